@@ -1,0 +1,126 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The executable ``bridge``: a MAVLink illuminator as a ROS 2 node."""
+
+from __future__ import annotations
+
+import sys
+
+
+def usage() -> str:
+    """Return what ``--help`` prints."""
+    from .ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS, ParameterSpec
+
+    def row(spec: ParameterSpec, default: str) -> str:
+        unit = f' ({spec.unit})' if spec.unit else ''
+        choices = f': {", ".join(spec.choices)}' if spec.choices else ''
+        return f'  {spec.name:22} {default:27} {spec.description}{unit}{choices}'
+
+    link = '\n'.join(row(spec, '' if spec.default in ('', ['']) else str(spec.default))
+                     for spec in LINK_PARAMETERS)
+    device = '\n'.join(row(spec, '') for spec in DEVICE_PARAMETERS)
+    return f"""\
+usage: bridge [-h | --version] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
+
+Makes a MAVLink illuminator (searchlight, torch, strobe) a ROS 2 node, /illuminator.
+
+examples:
+  ros2 run illuminator_ros bridge
+  ros2 run illuminator_ros bridge --ros-args -p connection_url:=serial:///dev/ttyACM0:57600
+  ros2 run illuminator_ros bridge --ros-args -p connection_url:=udpin://0.0.0.0:14550
+
+  ros2 service call /illuminator/enable std_srvs/srv/SetBool "{{data: true}}"
+  ros2 param set /illuminator brightness 60
+
+parameters of the link, fixed at the start, with their defaults:
+{link}
+
+parameters of the light, sent to it when it connects and whenever they are set:
+{device}
+
+connection URLs, each meaning what it means in MAVROS, MAVSDK or pymavlink:
+  udp://[BIND][:PORT]@[HOST][:PORT]   udpin://BIND:PORT   udpout://HOST:PORT
+  tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
+  serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
+
+exit status: 0 after SIGINT or SIGTERM, 2 if an argument or parameter is wrong.
+"""
+
+
+def main(args: list[str] | None = None) -> int:
+    """
+    Run the bridge until SIGINT or SIGTERM; see :func:`usage`.
+
+    :param args: the command line without the program's name.
+    """
+    arguments = sys.argv[1:] if args is None else args
+    try:
+        return _run(arguments)
+    except KeyboardInterrupt:
+        return 0
+
+
+def _run(arguments: list[str]) -> int:
+    from rclpy.utilities import remove_ros_args
+    own = arguments if '--ros-args' not in arguments else remove_ros_args(['', *arguments])[1:]
+    if '-h' in own or '--help' in own:
+        print(usage(), end='')
+        return 0
+    if '--version' in own:
+        from . import __version__
+        print(__version__)
+        return 0
+    if own:
+        print(f'bridge: unknown argument {own[0]!r}; parameters go behind --ros-args, see '
+              'bridge --help', file=sys.stderr)
+        return 2
+    return _serve(arguments)
+
+
+def _serve(arguments: list[str]) -> int:
+    import signal
+
+    import rclpy
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+
+    from .ros.node import IlluminatorNode
+    from .ros.parameters import ParameterError
+    from .ros.process import BridgeProcess
+
+    rclpy.init(args=['bridge', *arguments])
+    process = None
+    try:
+        node = IlluminatorNode()
+        process = BridgeProcess(node)
+        process.start()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except ParameterError as error:
+        print(f'bridge: parameter {error}', file=sys.stderr)
+        return 2
+    finally:
+        # A second Ctrl-C must not interrupt what little is left to do.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if process is not None:
+            process.stop()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,273 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The configuration agreed with a light: who changed it last, and what is still to be sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from typing import Any, TYPE_CHECKING
+
+from .model import checked, Configuration, FIELDS, InvalidValue, Status
+from .observer import Cause
+from .operation import Configure, Done, OperationQueue, Result, unexplained
+
+if TYPE_CHECKING:
+    from .light import Light
+
+# s; rqt_reconfigure gives up after 1.0 s, and a set must have answered by then.
+CONFIGURE_LIMIT = 0.85
+# s between tries of overrides and restored configurations that got no answer.
+RESTORE_INTERVAL = 2.0
+
+
+class Agreement:
+    """
+    What a light is configured to be.
+
+    :ivar agreed: the configuration that was last accepted from us or, where somebody else has
+        changed it since, reported; None before the first status.
+    :ivar discrepancy: in what the light differs from what it has accepted, '' if in nothing.
+    """
+
+    def __init__(self, light: Light) -> None:
+        self._light = light
+        self.agreed: Configuration | None = None
+        self.discrepancy = ''
+        self._queue = OperationQueue()
+        self._setpoint: float | None = None
+        # Overrides, or what a restart has undone: still to be sent.
+        self._wanted: dict[str, Any] = {}
+        self._wanted_at = 0.0
+        self._restoring = False
+        # What the light has accepted and then not shown.
+        self._unfulfilled: Configuration | None = None
+
+    # Requests
+
+    def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
+        """
+        Change some fields with one command.
+
+        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
+        :param done: called once with the result.
+        """
+        if unreachable := self._light.unreachable(now):
+            done(Result(False, unreachable), now)
+            return
+        try:
+            values = self.check(changes)
+            self.with_changes(values)
+        except InvalidValue as error:
+            done(Result(False, str(error), permanent=True), now)
+            return
+
+        def finished(result: Result, now: float) -> None:
+            if result.success:
+                self._wanted = {n: v for n, v in self._wanted.items() if n not in values}
+            done(result, now)
+
+        self._submit(values, now, finished)
+
+    def check(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """
+        Return the changes, ready to be sent.
+
+        :raises InvalidValue: if one must not be.
+        """
+        limits = self._light.limits
+        return {name: checked(name, value, limits) for name, value in changes.items()}
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Configuration:
+        """
+        Return the agreed configuration with changes.
+
+        :raises InvalidValue: if nothing is agreed yet and the changes are not complete.
+        """
+        if self.agreed is not None:
+            return self.agreed.with_changes(changes)
+        missing = [name for name in FIELDS if name not in changes]
+        if missing:
+            raise InvalidValue(
+                'the light has not reported its configuration yet, so '
+                f'{", ".join(missing)} must be set in the same call')
+        return Configuration(**changes)
+
+    def set_brightness(self, brightness: float, now: float) -> None:
+        """
+        Take a setpoint of a stream: the newest wins, and one command is under way at a time.
+
+        :param brightness: %, checked.
+        """
+        if unreachable := self._light.unreachable(now):
+            self._light.observer.setpoint_failed(self._light, unreachable)
+            return
+        self._setpoint = brightness
+        current = self._queue.current
+        if isinstance(current, Configure) and current.stream:
+            current.supersede(now)
+        self.poll(now)
+
+    def want(self, values: Mapping[str, Any], now: float) -> None:
+        """
+        Have values sent as soon as the light has reported its configuration.
+
+        :param values: by name, checked but for the limits that the light reports.
+        """
+        self._wanted.update(values)
+        self._wanted_at = now
+
+    def _submit(
+        self, values: Mapping[str, Any], now: float, done: Done, *, stream: bool = False,
+    ) -> None:
+        def finished(result: Result, now: float) -> None:
+            if result.contradicted:
+                self._unfulfilled = operation.wanted
+                self.discrepancy = result.message
+            done(result, now)
+
+        operation = Configure(
+            self._light, values, finished, now=now, limit=now + CONFIGURE_LIMIT, stream=stream)
+        self._queue.submit(operation, now)
+
+    # What the light says
+
+    def agree(self, wanted: Configuration, status: Status | None) -> None:
+        """
+        Note that the light has accepted a configuration, with the status that shows it.
+
+        What the status shows in other steps than asked for is what is agreed; what it shows
+        otherwise for a good reason (heat, external sync) is not.
+        """
+        reported = status.configuration() if status else None
+        if reported:
+            far = wanted.differences(reported)
+            wanted = wanted.with_changes({
+                name: getattr(reported, name)
+                for name in wanted.differences(reported, step=False) if name not in far})
+        self._fulfilled()
+        self._adopt(wanted, Cause.REQUEST)
+
+    def _fulfilled(self) -> None:
+        self._unfulfilled = None
+        self.discrepancy = ''
+
+    def _adopt(self, configuration: Configuration, cause: Cause) -> None:
+        old, self.agreed = self.agreed, configuration
+        names = [name for name in FIELDS
+                 if old is None or getattr(old, name) != getattr(configuration, name)]
+        if names:
+            self._light.observer.configured(self._light, configuration, names, cause)
+
+    def restarted(self, now: float) -> None:
+        """Note that the light has restarted, so what was agreed may be gone."""
+        if self._light.settings.restore_configuration and self.agreed is not None:
+            agreed = self.agreed
+            # Overrides that have not been sent yet come before what was there without them.
+            self.want({**{name: getattr(agreed, name) for name in FIELDS
+                          if name != 'mode' or agreed.mode}, **self._wanted}, now)
+            self._restoring = True
+
+    def take_status(self, status: Status, now: float) -> None:
+        """Confirm what is under way, or follow what somebody else has changed."""
+        current = self._queue.current
+        if current is not None:
+            current.status(status, now)
+            return
+        reported = status.configuration()
+        if reported is None:
+            return
+        if self._unfulfilled and not unexplained(
+                self._unfulfilled, reported, status.error_flags, step=True):
+            self._fulfilled()
+        if self.agreed is None:
+            self._adopt(reported, Cause.FIRST_STATUS)
+        elif self._restoring:
+            wanted = self.agreed.with_changes(self._wanted)
+            if not unexplained(wanted, reported, status.error_flags, step=True):
+                # It kept its configuration, or got it back from somebody else.
+                self._wanted.clear()
+                self._restoring = False
+        else:
+            self._follow(status, self.agreed, reported)
+
+    def _follow(self, status: Status, agreed: Configuration, reported: Configuration) -> None:
+        names = unexplained(agreed, reported, status.error_flags, step=False)
+        if names:
+            far = unexplained(agreed, reported, status.error_flags, step=True)
+            self._adopt(
+                agreed.with_changes({name: getattr(reported, name) for name in names}),
+                Cause.LIGHT if far else Cause.ROUNDING)
+
+    # Time
+
+    def poll(self, now: float) -> None:
+        """Send what is still to be sent, one command at a time."""
+        self._queue.poll(now)
+        if self._queue.current is not None or not self._light.connected:
+            return
+        if self._setpoint is not None:
+            value, self._setpoint = self._setpoint, None
+            self._send_setpoint(value, now)
+        elif self._wanted and self.agreed is not None and now >= self._wanted_at:
+            self._send_wanted(now)
+
+    def _send_setpoint(self, value: float, now: float) -> None:
+        if self.agreed is not None and self.agreed.brightness == value and not self.discrepancy:
+            return
+
+        def finished(result: Result, now: float) -> None:
+            if result.success:
+                self._wanted.pop('brightness', None)
+            else:
+                self._light.observer.setpoint_failed(self._light, result.message)
+
+        try:
+            self._submit({'brightness': value}, now, finished, stream=True)
+        except InvalidValue as error:
+            self._light.observer.setpoint_failed(self._light, str(error))
+
+    def _send_wanted(self, now: float) -> None:
+        self._wanted_at = now + RESTORE_INTERVAL
+        observer, light = self._light.observer, self._light
+        for name, value in list(self._wanted.items()):
+            try:
+                checked(name, value, light.limits)
+            except InvalidValue as error:
+                del self._wanted[name]
+                observer.restored(light, False, str(error))
+        if not self._wanted:
+            self._restoring = False
+            return
+
+        def finished(result: Result, now: float) -> None:
+            if result.success or result.permanent:
+                self._wanted.clear()
+                self._restoring = False
+                observer.restored(light, result.success, result.message)
+            if not result.success:
+                self.discrepancy = result.message
+
+        self._submit(self.check(self._wanted), now, finished)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        due = self._queue.next_deadline()
+        if self._queue.current is None and self._light.connected:
+            if self._setpoint is not None:
+                return -math.inf
+            if self._wanted and self.agreed is not None:
+                due = min(due, self._wanted_at)
+        return due

@@ -1,0 +1,136 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The drone's side of the illuminator protocol: finds lights and keeps each of them up to date."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+from ..mavlink.command import CommandSender, Ending
+from ..mavlink.dialect import (
+    CommandAck,
+    ComponentInformationBasic,
+    IlluminatorStatus,
+    MavType,
+    Source,
+)
+from ..mavlink.dialect import Heartbeat as HeartbeatMessage
+from ..mavlink.endpoint import Endpoint, Heartbeat
+from .light import Light, Settings
+from .model import Identity, Status
+
+# Lights that are kept apart; one more is passed over, so that memory is bounded.
+MAX_LIGHTS = 128
+# s for which a heartbeat from our own address counts as a clash.
+CLASH_MEMORY = 10.0
+
+
+class Controller(Endpoint):
+    """
+    Finds illuminators on a link by what they send, never by their ids.
+
+    A component is one if its HEARTBEAT says so (MAV_TYPE_ILLUMINATOR) or if it sends
+    ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own.
+
+    :param identity: our own address.
+    :param on_light: called with each light when it is first heard.
+    :ivar lights: those found so far, by address, in the order in which they were found.
+    :ivar clash_at: when a heartbeat from our own address was last heard.
+    :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
+    """
+
+    def __init__(
+        self, identity: Source, settings: Settings, *, command_timeout: float = 0.5,
+        command_retries: int = 3, on_light: Callable[[Light], None] = lambda light: None,
+    ) -> None:
+        super().__init__()
+        self.identity = identity
+        self.settings = settings
+        self.lights: dict[Source, Light] = {}
+        self.clash_at = -math.inf
+        self.passed_over = False
+        self._on_light = on_light
+        self._heartbeat = Heartbeat(identity, MavType.ONBOARD_CONTROLLER)
+        self._link_open = False
+        self.sender = CommandSender(
+            lambda message: self.outgoing.append((identity, message)), identity,
+            command_timeout, command_retries)
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Endpoint.link_opened`."""
+        self._link_open = True
+        self._heartbeat.send(now, self.outgoing)
+
+    def link_closed(self, now: float) -> None:
+        """See :meth:`Endpoint.link_closed`."""
+        self._link_open = False
+        self.sender.end_all(now, Ending.LINK_LOST)
+        for light in self.lights.values():
+            light.lose('the link was lost')
+
+    def receive(self, source: Source, message: Any, now: float) -> None:
+        """See :meth:`Endpoint.receive`."""
+        if source == self.identity:
+            if isinstance(message, HeartbeatMessage):
+                self.clash_at = now
+            return
+        if isinstance(message, IlluminatorStatus):
+            light = self._light(source)
+            if light:
+                light.take_status(Status.from_message(message), now)
+        elif isinstance(message, HeartbeatMessage):
+            is_light = message.type == MavType.ILLUMINATOR
+            light = self._light(source) if is_light else self.lights.get(source)
+            if light:
+                light.heard(now)
+        elif isinstance(message, CommandAck):
+            self.sender.acknowledge(source, message, now)
+        elif isinstance(message, ComponentInformationBasic):
+            light = self.lights.get(source)
+            if light:
+                light.take_information(Identity.from_message(message), now)
+
+    def _light(self, source: Source) -> Light | None:
+        """Return the light at an address, a new one if need be; None if there is no room."""
+        light = self.lights.get(source)
+        if light is None:
+            if len(self.lights) >= MAX_LIGHTS:
+                self.passed_over = True
+                return None
+            light = self.lights[source] = Light(source, self.sender, self.settings)
+            self._on_light(light)
+        return light
+
+    def clashes(self, now: float) -> bool:
+        """Return whether somebody else uses our address."""
+        return now - self.clash_at < CLASH_MEMORY
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Endpoint.poll`."""
+        if self._link_open:
+            self._heartbeat.poll(now, self.outgoing)
+        self.sender.poll(now)
+        for light in self.lights.values():
+            if now >= light.next_deadline():
+                light.poll(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Endpoint.next_deadline`."""
+        heartbeat = self._heartbeat.due if self._link_open else math.inf
+        lights = min((light.next_deadline() for light in self.lights.values()),
+                     default=math.inf)
+        return min(heartbeat, self.sender.next_deadline(), lights)

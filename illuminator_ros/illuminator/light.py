@@ -1,0 +1,225 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One light as the drone's side sees it: liveness, status and requests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+
+from ..mavlink.command import Command, CommandSender, format_seconds, Outcome
+from ..mavlink.dialect import MavCmd, Source, STATUS_ID
+from .agreement import Agreement
+from .identification import Identification
+from .model import ErrorFlag, Identity, Limits, Status
+from .observer import LightObserver
+from .operation import Done, Enable, OperationQueue, Result
+from .refresh import Refresh
+from .uptime import compare_uptime, Uptime
+
+# s without a status after which the light is asked for one, and between the askings.
+STATUS_TIMEOUT = 2.5
+
+
+@dataclass(frozen=True)
+class Settings:
+    """
+    How lights are treated.
+
+    :param heartbeat_timeout: s without a heartbeat or status, after which a light is lost.
+    :param status_interval: s between statuses to ask the light for; 0 leaves its own.
+    :param restore_configuration: whether a light that has restarted gets the agreed
+        configuration again.
+    """
+
+    heartbeat_timeout: float = 3.0
+    status_interval: float = 0.0
+    restore_configuration: bool = True
+
+
+class Light:
+    """
+    One component that is an illuminator. No I/O; time is passed in.
+
+    :ivar connected: whether it is heard.
+    :ivar status: the newest status, None before the first.
+    :ivar restarts: how often it has restarted since it was found.
+    :ivar measures_temperature: whether it has ever sent a temperature other than 0.
+    """
+
+    def __init__(
+        self, source: Source, sender: CommandSender, settings: Settings,
+        observer: LightObserver | None = None,
+    ) -> None:
+        self.source = source
+        self.sender = sender
+        self.settings = settings
+        self.observer = observer or LightObserver()
+        self.connected = False
+        self.heard_at = -math.inf
+        self.status: Status | None = None
+        self.status_at = -math.inf
+        self.restarts = 0
+        self.measures_temperature = False
+        self.identification = Identification(self)
+        self.agreement = Agreement(self)
+        self._switching = OperationQueue()
+        self._status_due = math.inf
+        self._refreshes: list[Refresh] = []
+
+    # What comes in
+
+    def heard(self, now: float) -> None:
+        """Take a heartbeat, or anything else that shows that the light is alive."""
+        self.heard_at = now
+        if not self.connected:
+            self.connected = True
+            self._set_up(now)
+            self.observer.connected(self)
+
+    def take_status(self, status: Status, now: float) -> None:
+        """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
+        returned = not self.connected
+        self.heard(now)
+        meaning = Uptime.RUNNING
+        if self.status is not None:
+            meaning = compare_uptime(
+                self.status.uptime_ms, status.uptime_ms, now - self.status_at)
+        if meaning is Uptime.LATE:
+            return
+        self.status = status
+        self.status_at = now
+        self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
+        # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
+        self.measures_temperature |= bool(status.temperature)
+        if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and returned):
+            self._restarted(now)
+        self.observer.status(self, status)
+        if self._switching.current:
+            self._switching.current.status(status, now)
+        self.agreement.take_status(status, now)
+        self._tell_refreshes(lambda refresh: refresh.status(now))
+
+    def take_information(self, identity: Identity, now: float) -> None:
+        """Take a COMPONENT_INFORMATION_BASIC."""
+        self.heard(now)
+        self.identification.received(identity, now)
+        self.observer.identified(self, identity)
+
+    def lose(self, reason: str) -> None:
+        """Note that the light is not heard any more."""
+        if self.connected:
+            self.connected = False
+            self._status_due = math.inf
+            self.observer.lost(self, reason)
+
+    def _restarted(self, now: float) -> None:
+        self.restarts += 1
+        self.observer.restarted(self)
+        self._set_up(now)
+        self.agreement.restarted(now)
+
+    def _set_up(self, now: float) -> None:
+        """Ask for what the light does not send by itself, when it is found or has restarted."""
+        interval = self.settings.status_interval
+        if interval > 0:
+            self.sender.start(Command(
+                self.source, MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6)),
+                now, lambda outcome, now: None)
+        self._status_due = now + STATUS_TIMEOUT
+        self.request_status(now)
+        self.identification.ask(now)
+
+    # What is known
+
+    @property
+    def sends_status(self) -> bool:
+        """Whether the light has ever sent a status."""
+        return self.status is not None
+
+    @property
+    def limits(self) -> Limits:
+        """The strobe periods that the light reports to be possible."""
+        return self.status.limits if self.status else Limits()
+
+    @property
+    def temperature(self) -> float | None:
+        """The temperature, degC; None where the light does not measure it, or its sensor fails."""
+        status = self.status
+        if (status is None or not self.measures_temperature
+                or status.error_flags & ErrorFlag.THERMISTOR_FAILURE):
+            return None
+        return status.temperature
+
+    def unreachable(self, now: float) -> str:
+        """Return why requests cannot reach the light, for people; '' if they can."""
+        if self.connected:
+            return ''
+        absence = format_seconds(now - self.heard_at)
+        return f'light {self.source} is lost: no heartbeat for {absence}'
+
+    # Requests
+
+    def enable(self, on: bool, now: float, done: Done) -> None:
+        """Switch the light on or off; ``done`` is called once with the result."""
+        if unreachable := self.unreachable(now):
+            done(Result(False, unreachable), now)
+        else:
+            self._switching.submit(Enable(self, on, done, now=now), now)
+
+    def refresh(self, now: float, done: Done) -> None:
+        """Ask for identity and status again; ``done`` is called once with the result."""
+        if unreachable := self.unreachable(now):
+            done(Result(False, unreachable), now)
+            return
+        self._refreshes.append(Refresh(self, now, done))
+
+    def request_status(self, now: float, done: Callable[[Outcome, float], None] | None = None,
+                       ) -> None:
+        """Ask for a status; without ``done`` only where no question is under way already."""
+        if done is None and self.sender.pending(self.source, MavCmd.REQUEST_MESSAGE):
+            return
+        self.sender.start(
+            Command(self.source, MavCmd.REQUEST_MESSAGE, (float(STATUS_ID),)), now,
+            done or (lambda outcome, now: None))
+
+    # Time
+
+    def poll(self, now: float) -> None:
+        """Do what is due."""
+        if self.connected and now - self.heard_at >= self.settings.heartbeat_timeout:
+            self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}')
+        if now >= self._status_due:
+            self._status_due = now + STATUS_TIMEOUT
+            self.request_status(now)
+        self.identification.poll(now)
+        self._switching.poll(now)
+        self.agreement.poll(now)
+        self._tell_refreshes(lambda refresh: refresh.poll(now))
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        lost = (self.heard_at + self.settings.heartbeat_timeout if self.connected
+                else math.inf)
+        refresh = min((refresh.until for refresh in self._refreshes), default=math.inf)
+        return min(lost, self._status_due, refresh, self.identification.next_deadline(),
+                   self._switching.next_deadline(), self.agreement.next_deadline())
+
+    def _tell_refreshes(self, tell: Callable[[Refresh], None]) -> None:
+        for refresh in list(self._refreshes):
+            tell(refresh)
+            if refresh.finished:
+                self._refreshes.remove(refresh)

@@ -1,0 +1,304 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What an illuminator is: its status, configuration, limits and identity, and what they may be.
+
+https://mavlink.io/en/services/illuminator.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import IntEnum, IntFlag
+import math
+import struct
+from typing import Any
+
+ABSOLUTE_ZERO_C = -273.15
+MAX_TEMPERATURE_C = 1000.0
+# s; whatever blinks once an hour is no strobe, and neither is what reports more.
+MAX_STROBE_PERIOD = 3600.0
+# A light rounds what it is told to its own steps: that is no other configuration.
+# % for brightness and duty cycle; relative for the strobe period.
+PERCENT_STEP = 0.5
+PERIOD_STEP = 0.01
+FLOAT32_STEP = 1e-6
+
+
+class Mode(IntEnum):
+    """ILLUMINATOR_MODE."""
+
+    UNKNOWN = 0
+    INTERNAL_CONTROL = 1
+    EXTERNAL_SYNC = 2
+
+    @property
+    def label(self) -> str:
+        """Return the name that the ROS interface uses."""
+        return self.name.lower()
+
+
+# The modes that can be asked for; UNKNOWN can only be reported.
+MODES = {mode.label: mode for mode in Mode if mode is not Mode.UNKNOWN}
+
+
+class ErrorFlag(IntFlag):
+    """ILLUMINATOR_ERROR_FLAGS."""
+
+    THERMAL_THROTTLING = 1
+    OVER_TEMPERATURE_SHUTDOWN = 2
+    THERMISTOR_FAILURE = 4
+
+
+# The flags under which a light is less bright than it was told to be.
+DIMMING_FLAGS = ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN
+KNOWN_FLAGS = DIMMING_FLAGS | ErrorFlag.THERMISTOR_FAILURE
+
+
+def flag_names(flags: int) -> list[str]:
+    """Return readable names of error flags; unknown bits as one hexadecimal number."""
+    names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlag
+             if flag & flags and flag.name]
+    if unknown := flags & ~KNOWN_FLAGS:
+        names.append(f'unknown flags 0x{unknown:x}')
+    return names
+
+
+def float32(value: float) -> float:
+    """Return a number as it comes back from a float field; infinity where it does not fit."""
+    try:
+        return float(struct.unpack('<f', struct.pack('<f', value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def shortest(value: float) -> float:
+    """Return the shortest decimal number that is this float32: 60.1 for 60.099998474."""
+    for digits in range(1, 9):
+        short = float(f'{value:.{digits}g}')
+        if float32(short) == value:
+            return short
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """
+    The strobe periods that a light reports to be possible, s.
+
+    Both 0 means that it does not say: ArduSub sends zeros for what it does not know.
+    """
+
+    min_strobe_period: float = 0.0
+    max_strobe_period: float = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether the light says anything of use."""
+        low, high = self.min_strobe_period, self.max_strobe_period
+        return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
+
+
+class InvalidValue(ValueError):
+    """A value that the light must not get; the message names it and says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """
+    What MAV_CMD_DO_ILLUMINATOR_CONFIGURE carries.
+
+    :param brightness: %, 0..100.
+    :param strobe_period: s, >= 0; 0 means no strobe.
+    :param strobe_duty_cycle: %, 0..100.
+    """
+
+    mode: Mode
+    brightness: float
+    strobe_period: float
+    strobe_duty_cycle: float
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Configuration:
+        """Return this configuration with some of its fields replaced."""
+        return replace(self, **changes)
+
+    def params(self) -> tuple[float, float, float, float]:
+        """
+        Return param1 to param4 of the command.
+
+        A light whose mode is unknown is asked for internal control: it is the one mode in which
+        the rest of the command means anything, and 0 would be denied.
+        """
+        mode = self.mode or Mode.INTERNAL_CONTROL
+        return float(mode), self.brightness, self.strobe_period, self.strobe_duty_cycle
+
+    def differences(self, other: Configuration, *, step: bool = True) -> list[str]:
+        """
+        Return the names of the fields in which two configurations differ.
+
+        :param step: whether a light's own rounding is passed over; float32's always is.
+        """
+        percent = PERCENT_STEP if step else 0.0
+        period = PERIOD_STEP if step else FLOAT32_STEP
+        same = {
+            'mode': self.mode == other.mode,
+            'brightness': math.isclose(self.brightness, other.brightness,
+                                       rel_tol=FLOAT32_STEP, abs_tol=percent),
+            'strobe_period': math.isclose(self.strobe_period, other.strobe_period,
+                                          rel_tol=period, abs_tol=1e-6),
+            'strobe_duty_cycle': math.isclose(self.strobe_duty_cycle, other.strobe_duty_cycle,
+                                              rel_tol=FLOAT32_STEP, abs_tol=percent),
+        }
+        return [name for name, is_same in same.items() if not is_same]
+
+    def describe(self, names: list[str] | None = None) -> str:
+        """Return some or all of the fields for people, with units."""
+        texts = {
+            'mode': f'mode {self.mode.label}',
+            'brightness': f'brightness {self.brightness:g} %',
+            'strobe_period': f'strobe_period {self.strobe_period:g} s',
+            'strobe_duty_cycle': f'strobe_duty_cycle {self.strobe_duty_cycle:g} %',
+        }
+        return ', '.join(texts[name] for name in names or texts)
+
+
+FIELDS = ('mode', 'brightness', 'strobe_period', 'strobe_duty_cycle')
+_UPPER = {'brightness': 100.0, 'strobe_period': MAX_STROBE_PERIOD, 'strobe_duty_cycle': 100.0}
+_UNITS = {'brightness': '%', 'strobe_period': 's', 'strobe_duty_cycle': '%'}
+
+
+def checked(name: str, value: Any, limits: Limits | None = None) -> Mode | float:
+    """
+    Return the value of a configuration field, ready to be sent.
+
+    :param name: one of :data:`FIELDS`.
+    :param value: a number, or for the mode one of :data:`MODES`.
+    :raises InvalidValue: if the light must not get it.
+    """
+    if name == 'mode':
+        if isinstance(value, Mode) and value in MODES.values():
+            return value
+        if not isinstance(value, str) or value not in MODES:
+            raise InvalidValue(f'mode {value!r} is none of {", ".join(MODES)}')
+        return MODES[value]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidValue(f'{name} {value!r} is no number')
+    unit = _UNITS[name]
+    if not math.isfinite(value):
+        raise InvalidValue(f'{name} {value} is not a finite number')
+    if not 0 <= value <= _UPPER[name]:
+        raise InvalidValue(
+            f'{name} {value:g} {unit} is out of range: 0 to {_UPPER[name]:g} {unit}')
+    if name == 'strobe_period':
+        _check_period(float(value), limits)
+    return float(value)
+
+
+def _check_period(period: float, limits: Limits | None) -> None:
+    """Compare as float32, which is what the light compares: 0.1 there is more than 0.1."""
+    sent = float32(period)
+    if period and limits and limits.known and not (
+            limits.min_strobe_period <= sent <= limits.max_strobe_period):
+        raise InvalidValue(
+            f'strobe_period {period:g} s is outside what the light reports: 0 (no strobe) or '
+            f'{shortest(limits.min_strobe_period):g} to {shortest(limits.max_strobe_period):g} s')
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """
+    An ILLUMINATOR_STATUS. What is not believable in it is None and named in ``invalid``.
+
+    :param uptime_ms: ms since the light started, wrapping at 2**32.
+    :param mode_bitmask: as sent; lights differ in what it means.
+    :param error_flags: as sent; see :class:`ErrorFlag`.
+    :param brightness: %, 0..100.
+    :param strobe_period: s, >= 0.
+    :param strobe_duty_cycle: %, 0..100.
+    :param temperature: degC, as sent: 0 may mean "not measured".
+    """
+
+    uptime_ms: int
+    enabled: bool | None
+    mode: Mode
+    mode_bitmask: int
+    error_flags: int
+    brightness: float | None
+    strobe_period: float | None
+    strobe_duty_cycle: float | None
+    temperature: float | None
+    limits: Limits
+    invalid: tuple[str, ...] = ()
+
+    @classmethod
+    def from_message(cls, message: Any) -> Status:
+        """Read a message. Any content is accepted: what is wrong is marked, not raised."""
+        invalid: list[str] = []
+
+        def number(name: str, low: float, high: float) -> float | None:
+            value = getattr(message, name)
+            if math.isfinite(value) and low <= value <= high:
+                return float(value)
+            invalid.append(f'{name} {value:g}')
+            return None
+
+        try:
+            mode = Mode(message.mode)
+        except ValueError:
+            mode = Mode.UNKNOWN
+            invalid.append(f'mode {message.mode}')
+        if message.enable not in (0, 1):
+            invalid.append(f'enable {message.enable}')
+        return cls(
+            message.uptime_ms, bool(message.enable) if message.enable in (0, 1) else None,
+            mode, message.mode_bitmask, message.error_status,
+            number('brightness', 0, 100), number('strobe_period', 0, MAX_STROBE_PERIOD),
+            number('strobe_duty_cycle', 0, 100),
+            number('temp_c', ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C),
+            Limits(message.min_strobe_period, message.max_strobe_period), tuple(invalid))
+
+    def configuration(self) -> Configuration | None:
+        """Return the configuration that the light reports, None if a part is not believable."""
+        if (self.brightness is None or self.strobe_period is None
+                or self.strobe_duty_cycle is None):
+            return None
+        return Configuration(
+            self.mode, shortest(self.brightness), shortest(self.strobe_period),
+            shortest(self.strobe_duty_cycle))
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """A COMPONENT_INFORMATION_BASIC; what the light leaves empty is ''."""
+
+    vendor: str = ''
+    model: str = ''
+    software_version: str = ''
+    hardware_version: str = ''
+    serial_number: str = ''
+
+    @classmethod
+    def from_message(cls, message: Any) -> Identity:
+        """Read a message; a field that is full has no terminator, and some have odd bytes."""
+        return cls(*(text(getattr(message, name)) for name in (
+            'vendor_name', 'model_name', 'software_version', 'hardware_version',
+            'serial_number')))
+
+
+def text(field: bytes) -> str:
+    """Return the printable text of a char field, up to its terminator if it has one."""
+    raw = field.partition(b'\0')[0].decode('utf-8', errors='replace')
+    return ''.join(c if c.isprintable() else '?' for c in raw).strip()

@@ -1,0 +1,104 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How a light gets hot, and what it does about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from .model import ErrorFlag
+
+
+@dataclass(frozen=True)
+class ThermalProperties:
+    """
+    A first-order thermal model with two thresholds, each with hysteresis.
+
+    :param ambient: degC.
+    :param rise: K above ambient that full power leads to in the end.
+    :param time_constant: s.
+    :param throttle_at: degC at which brightness is cut to ``throttle_to`` (a share, 0..1) ...
+    :param throttle_until: ... until it is cooler than this, degC.
+    :param shutdown_at: degC at which the light goes dark ...
+    :param shutdown_until: ... until it is cooler than this, degC.
+    """
+
+    ambient: float = 25.0
+    rise: float = 60.0
+    time_constant: float = 120.0
+    throttle_at: float = 80.0
+    throttle_until: float = 70.0
+    throttle_to: float = 0.5
+    shutdown_at: float = 95.0
+    shutdown_until: float = 65.0
+
+    def __post_init__(self) -> None:
+        if not self.time_constant > 0:
+            raise ValueError(f'time constant {self.time_constant} s is not above 0')
+        if not self.throttle_until < self.throttle_at <= self.shutdown_at:
+            raise ValueError('the throttling thresholds are not in order')
+        if not self.shutdown_until < self.shutdown_at:
+            raise ValueError('the shutdown thresholds are not in order')
+
+
+class ThermalModel:
+    """
+    The temperature of a light over time.
+
+    :ivar temperature: degC.
+    :ivar flags: what it makes the light report.
+    """
+
+    def __init__(self, properties: ThermalProperties) -> None:
+        self.properties = properties
+        self.temperature = properties.ambient
+        self.flags = ErrorFlag(0)
+
+    @property
+    def output(self) -> float:
+        """Return the share (0..1) of the brightness asked for that the light gives."""
+        if self.flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN:
+            return 0.0
+        if self.flags & ErrorFlag.THERMAL_THROTTLING:
+            return self.properties.throttle_to
+        return 1.0
+
+    def advance(self, seconds: float, power: float) -> None:
+        """
+        Let time pass.
+
+        :param power: what the light is asked to give, as a share of full power (0..1).
+        """
+        longest = self.properties.time_constant / 50
+        steps = max(math.ceil(seconds / longest), 1)
+        for _ in range(steps):
+            self._step(seconds / steps, power)
+
+    def _step(self, seconds: float, power: float) -> None:
+        properties = self.properties
+        final = properties.ambient + properties.rise * power * self.output
+        decay = math.exp(-seconds / properties.time_constant)
+        self.temperature = final + (self.temperature - final) * decay
+        self._switch(ErrorFlag.THERMAL_THROTTLING, properties.throttle_at,
+                     properties.throttle_until)
+        self._switch(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN, properties.shutdown_at,
+                     properties.shutdown_until)
+
+    def _switch(self, flag: ErrorFlag, on_at: float, off_below: float) -> None:
+        if self.temperature >= on_at:
+            self.flags |= flag
+        elif self.temperature < off_below:
+            self.flags &= ~flag

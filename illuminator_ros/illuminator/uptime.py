@@ -1,0 +1,60 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a light's uptime tells: time goes on, it has restarted, or the frame is an old one."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+WRAP_MS = 1 << 32
+# s; a frame later than this is not late, it is from another life of the light.
+MAX_LATE = 5.0
+# Slack for clocks and links: s, and a share of the time passed.
+SLACK = 2.0
+DRIFT = 0.05
+
+
+class Uptime(Enum):
+    """What an uptime means beside the last one."""
+
+    RUNNING = 'running'
+    RESTARTED = 'restarted'
+    LATE = 'late'
+    NO_CLOCK = 'no clock'
+
+
+def compare_uptime(last_ms: int, new_ms: int, elapsed: float) -> Uptime:
+    """
+    Compare the uptime of a status with that of the newest one before.
+
+    :param elapsed: s between the two on our clock, >= 0.
+
+    The uptime wraps after 49.7 days. A light that was out of hearing for long may have restarted
+    and show a greater uptime than before, but never one greater than the time since.
+    """
+    if new_ms == last_ms:
+        # The same status twice or within a millisecond, or a light that has no clock.
+        return Uptime.RUNNING if elapsed < SLACK else Uptime.NO_CLOCK
+    ahead = (new_ms - last_ms - elapsed * 1000.0 + WRAP_MS / 2) % WRAP_MS - WRAP_MS / 2
+    slack = 1000.0 * (SLACK + DRIFT * elapsed)
+    forward = (new_ms - last_ms) % WRAP_MS < WRAP_MS / 2
+    if abs(ahead) <= slack and forward:
+        return Uptime.RUNNING
+    if new_ms <= 1000.0 * (elapsed + SLACK / 4):
+        return Uptime.RESTARTED
+    if forward:
+        return Uptime.RUNNING
+    late_ms = (last_ms - new_ms) % WRAP_MS
+    return Uptime.LATE if late_ms <= 1000.0 * MAX_LATE else Uptime.RESTARTED

@@ -1,0 +1,185 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+MAVLink frames from and to bytes; no I/O and no clock.
+
+Reads MAVLink 1 and 2 and writes MAVLink 2 (MAVLink guide, "Packet Serialization"). A frame
+counts only when its checksum is right. After anything else the search goes on one byte later,
+never behind the length that a bad header claims: whatever stands between good frames, no good
+frame is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import re
+
+from fastcrc.crc16 import mcrf4xx
+
+from .dialect import Layout, LAYOUTS, Source
+
+STX_V1 = 0xFE
+STX_V2 = 0xFD
+HEADER_V1 = 6
+HEADER_V2 = 10
+CHECKSUM = 2
+SIGNATURE = 13
+FLAG_SIGNED = 0x01
+MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
+
+_START = re.compile(b'[\xfd\xfe]')
+
+
+@dataclass(slots=True)
+class Frame:
+    """
+    A frame whose checksum is right.
+
+    :param version: 1 or 2.
+    :param signature: the 13 bytes of a signed frame: link id, 6 bytes of time stamp, 6 bytes of
+        signature; None where it is not signed.
+    :param signed_part: the bytes that the signature covers before it, from STX to the checksum.
+    """
+
+    version: int
+    sequence: int
+    source: Source
+    message_id: int
+    payload: bytes
+    signature: bytes | None = None
+    signed_part: bytes = b''
+
+
+@dataclass(slots=True)
+class DecoderCounters:
+    """What a :class:`Decoder` has met: bytes and frames since it was made."""
+
+    frames: int = 0
+    crc_errors: int = 0
+    unknown_ids: int = 0
+    skipped_bytes: int = 0
+
+
+def encode_frame(
+    message_id: int, payload: bytes, *, sequence: int, source: Source, crc_extra: int,
+    signed: bool = False,
+) -> bytes:
+    """
+    Return a MAVLink 2 frame, without the signature that a signed one still needs.
+
+    :param payload: at most 255 bytes; its trailing zeros are cut, all but the first byte.
+    :param sequence: 0..255.
+    """
+    body = payload.rstrip(b'\0') or payload[:1]
+    frame = bytes((
+        STX_V2, len(body), FLAG_SIGNED if signed else 0, 0, sequence, source.system,
+        source.component, message_id & 0xFF, message_id >> 8 & 0xFF, message_id >> 16,
+    )) + body
+    checksum = mcrf4xx(frame[1:] + bytes((crc_extra,)))
+    return frame + checksum.to_bytes(CHECKSUM, 'little')
+
+
+@dataclass
+class Decoder:
+    """
+    Checked frames from a stream of bytes, in whatever pieces it comes.
+
+    Keeps at most one incomplete frame (:data:`MAX_FRAME` bytes). Frames with an id that is not
+    in ``layouts`` cannot be checked and are never returned.
+    """
+
+    layouts: Mapping[int, Layout] = field(default_factory=lambda: LAYOUTS)
+    counters: DecoderCounters = field(default_factory=DecoderCounters)
+    _rest: bytes = b''
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Return the frames that ``data`` completes, in order."""
+        data = self._rest + data if self._rest else data
+        frames: list[Frame] = []
+        position = end = 0
+        while match := _START.search(data, position):
+            start = match.start()
+            found = self._read(data, start)
+            if found is None:
+                break
+            size, frame = found
+            if frame is None:
+                position = start + 1
+                continue
+            frames.append(frame)
+            self.counters.skipped_bytes += start - end
+            position = end = start + size
+        else:
+            start = len(data)
+        self.counters.frames += len(frames)
+        self.counters.skipped_bytes += start - end
+        self._rest = data[start:]
+        return frames
+
+    def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""
+        if data[start] == STX_V2:
+            return self._read_v2(data, start)
+        return self._read_v1(data, start)
+
+    def _read_v2(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        if len(data) - start < HEADER_V2:
+            return None
+        length, flags, _, sequence, system, component = data[start + 1:start + 7]
+        message_id = int.from_bytes(data[start + 7:start + HEADER_V2], 'little')
+        layout = self.layouts.get(message_id)
+        # "Incompatibility flags": a frame with a flag that is not understood must be dropped.
+        if layout is None or flags & ~FLAG_SIGNED:
+            self.counters.unknown_ids += layout is None
+            return 1, None
+        end = start + HEADER_V2 + length + CHECKSUM
+        size = end - start + (SIGNATURE if flags & FLAG_SIGNED else 0)
+        if len(data) < start + size:
+            return None
+        if not self._checksum_right(data, start, end, layout.crc_extra):
+            return 1, None
+        frame = Frame(
+            2, sequence, Source(system, component), message_id,
+            data[start + HEADER_V2:end - CHECKSUM])
+        if flags & FLAG_SIGNED:
+            frame.signature = data[end:start + size]
+            frame.signed_part = data[start:end]
+        return size, frame
+
+    def _read_v1(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        if len(data) - start < HEADER_V1:
+            return None
+        length, sequence, system, component, message_id = data[start + 1:start + HEADER_V1]
+        layout = self.layouts.get(message_id)
+        # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting
+        # for the rest of it would hold back the good frames behind.
+        if layout is None or length > layout.size:
+            self.counters.unknown_ids += layout is None
+            return 1, None
+        end = start + HEADER_V1 + length + CHECKSUM
+        if len(data) < end:
+            return None
+        if not self._checksum_right(data, start, end, layout.crc_extra):
+            return 1, None
+        return end - start, Frame(
+            1, sequence, Source(system, component), message_id,
+            data[start + HEADER_V1:end - CHECKSUM])
+
+    def _checksum_right(self, data: bytes, start: int, end: int, crc_extra: int) -> bool:
+        body = data[start + 1:end - CHECKSUM] + bytes((crc_extra,))
+        right = mcrf4xx(body) == int.from_bytes(data[end - CHECKSUM:end], 'little')
+        self.counters.crc_errors += not right
+        return right

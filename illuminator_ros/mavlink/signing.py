@@ -1,0 +1,155 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+MAVLink 2 message signing, on frames; no I/O, and time is passed in.
+
+https://mavlink.io/en/guide/message_signing.html. A frame is checked in this order: checksum (by
+the decoder), signature, time stamp; and only then is anything remembered of it. A forged frame
+changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+import hashlib
+import hmac
+
+from .dialect import Source
+from .framing import Frame, SIGNATURE
+
+# Time stamps count 10 us from 2015-01-01 00:00 UTC, in 48 bits.
+EPOCH = 1_420_070_400
+TICKS_PER_SECOND = 100_000
+MAX_TICKS = (1 << 48) - 1
+# A stream that is not known yet may be this far behind ("Timestamp Handling").
+NEW_STREAM_TICKS = 60 * TICKS_PER_SECOND
+MAX_STREAMS = 256
+KEY_SIZE = 32
+
+
+class SigningMode(Enum):
+    """
+    What is signed and what is believed.
+
+    ``off``: nothing is signed, and every frame is taken. ``sign``: what we send is signed;
+    unsigned frames are taken, wrongly signed ones are not. ``require``: only rightly signed
+    frames are taken.
+    """
+
+    OFF = 'off'
+    SIGN = 'sign'
+    REQUIRE = 'require'
+
+
+@dataclass(slots=True)
+class SigningCounters:
+    """Frames by what their signature was found to be."""
+
+    good: int = 0
+    bad: int = 0
+    replayed: int = 0
+    unsigned: int = 0
+
+
+def ticks(unix_time: float) -> int:
+    """Return a Unix time (s) as a time stamp of the signing protocol."""
+    return min(max(int((unix_time - EPOCH) * TICKS_PER_SECOND), 0), MAX_TICKS)
+
+
+def signature(key: bytes, signed_part: bytes) -> bytes:
+    """Return the first 48 bits of SHA-256 over the key and the frame up to the time stamp."""
+    return hashlib.sha256(key + signed_part).digest()[:6]
+
+
+@dataclass
+class Signing:
+    """
+    Signs what goes out on a link and checks what comes in.
+
+    :param key: 32 bytes; may be missing only where the mode is off.
+    :param link_id: 0..255, our id for this link in what we sign.
+    :param timestamp: the last time stamp used, in ticks; from a former run.
+    :raises ValueError: if the mode needs a key and there is none of 32 bytes.
+    """
+
+    mode: SigningMode = SigningMode.OFF
+    key: bytes = field(default=b'', repr=False)
+    link_id: int = 0
+    timestamp: int = 0
+    counters: SigningCounters = field(default_factory=SigningCounters)
+    _streams: dict[tuple[int, Source], int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.mode is not SigningMode.OFF and len(self.key) != KEY_SIZE:
+            raise ValueError(f'signing needs a key of {KEY_SIZE} bytes, not {len(self.key)}')
+
+    @property
+    def signs(self) -> bool:
+        """Whether what we send is signed."""
+        return self.mode is not SigningMode.OFF
+
+    def sign(self, frame: bytes, unix_time: float) -> bytes:
+        """Return the frame with its signature. Its signed flag must already be set."""
+        self.timestamp = min(max(self.timestamp + 1, ticks(unix_time)), MAX_TICKS)
+        frame += bytes((self.link_id,)) + self.timestamp.to_bytes(6, 'little')
+        return frame + signature(self.key, frame)
+
+    def accepts(self, frame: Frame, unix_time: float) -> bool:
+        """Return whether a frame is to be believed."""
+        if self.mode is SigningMode.OFF:
+            return True
+        if frame.signature is None:
+            self.counters.unsigned += 1
+            return self.mode is SigningMode.SIGN
+        assert len(frame.signature) == SIGNATURE
+        expected = signature(self.key, frame.signed_part + frame.signature[:7])
+        if not hmac.compare_digest(expected, frame.signature[7:]):
+            self.counters.bad += 1
+            return False
+        if not self._fresh(frame, unix_time):
+            self.counters.replayed += 1
+            return False
+        self.counters.good += 1
+        return True
+
+    def _fresh(self, frame: Frame, unix_time: float) -> bool:
+        """Return whether the time stamp is new for its stream, and remember it if so."""
+        assert frame.signature is not None
+        stamp = int.from_bytes(frame.signature[1:7], 'little')
+        stream = (frame.signature[0], frame.source)
+        last = self._streams.get(stream)
+        oldest = max(self.timestamp, ticks(unix_time)) - NEW_STREAM_TICKS
+        if last is None:
+            if stamp < oldest or not self._room(oldest):
+                return False
+        elif stamp <= last:
+            return False
+        self._streams[stream] = stamp
+        # A peer with a better clock, or a longer memory, is followed.
+        self.timestamp = max(self.timestamp, stamp)
+        return True
+
+    def _room(self, oldest: int) -> bool:
+        """
+        Return whether one more stream can be remembered.
+
+        Forgetting a stream must not let its old frames in again: only those go that are so old
+        that their replay would be refused as too old for a new stream.
+        """
+        if len(self._streams) >= MAX_STREAMS:
+            for stream in [s for s, stamp in self._streams.items() if stamp < oldest]:
+                del self._streams[stream]
+        return len(self._streams) < MAX_STREAMS

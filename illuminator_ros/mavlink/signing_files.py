@@ -1,0 +1,108 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The two files of message signing: the key, and the last time stamp used."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from pathlib import Path
+import re
+import stat
+
+from .signing import KEY_SIZE, TICKS_PER_SECOND
+
+MIN_PASSPHRASE = 8
+MAX_KEY_FILE = 4096
+# The stored time stamp runs ahead of the last one used by this much, so that a crash between
+# two stores repeats none. The specification asks for a store at least once a minute.
+STORE_MARGIN = 60 * TICKS_PER_SECOND
+
+
+class KeyFileError(ValueError):
+    """A key file that cannot be used; the message names the file and says why, never the key."""
+
+
+def load_key(path: str) -> bytes:
+    """
+    Return the 32-byte key that a file holds.
+
+    The file has 32 raw bytes, or 64 hexadecimal digits, or a passphrase of at least 8 characters
+    whose SHA-256 is the key, as in MAVProxy and Mission Planner. 32 printable characters are a
+    passphrase.
+
+    :raises KeyFileError: if it cannot be read, is open to others, or holds none of these.
+    """
+    if not path:
+        raise KeyFileError('no key file is given (signing_key_file)')
+    try:
+        with open(path, 'rb') as file:
+            mode = os.fstat(file.fileno()).st_mode
+            content = file.read(MAX_KEY_FILE + 1)
+    except OSError as error:
+        raise KeyFileError(f'key file {path!r}: {error.strerror}') from None
+    if stat.S_IMODE(mode) & 0o077:
+        raise KeyFileError(
+            f'key file {path!r} can be read by others (mode {stat.S_IMODE(mode):04o}); '
+            f'make it private: chmod 600 {path}')
+    if len(content) > MAX_KEY_FILE:
+        raise KeyFileError(f'key file {path!r} is longer than {MAX_KEY_FILE} bytes')
+    text = content.rstrip(b'\r\n')
+    if re.fullmatch(rb'[0-9A-Fa-f]{64}', text):
+        return bytes.fromhex(text.decode())
+    if len(content) == KEY_SIZE and not re.fullmatch(rb'[ -~]+', text):
+        return content
+    if len(text) < MIN_PASSPHRASE:
+        raise KeyFileError(
+            f'key file {path!r} holds {len(text)} bytes: neither 32 raw bytes, nor 64 '
+            f'hexadecimal digits, nor a passphrase of at least {MIN_PASSPHRASE} characters')
+    return hashlib.sha256(text).digest()
+
+
+class TimestampStore:
+    """
+    The last time stamp used with a key, kept over restarts.
+
+    Lies in ``$ROS_HOME/illuminator_ros`` (``~/.ros/illuminator_ros``), a file per key file and
+    component.
+    """
+
+    def __init__(self, key_file: str, name: str, directory: Path | None = None) -> None:
+        home = Path(os.environ.get('ROS_HOME') or Path.home() / '.ros')
+        tag = hashlib.sha256(f'{os.path.realpath(key_file)}\0{name}'.encode()).hexdigest()[:16]
+        self.path = (directory or home / 'illuminator_ros') / f'signing-{tag}'
+
+    def load(self) -> int:
+        """Return the time stamp to go on from, 0 where none is stored."""
+        try:
+            return int(self.path.read_text())
+        except (OSError, ValueError):
+            return 0
+
+    def store(self, timestamp: int) -> None:
+        """
+        Replace the stored time stamp.
+
+        :raises OSError: if the directory cannot be written.
+        """
+        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        scratch = self.path.with_name(f'{self.path.name}.{os.getpid()}')
+        try:
+            scratch.write_text(f'{timestamp + STORE_MARGIN}\n')
+            os.replace(scratch, self.path)
+        finally:
+            with contextlib.suppress(OSError):
+                scratch.unlink()

@@ -1,0 +1,42 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Open channels for connection URLs: UDP, TCP, serial and in-memory."""
+
+from __future__ import annotations
+
+from ..url import MemoryUrl, SerialUrl, TcpUrl, UdpUrl, Url
+from .base import Channel, ChannelLost, Peer
+from .memory import open_memory
+from .serial import open_serial
+from .tcp import TcpClient, TcpServer
+from .udp import UdpChannel
+
+__all__ = ['Channel', 'ChannelLost', 'open_channel', 'Peer']
+
+
+def open_channel(url: Url) -> Channel:
+    """
+    Open what a connection URL names. May block for about a second: name lookup and connecting.
+
+    :raises OSError: if it cannot be opened; the text says why.
+    """
+    if isinstance(url, UdpUrl):
+        return UdpChannel(url)
+    if isinstance(url, TcpUrl):
+        return TcpServer(url.address) if url.listen else TcpClient(url.address)
+    if isinstance(url, SerialUrl):
+        return open_serial(url)
+    assert isinstance(url, MemoryUrl)
+    return open_memory(url)

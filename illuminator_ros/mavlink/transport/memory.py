@@ -1,0 +1,78 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An in-process link: everybody who opens the same name hears everybody else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import selectors
+import socket
+import threading
+from typing import Any
+
+from ..url import MemoryUrl
+from .base import Channel, Peer
+
+_hub: dict[str, list[_MemoryChannel]] = {}
+_lock = threading.Lock()
+
+
+def open_memory(url: MemoryUrl) -> Channel:
+    """Join the in-process link of this name."""
+    channel = _MemoryChannel(url.name)
+    with _lock:
+        _hub.setdefault(url.name, []).append(channel)
+    return channel
+
+
+class _MemoryChannel(Channel):
+    def __init__(self, hub_name: str) -> None:
+        self._hub_name = hub_name
+        self._inbox, self._entrance = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._inbox.setblocking(False)
+        self._entrance.setblocking(False)
+        self.name = f'memory {hub_name}'
+
+    def register(self, selector: selectors.BaseSelector) -> None:
+        selector.register(self._inbox, selectors.EVENT_READ)
+
+    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+        try:
+            while True:
+                yield None, self._inbox.recv(65536)
+        except BlockingIOError:
+            return
+
+    def peers(self, now: float) -> Sequence[Peer]:
+        return (None,)
+
+    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+        with _lock:
+            for other in _hub.get(self._hub_name, []):
+                if other is not self:
+                    try:
+                        other._entrance.send(frame)
+                    except BlockingIOError:
+                        self.dropped += 1
+
+    def close(self) -> None:
+        with _lock:
+            others = _hub.get(self._hub_name, [])
+            if self in others:
+                others.remove(self)
+            if not others:
+                _hub.pop(self._hub_name, None)
+        self._inbox.close()
+        self._entrance.close()

@@ -1,0 +1,103 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Serial ports, opened and set up by pyserial, read and written without blocking."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+import os
+import selectors
+from typing import Any, TYPE_CHECKING
+
+from ..url import SerialUrl
+from .base import Channel, ChannelLost, FrameQueue, Peer
+
+if TYPE_CHECKING:
+    from serial import Serial
+
+READ_SIZE = 4096
+
+
+def open_serial(url: SerialUrl) -> Channel:
+    """
+    Open a serial port, exclusively: a second reader would steal bytes.
+
+    :raises OSError: if it is not there, not ours, or in use.
+    """
+    try:
+        import serial
+    except ImportError:
+        raise OSError('a serial port needs pyserial: apt install python3-serial, or '
+                      'pip install pyserial') from None
+    try:
+        port = serial.Serial(
+            url.device, url.baud, timeout=0, write_timeout=0, exclusive=True,
+            rtscts=url.hardware_flow_control)
+    except serial.SerialException as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise OSError(error.errno, f'cannot open {url.device}: {reason}') from None
+    except (ValueError, OSError) as error:
+        raise OSError(f'cannot open {url.device} at {url.baud} baud: {error}') from None
+    # FTDI adapters hold bytes back for 16 ms unless told not to; not every driver knows how.
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        port.set_low_latency_mode(True)
+    return _SerialChannel(port, url)
+
+
+class _SerialChannel(Channel):
+    def __init__(self, port: Serial, url: SerialUrl) -> None:
+        self._port = port
+        self._fd: int = port.fileno()
+        self._queue = FrameQueue()
+        self.name = f'serial {url.device} at {url.baud} baud'
+
+    def register(self, selector: selectors.BaseSelector) -> None:
+        self._selector = selector
+        selector.register(self._fd, selectors.EVENT_READ)
+
+    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+        try:
+            data = os.read(self._fd, READ_SIZE)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            raise ChannelLost(error.errno, error.strerror) from None
+        if not data:
+            raise ChannelLost('the device is gone')
+        yield None, data
+
+    def peers(self, now: float) -> Sequence[Peer]:
+        return (None,)
+
+    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+        self.dropped += self._queue.put(frame)
+        self.writable(self._fd)
+
+    def writable(self, handle: Any) -> None:
+        try:
+            while self._queue:
+                self._queue.written(os.write(self._fd, self._queue.head()))
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            raise ChannelLost(error.errno, error.strerror) from None
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
+        if self._selector.get_key(self._fd).events != events:
+            self._selector.modify(self._fd, events)
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            self._port.close()

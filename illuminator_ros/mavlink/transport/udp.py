@@ -1,0 +1,151 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""UDP: listen, a fixed remote, learnt peers, broadcast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+import ipaddress
+import selectors
+import socket
+from typing import Any
+
+from ..url import Address, UdpUrl
+from .base import Channel, ChannelLost, Peer
+
+# Peers that a listening socket sends to. A new one is not let in over a live one.
+MAX_PEERS = 32
+# s without a checked frame, after which a peer is forgotten. MAVSDK takes 10 s too.
+PEER_EXPIRY = 10.0
+# Datagrams read before other work gets its turn.
+BATCH = 256
+# What a flight controller sends at once must fit; the kernel may allow less.
+RECEIVE_BUFFER = 4 * 1024 * 1024
+
+
+class UdpChannel(Channel):
+    """
+    A UDP socket.
+
+    With a remote it sends there and only there, and hears only that host, on whatever port it
+    sends from: the reference emulator sends from another than it listens on. Without one it
+    sends to every peer that a checked frame has come from.
+    """
+
+    def __init__(self, url: UdpUrl) -> None:
+        remote = _resolve(url.remote) if url.remote else None
+        family = remote[0] if remote else socket.AF_INET
+        if url.bind.host:
+            family, bind = _resolve(url.bind)
+        else:
+            bind = ('::' if family == socket.AF_INET6 else '0.0.0.0', url.bind.port)
+        if remote and remote[0] != family:
+            raise OSError(f'{url.bind} and {url.remote} are of different IP versions')
+        self._remote = remote[1] if remote else None
+        self._broadcast = url.broadcast
+        self._peers: dict[Peer, float] = {}
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            self._socket.setblocking(False)
+            with contextlib.suppress(OSError):
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            if url.broadcast:
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            self._socket.bind(bind)
+        except OSError as error:
+            self._socket.close()
+            raise OSError(error.errno, f'cannot listen on {url.bind}: {error.strerror}') from None
+        self.name = 'udp ' + ' to '.join(filter(None, (
+            str(Address(*self._socket.getsockname()[:2])), str(url.remote or ''))))
+
+    def register(self, selector: selectors.BaseSelector) -> None:
+        """See :meth:`Channel.register`."""
+        selector.register(self._socket, selectors.EVENT_READ)
+
+    @property
+    def _hears_all(self) -> bool:
+        return self._remote is None or bool(self._broadcast)
+
+    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+        """See :meth:`Channel.receive`."""
+        receive = self._socket.recvfrom
+        for _ in range(BATCH):
+            try:
+                data, peer = receive(65536)
+            except BlockingIOError:
+                return
+            except ConnectionError:
+                continue
+            except OSError as error:
+                raise ChannelLost(error.errno, error.strerror) from None
+            if self._hears_all or _same_host(peer, self._remote):
+                yield peer, data
+
+    def peers(self, now: float) -> Sequence[Peer]:
+        """See :meth:`Channel.peers`."""
+        if not self._hears_all or self._broadcast == 'always':
+            return (self._remote,)
+        for peer in [p for p, heard in self._peers.items() if now - heard > PEER_EXPIRY]:
+            del self._peers[peer]
+        if self._broadcast and not self._peers:
+            return (self._remote,)
+        return tuple(self._peers)
+
+    def heard(self, peer: Peer, now: float) -> bool:
+        """See :meth:`Channel.heard`."""
+        if not self._hears_all:
+            return False
+        new = peer not in self._peers
+        if new and len(self.peers(now)) >= MAX_PEERS:
+            return False
+        self._peers[peer] = now
+        return new
+
+    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+        """See :meth:`Channel.send`."""
+        for peer in peers:
+            try:
+                self._socket.sendto(frame, peer)  # type: ignore[call-overload]
+            except (BlockingIOError, ConnectionError):
+                self.dropped += 1
+            except OSError as error:
+                if peer not in self._peers:
+                    raise ChannelLost(error.errno, error.strerror) from None
+                # One learnt peer out of reach is no loss of the link.
+                self.dropped += 1
+                del self._peers[peer]
+
+    def close(self) -> None:
+        """See :meth:`Channel.close`."""
+        self._socket.close()
+
+
+def _resolve(address: Address) -> tuple[int, Any]:
+    """Return family and socket address. IPv4 goes first: most MAVLink programs know no other."""
+    try:
+        found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
+    except socket.gaierror as error:
+        raise OSError(f'cannot resolve {address.host!r}: {error.strerror}') from None
+    family, _, _, _, sockaddr = min(found, key=lambda entry: entry[0] != socket.AF_INET)
+    return family, sockaddr
+
+
+def _same_host(peer: Any, remote: Any) -> bool:
+    if peer[0] == remote[0]:
+        return True
+    # 127.0.0.2 and the like: a loopback remote means this machine.
+    return (ipaddress.ip_address(peer[0].partition('%')[0]).is_loopback
+            and ipaddress.ip_address(remote[0].partition('%')[0]).is_loopback)

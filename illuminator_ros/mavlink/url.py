@@ -1,0 +1,297 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Connection URLs: the notations of MAVROS, MAVSDK and pymavlink, each meaning what it means there.
+
+An empty host to listen on means all interfaces, as it does in all three. IPv6 addresses stand in
+brackets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import re
+from typing import NamedTuple, NoReturn
+
+MAVROS_UDP_BIND_PORT = 14555
+MAVROS_UDP_REMOTE_PORT = 14550
+MAVROS_TCP_PORT = 5760
+MAVROS_BAUD = 57600
+MAX_BAUD = 20_000_000
+
+EXAMPLES = (
+    'udpin://0.0.0.0:14550', 'udpout://192.168.1.10:14550', 'udp://:14541@127.0.0.1:14540',
+    'tcpout://192.168.1.10:5760', 'serial:///dev/ttyACM0:57600')
+
+
+class UrlError(ValueError):
+    """A connection URL that is wrong; the message quotes the URL and the offending part."""
+
+
+class Address(NamedTuple):
+    """Host name or IP address ('' = all interfaces, where listening) and port (0 = any)."""
+
+    host: str
+    port: int
+
+    def __str__(self) -> str:
+        return f'[{self.host}]:{self.port}' if ':' in self.host else f'{self.host}:{self.port}'
+
+
+@dataclass(frozen=True)
+class UdpUrl:
+    """
+    A UDP socket.
+
+    :param bind: what it listens on; port 0 means any free one.
+    :param remote: where it sends, and only there; None means to the peers that it hears.
+    :param broadcast: the remote is a broadcast address: '' no, 'until_peer' or 'always'.
+    """
+
+    bind: Address
+    remote: Address | None = None
+    broadcast: str = ''
+
+
+@dataclass(frozen=True)
+class TcpUrl:
+    """A TCP client, or a server where ``listen`` is set."""
+
+    address: Address
+    listen: bool = False
+
+
+@dataclass(frozen=True)
+class SerialUrl:
+    """A serial port: device path, baud rate and RTS/CTS flow control."""
+
+    device: str
+    baud: int
+    hardware_flow_control: bool = False
+
+
+@dataclass(frozen=True)
+class MemoryUrl:
+    """An in-process link for tests and examples: both sides open the same name."""
+
+    name: str
+
+
+Url = UdpUrl | TcpUrl | SerialUrl | MemoryUrl
+
+
+def parse_url(text: str) -> Url:
+    """
+    Return what a connection URL means.
+
+    :raises UrlError: if it is not one; the message quotes the offending part.
+    """
+    return _Parser(text).parse()
+
+
+class _Parser:
+    """One URL, kept for the error messages."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def parse(self) -> Url:
+        text = self.text
+        if not text:
+            self.fail('it is empty')
+        if bad := re.search(r'[\s\x00-\x1f\x7f]', text):
+            self.fail(f'{bad.group()!r} does not belong in a URL')
+        if text.startswith('/'):
+            return self.device(text)
+        if '?' in text:
+            query = text[text.index('?'):]
+            self.fail(f'{query!r}: no options here; ids are the parameters system_id and '
+                      'component_id')
+        scheme, separator, rest = text.partition('://')
+        if separator:
+            reader = _WITH_SLASHES.get(scheme)
+            if reader is None:
+                self.fail(f'unknown scheme {scheme!r}; known are '
+                          + ', '.join(f'{name}://' for name in _WITH_SLASHES))
+            return reader(self, rest)
+        scheme, separator, rest = text.partition(':')
+        if separator and scheme in _WITHOUT_SLASHES:
+            return _WITHOUT_SLASHES[scheme](self, rest)
+        if separator:
+            # pymavlink takes a bare host:port as an address to listen on with UDP.
+            return UdpUrl(self.address(text))
+        return self.fail(f'{text!r} names neither a scheme nor a device path')
+
+    def fail(self, reason: str) -> NoReturn:
+        raise UrlError(f'connection URL {self.text!r}: {reason}; for example '
+                       + ' or '.join(EXAMPLES[::2]))
+
+    # Addresses
+
+    def address(
+        self, text: str, *, default_host: str | None = '', default_port: int | None = None,
+    ) -> Address:
+        """Return host and port of ``[host][:port]``; a part without default must be there."""
+        if match := re.fullmatch(r'\[([^\[\]]*)\](?::(.*))?', text):
+            host, port = match.groups()
+            if not re.fullmatch(r'[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%\w+)?', host):
+                self.fail(f'{host!r} in brackets is no IPv6 address')
+        else:
+            host, colon, port = text.partition(':')
+            port = port if colon else None
+            if ':' in (port or ''):
+                self.fail(f'{text!r}: an IPv6 address stands in brackets, as in [::1]:14550')
+            if not re.fullmatch(r'[A-Za-z0-9._-]*', host):
+                self.fail(f'{host!r} is no host name')
+            if re.fullmatch(r'[0-9.]+', host) and not _is_ipv4(host):
+                self.fail(f'{host!r} is no IPv4 address')
+        if not host:
+            if default_host is None:
+                self.fail(f'no host in {text!r}')
+            host = default_host
+        if port is None:
+            if default_port is None:
+                self.fail(f'no port in {text!r}')
+            return Address(host, default_port)
+        return Address(host, self.port(port))
+
+    def remote(self, text: str, *, default_port: int | None = None) -> Address:
+        """Return an address to send to: it needs a host, and not the one that means "any"."""
+        address = self.address(text, default_host=None, default_port=default_port)
+        if address.host in ('0.0.0.0', '::'):
+            self.fail(f'{address.host!r} is no address to send to')
+        return address
+
+    def port(self, text: str) -> int:
+        if not re.fullmatch(r'[0-9]+', text):
+            self.fail(f'port {text!r} is no number')
+        if not 1 <= int(text) <= 65535:
+            self.fail(f'port {text} is outside 1..65535')
+        return int(text)
+
+    # Schemes
+
+    def udp(self, rest: str) -> Url:
+        """Read MAVROS's ``udp://[bind]@[remote]``; without ``@``, MAVSDK's address to bind."""
+        bind, at, remote = self.no_path(rest).partition('@')
+        if not at:
+            return UdpUrl(self.address(bind))
+        bound = self.address(bind, default_port=MAVROS_UDP_BIND_PORT)
+        if not remote:
+            return UdpUrl(bound)
+        return UdpUrl(bound, self.remote(remote, default_port=MAVROS_UDP_REMOTE_PORT))
+
+    def udp_broadcast(self, rest: str, kind: str) -> Url:
+        bind, at, remote = self.no_path(rest).partition('@')
+        if not at:
+            self.fail(f'{rest!r} lacks the "@" before the broadcast address')
+        return UdpUrl(
+            self.address(bind, default_port=MAVROS_UDP_BIND_PORT),
+            self.address(remote, default_host='255.255.255.255',
+                         default_port=MAVROS_UDP_REMOTE_PORT), kind)
+
+    def udp_in(self, rest: str) -> Url:
+        return UdpUrl(self.address(self.no_path(rest)))
+
+    def udp_out(self, rest: str) -> Url:
+        return UdpUrl(Address('', 0), self.remote(self.no_path(rest)))
+
+    def udp_bcast(self, rest: str) -> Url:
+        return UdpUrl(Address('', 0), self.address(self.no_path(rest), default_host=None),
+                      'always')
+
+    def tcp(self, rest: str) -> Url:
+        """Read ``tcp://``: MAVROS has defaults for both parts, and MAVSDK means the same."""
+        return TcpUrl(self.remote(self.no_path(rest) or 'localhost',
+                                  default_port=MAVROS_TCP_PORT))
+
+    def tcp_listen(self, rest: str) -> Url:
+        return TcpUrl(self.address(self.no_path(rest), default_port=MAVROS_TCP_PORT), True)
+
+    def tcp_out(self, rest: str) -> Url:
+        return TcpUrl(self.remote(self.no_path(rest)))
+
+    def tcp_in(self, rest: str) -> Url:
+        return TcpUrl(self.address(self.no_path(rest)), True)
+
+    def serial(self, rest: str, hardware_flow_control: bool = False) -> Url:
+        if not rest.startswith('/'):
+            self.fail(f'{rest!r} is no absolute device path, as in serial:///dev/ttyACM0:57600')
+        device, colon, baud = rest.rpartition(':')
+        if not colon:
+            return SerialUrl(rest, MAVROS_BAUD, hardware_flow_control)
+        return SerialUrl(device, self.baud(baud), hardware_flow_control)
+
+    def serial_hwfc(self, rest: str) -> Url:
+        return self.serial(rest, True)
+
+    def device(self, text: str) -> Url:
+        """Read a bare path: ``/dev/x:baud`` of MAVROS or ``/dev/x,baud`` of pymavlink."""
+        match = re.fullmatch(r'([^,:]+)[,:](.*)', text)
+        if not match:
+            self.fail(f'no baud rate behind {text!r}: MAVROS would take 57600 and pymavlink '
+                      '115200')
+        return SerialUrl(match.group(1), self.baud(match.group(2)))
+
+    def memory(self, rest: str) -> Url:
+        if not rest:
+            self.fail('no name behind "memory://"')
+        return MemoryUrl(rest)
+
+    def baud(self, text: str) -> int:
+        if not re.fullmatch(r'[0-9]+', text) or not 1 <= int(text) <= MAX_BAUD:
+            self.fail(f'{text!r} is no baud rate')
+        return int(text)
+
+    def no_path(self, rest: str) -> str:
+        """MAVROS's own examples end in a slash; anything behind it has no meaning."""
+        rest, slash, path = rest.partition('/')
+        if path:
+            self.fail(f'{slash + path!r} has no meaning here')
+        return rest
+
+
+def _is_ipv4(host: str) -> bool:
+    parts = host.split('.')
+    return len(parts) == 4 and all(part.isdigit() and int(part) <= 255 for part in parts)
+
+
+_Reader = Callable[[_Parser, str], Url]
+
+_WITH_SLASHES: dict[str, _Reader] = {
+    'udp': _Parser.udp,
+    'udp-b': lambda parser, rest: parser.udp_broadcast(rest, 'until_peer'),
+    'udp-pb': lambda parser, rest: parser.udp_broadcast(rest, 'always'),
+    'udpin': _Parser.udp_in,
+    'udpout': _Parser.udp_out,
+    'tcp': _Parser.tcp,
+    'tcp-l': _Parser.tcp_listen,
+    'tcpout': _Parser.tcp_out,
+    'tcpin': _Parser.tcp_in,
+    'serial': _Parser.serial,
+    'serial-hwfc': _Parser.serial_hwfc,
+    'serial_flowcontrol': _Parser.serial_hwfc,
+    'memory': _Parser.memory,
+}
+
+_WITHOUT_SLASHES: dict[str, _Reader] = {
+    'udpin': _Parser.udp_in,
+    'udp': _Parser.udp_in,
+    'udpout': _Parser.udp_out,
+    'udpbcast': _Parser.udp_bcast,
+    'tcp': _Parser.tcp_out,
+    'tcpin': _Parser.tcp_in,
+}

@@ -1,0 +1,126 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node of one light."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from ..illuminator.controller import Controller
+from ..illuminator.light import Light
+from ..mavlink.link import Link
+from .diagnostics import hardware_id, lamp_findings, lamp_status, link_status
+from .inputs import Inputs
+from .outputs import Outputs, STREAM_QOS
+from .parameters import declare_device_parameters, misspelt
+
+DEFAULT_NAME = 'illuminator'
+
+
+class IlluminatorNode(Node):
+    """
+    Serves one light: topics, services, parameters, diagnostics.
+
+    The link's parameters are not declared here but by whoever makes the link.
+
+    :param kwargs: as for rclpy's Node: namespace, parameter_overrides, context ...
+    """
+
+    def __init__(self, name: str = DEFAULT_NAME, **kwargs: Any) -> None:
+        super().__init__(name, start_parameter_services=False, enable_logger_service=True,
+                         **kwargs)
+        self.light: Light | None = None
+        self._hardware_id = ''
+        self._levels: tuple[Any, ...] = ()
+        self._publishing = threading.Lock()
+
+    def serve(
+        self, link: Link, controller: Controller, *, url: str, frame_id: str, period: float,
+    ) -> None:
+        """
+        Create what the node offers.
+
+        :param url: the connection URL, which diagnostics show as the link's hardware id.
+        :param period: of diagnostics, s.
+        :raises ParameterError: if the value given for a parameter of the light is wrong.
+        """
+        self._link = link
+        self._controller = controller
+        self._url = url
+        self._started = link.clock()
+        self._overrides = declare_device_parameters(self)
+        for warning in misspelt(self):
+            self.get_logger().warning(warning)
+        self.outputs = Outputs(self, frame_id, self._check_levels)
+        self.inputs = Inputs(self, link, lambda: self.light, self._absence)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
+        # On a steady clock: with use_sim_time and no /clock a ROS timer never fires. A timer
+        # that fires often also lets the executor notice SIGTERM, which it otherwise may miss.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        group = ReentrantCallbackGroup()
+        self.create_timer(period, self.publish_diagnostics, group, self._steady)
+        self.create_timer(0.25, lambda: None, group, self._steady)
+
+    def bind(self, light: Light, now: float) -> None:
+        """Serve a light from now on; called in the link's thread."""
+        self.light = light
+        light.observer = self.outputs
+        if self._overrides:
+            light.agreement.want(self._overrides, now)
+
+    def _absence(self) -> str:
+        state = self._link.state()
+        if not state.is_open:
+            return f'no light connected: {state.name} is not open: {state.reason}'
+        return f'no light connected: none heard yet on {state.name}'
+
+    def publish_diagnostics(self) -> None:
+        """Publish both statuses, or only the link's while it is open who the light is."""
+        with self._publishing:
+            now = self._link.clock()
+            light = self.light
+            array = DiagnosticArray()
+            array.header.stamp = self.get_clock().now().to_msg()
+            array.status = [link_status(
+                self.get_name(), self._url, self._link.state(), self._controller, light,
+                now=now, started=self._started)]
+            if light is not None and light.identification.settled(now):
+                # A light that tells its serial number late keeps the id it had.
+                self._hardware_id = self._hardware_id or hardware_id(light)
+                array.status.append(
+                    lamp_status(self.get_name(), self._hardware_id, light, now))
+            self._diagnostics.publish(array)
+
+    def _check_levels(self) -> None:
+        """Publish at once where a level has changed."""
+        light = self.light
+        if light is None:
+            return
+        level = max((finding[0] for finding in lamp_findings(light, self._link.clock())),
+                    default=b'\0')
+        levels = (light.connected, level)
+        if levels != self._levels:
+            self._levels = levels
+            self.publish_diagnostics()
+
+    def link_changed(self) -> None:
+        """Publish diagnostics, since the link was opened or lost."""
+        self.publish_diagnostics()

@@ -1,0 +1,135 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bridge's process: one link, one node for each light on it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import Any
+
+from rclpy.node import Node
+
+from ..illuminator.controller import Controller
+from ..illuminator.light import Light, Settings
+from ..illuminator.operation import Result
+from ..mavlink.link import Link, LinkEvent
+from ..mavlink.signing import Signing, SigningMode
+from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
+from .node import IlluminatorNode
+from .parameters import declare_link_parameters, LinkParameters, ParameterError
+
+# s; SIGINT and SIGTERM end the process within 1 s, this and the rest included.
+OFF_LIMIT = 0.5
+STOP_LIMIT = 0.2
+
+
+class BridgeProcess:
+    """
+    Connects the nodes of the lights on one link with that link.
+
+    :raises ParameterError: if a parameter is wrong.
+    """
+
+    def __init__(self, node: IlluminatorNode) -> None:
+        self.node = node
+        self.parameters = parameters = declare_link_parameters(node)
+        self.controller = Controller(
+            parameters.identity, Settings(
+                parameters.heartbeat_timeout, parameters.status_interval,
+                parameters.restore_configuration),
+            command_timeout=parameters.command_timeout,
+            command_retries=parameters.command_retries, on_light=self._found)
+        signing, store = _signing(parameters)
+        self.link = Link(
+            parameters.url, self.controller, label=parameters.connection_url,
+            on_event=self._link_event, signing=signing, store=store)
+        node.serve(
+            self.link, self.controller, url=parameters.connection_url,
+            frame_id=node.get_parameter('frame_id').value,
+            period=node.get_parameter('diagnostics_period').value)
+        _forward_logs(node)
+
+    def start(self) -> None:
+        """Open the link."""
+        self.link.start()
+
+    def _found(self, light: Light) -> None:
+        """Give a light its node, in the link's thread."""
+        target = self.parameters.target
+        wanted = (target.system in (0, light.source.system)
+                  and target.component in (0, light.source.component))
+        if self.node.light is None and wanted:
+            self.node.bind(light, self.link.clock())
+        else:
+            self.node.get_logger().info(f'light {light.source} heard, and not served')
+
+    def _link_event(self, event: LinkEvent) -> None:
+        logger = self.node.get_logger()
+        if event.is_open:
+            logger.info(f'link open: {event.name}')
+        else:
+            logger.warning(f'link not open: {event.name}: {event.reason}; trying again')
+        self.node.link_changed()
+
+    def stop(self) -> None:
+        """Switch the light off if that is wanted, and close the link; takes 0.7 s at most."""
+        light = self.node.light
+        if self.parameters.off_on_shutdown and light is not None and light.connected:
+            done = threading.Event()
+
+            def answered(result: Result, now: float) -> None:
+                done.set()
+
+            self.link.call(lambda now: light.enable(False, now, answered))
+            done.wait(OFF_LIMIT)
+        self.link.stop(STOP_LIMIT)
+
+
+def _signing(parameters: LinkParameters) -> tuple[Signing, TimestampStore | None]:
+    if parameters.signing_mode is SigningMode.OFF:
+        return Signing(), None
+    try:
+        key = load_key(parameters.signing_key_file)
+    except KeyFileError as error:
+        raise ParameterError(f'signing_key_file: {error}') from None
+    store = TimestampStore(parameters.signing_key_file, f'bridge {parameters.identity}')
+    return Signing(parameters.signing_mode, key, timestamp=store.load()), store
+
+
+class _LogForwarder(logging.Handler):
+    """Shows what the protocol's modules log in the node's log."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__()
+        self._logger = node.get_logger()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = self.format(record)
+        if record.levelno >= logging.ERROR:
+            self._logger.error(text)
+        elif record.levelno >= logging.WARNING:
+            self._logger.warning(text)
+        else:
+            self._logger.info(text)
+
+
+def _forward_logs(node: Node) -> None:
+    logger = logging.getLogger('illuminator_ros')
+    handlers: list[Any] = list(logger.handlers)
+    for handler in handlers:
+        logger.removeHandler(handler)
+    logger.addHandler(_LogForwarder(node))
+    logger.propagate = False

@@ -1,0 +1,49 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from pathlib import Path
+import re
+
+from setuptools import find_packages, setup
+
+package_name = 'illuminator_ros'
+version = re.search(
+    r"__version__ = '(.+)'", Path(package_name, '__init__.py').read_text()).group(1)
+
+setup(
+    name=package_name,
+    version=version,
+    packages=find_packages(include=[f'{package_name}*']),
+    package_data={package_name: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (f'share/{package_name}', ['package.xml']),
+        (f'share/{package_name}/config', [str(path) for path in Path('config').glob('*.yaml')]),
+    ],
+    python_requires='>=3.10',
+    # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
+    install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
+    extras_require={'serial': ['pyserial>=3.5']},
+    zip_safe=True,
+    maintainer='The illuminator_ros developers',
+    maintainer_email='illuminator_ros@example.org',
+    description='A MAVLink illuminator (searchlight, torch, strobe) as an ordinary ROS 2 device',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'bridge = illuminator_ros.bridge:main',
+            'simulator = illuminator_ros.simulator:main',
+        ],
+    },
+)
