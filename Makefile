@@ -1,0 +1,31 @@
+# On a machine without ROS: make demo, make test. With ROS sourced, the same with its rclpy.
+PYTHON_IN_VENV := .venv/bin/python
+TESTS ?= test
+
+.PHONY: help demo test lint unit fuzz soak bench clean environment
+
+help:
+	@echo 'make demo    a simulated light and the bridge: the main job, shown'
+	@echo 'make test    all tests, and the linters'
+	@echo 'make unit    the tests that need no ROS'
+	@echo 'make lint    ruff and mypy'
+	@echo 'make clean   remove .venv and what was built'
+
+environment:
+	@python3 tools/environment.py
+
+demo: environment
+	@$(PYTHON_IN_VENV) demo/run.py
+
+test: lint
+	@$(PYTHON_IN_VENV) -m pytest $(TESTS)
+
+unit: environment
+	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator
+
+lint: environment
+	@$(PYTHON_IN_VENV) -m ruff check .
+	@$(PYTHON_IN_VENV) -m mypy -p illuminator_ros
+
+clean:
+	rm -rf .venv build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis

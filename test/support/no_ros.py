@@ -1,0 +1,34 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A pytest plugin (``-p support.no_ros``) that makes the machine look as if it had no ROS."""
+
+from importlib.abc import MetaPathFinder
+import sys
+from typing import Any
+
+ROS_MODULES = ('rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'sensor_msgs',
+               'diagnostic_msgs', 'ament_index_python')
+
+
+class _NoRos(MetaPathFinder):
+    """Refuses to find any module of ROS."""
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> None:
+        """See :meth:`MetaPathFinder.find_spec`."""
+        if name.partition('.')[0] in ROS_MODULES:
+            raise ModuleNotFoundError(f'no {name}: these tests run without ROS', name=name)
+
+
+sys.meta_path.insert(0, _NoRos())
