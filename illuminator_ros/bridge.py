@@ -16,7 +16,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
+
+from .termination import Termination
 
 
 def usage() -> str:
@@ -65,16 +68,12 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name.
     """
+    termination = Termination()
     arguments = sys.argv[1:] if args is None else args
     try:
-        return _run(arguments)
-    except KeyboardInterrupt:
-        return 0
-
-
-def _run(arguments: list[str]) -> int:
-    from rclpy.utilities import remove_ros_args
-    own = arguments if '--ros-args' not in arguments else remove_ros_args(['', *arguments])[1:]
+        own = _without_ros_args(arguments)
+    except Exception as error:
+        return _wrong(f'wrong ROS arguments: {error}')
     if '-h' in own or '--help' in own:
         print(usage(), end='')
         return 0
@@ -83,42 +82,48 @@ def _run(arguments: list[str]) -> int:
         print(__version__)
         return 0
     if own:
-        print(f'bridge: unknown argument {own[0]!r}; parameters go behind --ros-args, see '
-              'bridge --help', file=sys.stderr)
-        return 2
-    return _serve(arguments)
+        return _wrong(f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
+                      'bridge --help')
+    return _serve(arguments, termination)
 
 
-def _serve(arguments: list[str]) -> int:
-    import signal
+def _without_ros_args(arguments: list[str]) -> list[str]:
+    if '--ros-args' not in arguments:
+        return arguments
+    # Slow to import, as all else that is imported in a function here.
+    from rclpy.utilities import remove_ros_args
+    return list(remove_ros_args(['bridge', *arguments])[1:])
 
+
+def _wrong(what: str) -> int:
+    """Say in one line what is wrong with the command line, and return the exit status for it."""
+    # rcl ends its messages with the places in its sources that they passed through.
+    text = re.sub(r', at /[^ ,]+:\d+', '', ' '.join(what.split()))
+    print(f'bridge: {text}', file=sys.stderr)
+    return 2
+
+
+def _serve(arguments: list[str], termination: Termination) -> int:
     import rclpy
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.signals import SignalHandlerOptions
 
     from .ros.node import IlluminatorNode
     from .ros.parameters import ParameterError
     from .ros.process import BridgeProcess
 
-    rclpy.init(args=['bridge', *arguments])
-    process = None
     try:
+        rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = IlluminatorNode()
+    except Exception as error:
+        # rclpy has an exception of its own for each thing that can be wrong with an argument.
+        return _wrong(f'wrong ROS arguments: {error}')
+    try:
         process = BridgeProcess(node)
-        process.start()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     except ParameterError as error:
-        print(f'bridge: parameter {error}', file=sys.stderr)
-        return 2
-    finally:
-        # A second Ctrl-C must not interrupt what little is left to do.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        if process is not None:
-            process.stop()
-        rclpy.try_shutdown()
+        return _wrong(f'parameter {error}')
+    termination.calls(process.end)
+    process.run()
+    rclpy.try_shutdown()
     return 0
 
 

@@ -20,6 +20,7 @@ import logging
 import threading
 from typing import Any
 
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from ..illuminator.controller import Controller
@@ -31,9 +32,9 @@ from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
 from .node import IlluminatorNode
 from .parameters import declare_link_parameters, LinkParameters, ParameterError
 
-# s; SIGINT and SIGTERM end the process within 1 s, this and the rest included.
+# s; SIGINT and SIGTERM end the process within 1 s, of which ROS takes 0.2 s.
 OFF_LIMIT = 0.5
-STOP_LIMIT = 0.2
+STOP_LIMIT = 0.15
 
 
 class BridgeProcess:
@@ -61,10 +62,29 @@ class BridgeProcess:
             frame_id=node.get_parameter('frame_id').value,
             period=node.get_parameter('diagnostics_period').value)
         _forward_logs(node)
+        self._ended = threading.Event()
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
 
-    def start(self) -> None:
-        """Open the link."""
+    def run(self) -> None:
+        """Serve until :meth:`end` is called or the context is shut down."""
         self.link.start()
+        while not self._ended.is_set() and self.node.context.ok():
+            try:
+                self._executor.spin_once()
+            except ExternalShutdownException:
+                break
+            except Exception as error:
+                # Our own callbacks answer for what goes wrong in them; rclpy's may not.
+                self.node.get_logger().error(
+                    f'internal error: {error!r}', throttle_duration_sec=5.0)
+        self._stop()
+
+    def end(self) -> None:
+        """Have :meth:`run` return; callable from any thread."""
+        self._ended.set()
+        # Waking the executor is not enough: it goes on waiting until it has something to do.
+        self._executor.create_task(lambda: None)
 
     def _found(self, light: Light) -> None:
         """Give a light its node, in the link's thread."""
@@ -84,8 +104,8 @@ class BridgeProcess:
             logger.warning(f'link not open: {event.name}: {event.reason}; trying again')
         self.node.link_changed()
 
-    def stop(self) -> None:
-        """Switch the light off if that is wanted, and close the link; takes 0.7 s at most."""
+    def _stop(self) -> None:
+        """Switch the light off if that is wanted, and close the link; takes 0.65 s at most."""
         light = self.node.light
         if self.parameters.off_on_shutdown and light is not None and light.connected:
             done = threading.Event()
