@@ -20,6 +20,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from ..mavlink.agenda import Agenda
 from ..mavlink.command import CommandSender, Ending
 from ..mavlink.dialect import (
     CommandAck,
@@ -66,6 +67,7 @@ class Controller(Endpoint):
         self._on_light = on_light
         self._heartbeat = Heartbeat(identity, MavType.ONBOARD_CONTROLLER)
         self._link_open = False
+        self._agenda: Agenda[Source] = Agenda()
         self.sender = CommandSender(
             lambda message: self.outgoing.append((identity, message)), identity,
             command_timeout, command_retries)
@@ -81,6 +83,7 @@ class Controller(Endpoint):
         self.sender.end_all(now, Ending.LINK_LOST)
         for light in self.lights.values():
             light.lose('the link was lost')
+        self.touched()
 
     def receive(self, source: Source, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
@@ -103,6 +106,18 @@ class Controller(Endpoint):
             light = self.lights.get(source)
             if light:
                 light.take_information(Identity.from_message(message), now)
+        self._schedule(source)
+
+    def _schedule(self, source: Source) -> None:
+        """Enter when a light has something to do, after anything that may have changed it."""
+        light = self.lights.get(source)
+        if light is not None:
+            self._agenda.set(source, light.next_deadline())
+
+    def touched(self) -> None:
+        """See :meth:`Endpoint.touched`."""
+        for source in self.lights:
+            self._schedule(source)
 
     def _light(self, source: Source) -> Light | None:
         """Return the light at an address, a new one if need be; None if there is no room."""
@@ -123,14 +138,15 @@ class Controller(Endpoint):
         """See :meth:`Endpoint.poll`."""
         if self._link_open:
             self._heartbeat.poll(now, self.outgoing)
-        self.sender.poll(now)
-        for light in self.lights.values():
-            if now >= light.next_deadline():
-                light.poll(now)
+        if now >= self.sender.next_deadline():
+            self.sender.poll(now)
+            # What has ended may be of any light.
+            self.touched()
+        for source in self._agenda.due(now):
+            self.lights[source].poll(now)
+            self._schedule(source)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
         heartbeat = self._heartbeat.due if self._link_open else math.inf
-        lights = min((light.next_deadline() for light in self.lights.values()),
-                     default=math.inf)
-        return min(heartbeat, self.sender.next_deadline(), lights)
+        return min(heartbeat, self.sender.next_deadline(), self._agenda.next_deadline())

@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+from ..mavlink.agenda import Agenda
 from ..mavlink.dialect import (
     CommandAck,
     CommandInt,
@@ -236,23 +237,37 @@ class Devices(Endpoint):
     def __init__(self, properties: list[DeviceProperties], now: float) -> None:
         super().__init__()
         self.devices = [Device(one, now, self.outgoing) for one in properties]
+        self._agenda: Agenda[int] = Agenda()
+        self.touched()
+
+    def touched(self) -> None:
+        """See :meth:`Endpoint.touched`."""
+        for index in range(len(self.devices)):
+            self._schedule(index)
+
+    def _schedule(self, index: int) -> None:
+        self._agenda.set(index, self.devices[index].next_deadline())
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
         for device in self.devices:
             device.announce(now)
+        self.touched()
 
     def receive(self, source: Source, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
-        for device in self.devices:
-            device.receive(source, message, now)
+        if isinstance(message, CommandLong | CommandInt):
+            for index, device in enumerate(self.devices):
+                if device.addressed(message):
+                    device.receive(source, message, now)
+                    self._schedule(index)
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        for device in self.devices:
-            if now >= device.next_deadline():
-                device.poll(now)
+        for index in self._agenda.due(now):
+            self.devices[index].poll(now)
+            self._schedule(index)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
-        return min(device.next_deadline() for device in self.devices)
+        return self._agenda.next_deadline()

@@ -1,0 +1,77 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""When many things have something to do, found without looking at each."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+import heapq
+import itertools
+import math
+from typing import Generic, TypeVar
+
+K = TypeVar('K', bound=Hashable)
+
+
+class Agenda(Generic[K]):
+    """
+    The next deadline of each of many keys.
+
+    Postponing, which every heartbeat does, costs next to nothing: the entry in the heap stays
+    and is looked at again when its old time comes.
+    """
+
+    def __init__(self) -> None:
+        self._deadlines: dict[K, float] = {}
+        self._heap: list[tuple[float, int, K]] = []
+        # The earliest entry of each key in the heap.
+        self._entered: dict[K, float] = {}
+        self._order = itertools.count()
+
+    def set(self, key: K, deadline: float) -> None:
+        """Set the deadline of a key, infinity for none."""
+        self._deadlines[key] = deadline
+        if deadline < self._entered.get(key, math.inf):
+            self._enter(key, deadline)
+
+    def _enter(self, key: K, deadline: float) -> None:
+        self._entered[key] = deadline
+        heapq.heappush(self._heap, (deadline, next(self._order), key))
+
+    def next_deadline(self) -> float:
+        """Return the earliest deadline, infinity if there is none."""
+        while self._heap:
+            entered, _, key = self._heap[0]
+            deadline = self._deadlines[key]
+            if entered == deadline:
+                return deadline
+            heapq.heappop(self._heap)
+            if entered == self._entered.get(key):
+                # Postponed since, so the entry is only now put where it belongs.
+                del self._entered[key]
+                if deadline < math.inf:
+                    self._enter(key, deadline)
+        return math.inf
+
+    def due(self, now: float) -> list[K]:
+        """Return the keys whose deadline has come; each keeps it until it gets another."""
+        keys = []
+        while self.next_deadline() <= now:
+            _, _, key = heapq.heappop(self._heap)
+            self._entered.pop(key, None)
+            keys.append(key)
+        for key in keys:
+            self._enter(key, self._deadlines[key])
+        return keys
