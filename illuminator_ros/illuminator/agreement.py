@@ -80,6 +80,7 @@ class Agreement:
             done(result, now)
 
         self._submit(values, now, finished)
+        self._light.changed()
 
     def check(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """
@@ -119,6 +120,7 @@ class Agreement:
         if isinstance(current, Configure) and current.stream:
             current.supersede(now)
         self.poll(now)
+        self._light.changed()
 
     def want(self, values: Mapping[str, Any], now: float) -> None:
         """
@@ -128,6 +130,7 @@ class Agreement:
         """
         self._wanted.update(values)
         self._wanted_at = now
+        self._light.changed()
 
     def _submit(
         self, values: Mapping[str, Any], now: float, done: Done, *, stream: bool = False,

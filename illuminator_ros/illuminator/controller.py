@@ -83,7 +83,7 @@ class Controller(Endpoint):
         self.sender.end_all(now, Ending.LINK_LOST)
         for light in self.lights.values():
             light.lose('the link was lost')
-        self.touched()
+        self._schedule_all()
 
     def receive(self, source: Source, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
@@ -114,8 +114,7 @@ class Controller(Endpoint):
         if light is not None:
             self._agenda.set(source, light.next_deadline())
 
-    def touched(self) -> None:
-        """See :meth:`Endpoint.touched`."""
+    def _schedule_all(self) -> None:
         for source in self.lights:
             self._schedule(source)
 
@@ -127,6 +126,7 @@ class Controller(Endpoint):
                 self.passed_over = True
                 return None
             light = self.lights[source] = Light(source, self.sender, self.settings)
+            light.changed = lambda: self._schedule(source)
             self._on_light(light)
         return light
 
@@ -141,7 +141,7 @@ class Controller(Endpoint):
         if now >= self.sender.next_deadline():
             self.sender.poll(now)
             # What has ended may be of any light.
-            self.touched()
+            self._schedule_all()
         for source in self._agenda.due(now):
             self.lights[source].poll(now)
             self._schedule(source)

@@ -21,7 +21,9 @@ https://mavlink.io/en/services/illuminator.html
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
+import functools
 import math
 from typing import Any
 
@@ -75,6 +77,7 @@ class Device:
     One light. No I/O; time is passed in.
 
     :ivar outgoing: messages to send, each with the address that it is sent from.
+    :ivar changed: called when :meth:`next_deadline` may be another but for receive and poll.
     """
 
     def __init__(
@@ -84,6 +87,7 @@ class Device:
         self.properties = properties
         self.outgoing = deque() if outgoing is None else outgoing
         self.heartbeat = Heartbeat(properties.source, MavType.ILLUMINATOR)
+        self.changed: Callable[[], None] = lambda: None
         self.restart(now)
 
     def restart(self, now: float) -> None:
@@ -97,6 +101,7 @@ class Device:
         self._status_due = now if self.interval else math.inf
         self._thermal_at = now
         self.heartbeat.due = now
+        self.changed()
 
     @property
     def source(self) -> Source:
@@ -216,6 +221,7 @@ class Device:
     def announce(self, now: float) -> None:
         """Send a heartbeat at once: somebody new is within hearing."""
         self.heartbeat.send(now, self.outgoing)
+        self.changed()
 
     def poll(self, now: float) -> None:
         """Send what is due."""
@@ -238,12 +244,9 @@ class Devices(Endpoint):
         super().__init__()
         self.devices = [Device(one, now, self.outgoing) for one in properties]
         self._agenda: Agenda[int] = Agenda()
-        self.touched()
-
-    def touched(self) -> None:
-        """See :meth:`Endpoint.touched`."""
-        for index in range(len(self.devices)):
-            self._schedule(index)
+        for index, device in enumerate(self.devices):
+            device.changed = functools.partial(self._schedule, index)
+            device.changed()
 
     def _schedule(self, index: int) -> None:
         self._agenda.set(index, self.devices[index].next_deadline())
@@ -252,7 +255,6 @@ class Devices(Endpoint):
         """See :meth:`Endpoint.link_opened`."""
         for device in self.devices:
             device.announce(now)
-        self.touched()
 
     def receive(self, source: Source, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""

@@ -58,6 +58,7 @@ class Light:
     :ivar status: the newest status, None before the first.
     :ivar restarts: how often it has restarted since it was found.
     :ivar measures_temperature: whether it has ever sent a temperature other than 0.
+    :ivar changed: called when a request may have changed :meth:`next_deadline`.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class Light:
         self.status_at = -math.inf
         self.restarts = 0
         self.measures_temperature = False
+        self.changed: Callable[[], None] = lambda: None
         self.identification = Identification(self)
         self.agreement = Agreement(self)
         self._switching = OperationQueue()
@@ -179,6 +181,7 @@ class Light:
             done(Result(False, unreachable), now)
         else:
             self._switching.submit(Enable(self, on, done, now=now), now)
+            self.changed()
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
@@ -186,6 +189,7 @@ class Light:
             done(Result(False, unreachable), now)
             return
         self._refreshes.append(Refresh(self, now, done))
+        self.changed()
 
     def request_status(self, now: float, done: Callable[[Outcome, float], None] | None = None,
                        ) -> None:

@@ -49,9 +49,6 @@ class Endpoint(ABC):
     def receive(self, source: Source, message: Any, now: float) -> None:
         """Take a message."""
 
-    def touched(self) -> None:  # noqa: B027 - not everybody keeps deadlines
-        """Note that something beside these methods was called, so deadlines may have changed."""
-
     @abstractmethod
     def poll(self, now: float) -> None:
         """Do what is due."""

@@ -195,10 +195,8 @@ class Link:
                     self._wake_out.recv(4096)
             elif self._channel is not None:
                 self._serve(key.fileobj, events)
-        if self._calls:
-            for _ in range(len(self._calls)):
-                self._calls.popleft()(self.clock())
-            self.endpoint.touched()
+        for _ in range(len(self._calls)):
+            self._calls.popleft()(self.clock())
         self.endpoint.poll(self.clock())
         self._flush()
         if self.clock() >= self._store_due:
