@@ -27,6 +27,8 @@ import math
 import struct
 from typing import Any
 
+from ..mavlink.dialect import wire_value
+
 ABSOLUTE_ZERO_C = -273.15
 MAX_TEMPERATURE_C = 1000.0
 # s; whatever blinks once an hour is no strobe, and neither is what reports more.
@@ -65,7 +67,8 @@ class ErrorFlag(IntFlag):
 
 # The flags under which a light is less bright than it was told to be.
 DIMMING_FLAGS = ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN
-KNOWN_FLAGS = DIMMING_FLAGS | ErrorFlag.THERMISTOR_FAILURE
+# An int: since Python 3.11 the complement of an IntFlag has no unknown bits.
+KNOWN_FLAGS = int(DIMMING_FLAGS | ErrorFlag.THERMISTOR_FAILURE)
 
 
 def flag_names(flags: int) -> list[str]:
@@ -293,7 +296,7 @@ class Identity:
     @classmethod
     def from_message(cls, message: Any) -> Identity:
         """Read a message; a field that is full has no terminator, and some have odd bytes."""
-        return cls(*(text(getattr(message, name)) for name in (
+        return cls(*(text(wire_value(message, name)) for name in (
             'vendor_name', 'model_name', 'software_version', 'hardware_version',
             'serial_number')))
 

@@ -1,0 +1,301 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Both sides of the illuminator protocol wired together: real bytes, a clock that jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+import math
+from typing import Any
+
+from support.faulty_wire import Faults, FaultyWire
+
+from illuminator_ros.illuminator.controller import Controller
+from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
+from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.model import Configuration, Identity, Status
+from illuminator_ros.illuminator.observer import Cause, LightObserver
+from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.mavlink.dialect import (
+    CommandInt,
+    CommandLong,
+    decode_payload,
+    encode_payload,
+    HANDLED,
+    LAYOUTS,
+    MavCmd,
+    Source,
+)
+from illuminator_ros.mavlink.endpoint import Endpoint
+from illuminator_ros.mavlink.framing import Decoder, encode_frame
+
+BRIDGE = Source(1, 194)
+# s on the clock of a pair at its beginning: not 0, so that 0 as a time is found out.
+START = 1000.0
+# Turns at one moment: more of them mean that a link's thread would spin.
+MAX_TURNS = 100
+
+
+@dataclass
+class Recorder(LightObserver):
+    """Keeps what a light's observer is told; ``events`` has it all, in order."""
+
+    clock: Callable[[], float]
+    events: list[str] = field(default_factory=list)
+    statuses: list[Status] = field(default_factory=list)
+    identities: list[Identity] = field(default_factory=list)
+    changes: list[tuple[Cause, dict[str, Any]]] = field(default_factory=list)
+    restorations: list[tuple[bool, str]] = field(default_factory=list)
+    failed_setpoints: list[str] = field(default_factory=list)
+
+    def connected(self, light: Light) -> None:
+        self.events.append('connected')
+
+    def lost(self, light: Light, reason: str) -> None:
+        self.events.append(f'lost: {reason}')
+
+    def restarted(self, light: Light) -> None:
+        self.events.append('restarted')
+
+    def identified(self, light: Light, identity: Identity) -> None:
+        self.identities.append(identity)
+
+    def status(self, light: Light, status: Status) -> None:
+        self.statuses.append(status)
+
+    def configured(
+        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
+    ) -> None:
+        self.changes.append((cause, {name: getattr(configuration, name) for name in names}))
+
+    def restored(self, light: Light, success: bool, message: str) -> None:
+        self.restorations.append((success, message))
+
+    def setpoint_failed(self, light: Light, message: str) -> None:
+        self.failed_setpoints.append(message)
+
+
+@dataclass
+class Answer:
+    """What a request gets: all its results, of which there should be one."""
+
+    asked_at: float
+    results: list[Result] = field(default_factory=list)
+    ended_at: float = math.inf
+
+    def __call__(self, result: Result, now: float) -> None:
+        self.results.append(result)
+        self.ended_at = now
+
+    @property
+    def result(self) -> Result:
+        """The result; an error unless there is exactly one."""
+        (result,) = self.results
+        return result
+
+    @property
+    def seconds(self) -> float:
+        """How long it took."""
+        return self.ended_at - self.asked_at
+
+
+class _End:
+    """One end of the line: an endpoint, its sequence numbers, and its decoder."""
+
+    def __init__(self, endpoint: Endpoint, wire: FaultyWire) -> None:
+        self.endpoint = endpoint
+        self.wire = wire
+        self.decoder = Decoder()
+        self.sent: list[tuple[float, Any]] = []
+        self.received: list[tuple[float, Source, Any]] = []
+        self._sequences: dict[Source, int] = {}
+
+    def flush(self, now: float) -> None:
+        while self.endpoint.outgoing:
+            source, message = self.endpoint.outgoing.popleft()
+            self.sent.append((now, message))
+            sequence = self._sequences.get(source, 0)
+            self._sequences[source] = (sequence + 1) & 0xFF
+            self.wire.send(encode_frame(
+                message.id, encode_payload(message), sequence=sequence, source=source,
+                crc_extra=LAYOUTS[message.id].crc_extra), now)
+
+    def take(self, data: bytes, now: float) -> None:
+        for frame in self.decoder.feed(data):
+            if frame.message_id in HANDLED:
+                message = decode_payload(frame.message_id, frame.payload)
+                self.received.append((now, frame.source, message))
+                self.endpoint.receive(frame.source, message, now)
+                self.flush(now)
+
+
+class Pair:
+    """
+    A controller and lights, with a line between them.
+
+    :param lights: what to simulate, or an endpoint such as a
+        :class:`~support.fake_light.FakeLight`.
+    :param there: what the line does towards the lights.
+    :param back: what it does towards the controller; None is the same as there.
+    :param uptime: s for which simulated lights have been on at the beginning.
+    :ivar now: s.
+    """
+
+    def __init__(
+        self, lights: Sequence[DeviceProperties] | Endpoint = (DeviceProperties(),), *,
+        settings: Settings | None = None, there: Faults | None = None,
+        back: Faults | None = None, seed: int | str = 0, uptime: float = 100.0,
+        command_timeout: float = 0.5, command_retries: int = 3,
+        on_light: Callable[[Light], None] = lambda light: None,
+    ) -> None:
+        self.now = START
+        self.recorders: dict[Source, Recorder] = {}
+        self._on_light = on_light
+        self.controller = Controller(
+            BRIDGE, settings or Settings(), command_timeout=command_timeout,
+            command_retries=command_retries, on_light=self._record)
+        self.other = (lights if isinstance(lights, Endpoint)
+                      else Devices(list(lights), START - uptime))
+        there = there or Faults()
+        self.near = _End(self.controller, FaultyWire(there, f'{seed} there'))
+        self.far = _End(self.other, FaultyWire(back or there, f'{seed} back'))
+        self._turns = 0
+        self.open()
+
+    def _record(self, light: Light) -> None:
+        self.recorders[light.source] = light.observer = Recorder(lambda: self.now)
+        self._on_light(light)
+
+    # Who is there
+
+    @property
+    def light(self) -> Light:
+        """The light that the controller has found first."""
+        return next(iter(self.controller.lights.values()))
+
+    @property
+    def recorder(self) -> Recorder:
+        """What the observer of that light was told."""
+        return self.recorders[self.light.source]
+
+    @property
+    def device(self) -> Device:
+        """The first simulated light."""
+        assert isinstance(self.other, Devices)
+        return self.other.devices[0]
+
+    # Time
+
+    def next_deadline(self) -> float:
+        """Return when something happens next."""
+        return min(self.controller.next_deadline(), self.other.next_deadline(),
+                   self.near.wire.next_arrival(), self.far.wire.next_arrival())
+
+    def step(self, until: float = math.inf) -> bool:
+        """Let the next thing happen; return False, and stand at ``until``, if it is later."""
+        due = self.next_deadline()
+        if due > until:
+            self.now = max(self.now, until)
+            return False
+        self._turns = self._turns + 1 if due <= self.now else 0
+        assert self._turns < MAX_TURNS, f'a link would spin: deadline {due} at {self.now}'
+        self.now = max(self.now, due)
+        self.turn()
+        return True
+
+    def turn(self) -> None:
+        """Do what a link's thread does in one turn, at both ends."""
+        for end, wire in ((self.far, self.near.wire), (self.near, self.far.wire)):
+            for data in wire.receive(self.now):
+                end.take(data, self.now)
+        for end in (self.far, self.near):
+            end.endpoint.poll(self.now)
+            end.flush(self.now)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        until = self.now + seconds
+        while self.step(until):
+            pass
+
+    def run_until(self, condition: Callable[[], Any], *, within: float = 60.0) -> None:
+        """Let time pass until something is so; an error if that takes too long (s)."""
+        until = self.now + within
+        while not condition():
+            assert self.step(until), f'not so within {within} s'
+
+    def settle(self, seconds: float = 3.0) -> Pair:
+        """Let both sides get to know each other."""
+        self.run(seconds)
+        return self
+
+    # The line
+
+    def open(self) -> None:
+        """Open the line."""
+        self.controller.link_opened(self.now)
+        self.other.link_opened(self.now)
+        self.turn()
+
+    def close(self) -> None:
+        """Lose the line, and what is on it."""
+        for end in (self.near, self.far):
+            end.wire.cut()
+            end.decoder = Decoder()
+        self.controller.link_closed(self.now)
+        self.other.link_closed(self.now)
+        self.turn()
+
+    # Requests
+
+    def ask_enable(self, on: bool, light: Light | None = None) -> Answer:
+        """Begin to switch a light on or off."""
+        answer = Answer(self.now)
+        (light or self.light).enable(on, self.now, answer)
+        self.turn()
+        return answer
+
+    def ask_configure(self, light: Light | None = None, **changes: Any) -> Answer:
+        """Begin to configure a light."""
+        answer = Answer(self.now)
+        (light or self.light).agreement.configure(changes, self.now, answer)
+        self.turn()
+        return answer
+
+    def wait_for(self, answer: Answer) -> Result:
+        """Return the result of a request once it is there."""
+        self.run_until(lambda: answer.results)
+        return answer.result
+
+    def enable(self, on: bool) -> Result:
+        """Switch the light on or off and return what became of it."""
+        return self.wait_for(self.ask_enable(on))
+
+    def configure(self, **changes: Any) -> Result:
+        """Configure the light and return what became of it."""
+        return self.wait_for(self.ask_configure(**changes))
+
+    # What went over the line
+
+    def commands(self, *kinds: MavCmd, since: float = 0.0) -> list[Any]:
+        """Return the commands that the controller has sent, tries included, all or some kinds."""
+        return [message for at, message in self.commands_at(*kinds) if at >= since]
+
+    def commands_at(self, *kinds: MavCmd) -> Iterator[tuple[float, Any]]:
+        """Return the same with the times of sending."""
+        return ((at, message) for at, message in self.near.sent
+                if isinstance(message, CommandLong | CommandInt)
+                and (not kinds or message.command in kinds))

@@ -1,0 +1,177 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A light that does to commands what a test says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from typing import Any
+
+from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    ComponentInformationBasic,
+    IlluminatorStatus,
+    INFORMATION_ID,
+    MavCmd,
+    MavResult,
+    MavType,
+    Source,
+    STATUS_ID,
+)
+from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
+
+DEFAULT_STATUS = {
+    'enable': 0, 'mode_bitmask': 3, 'error_status': 0, 'mode': 1, 'brightness': 100.0,
+    'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'temp_c': 25.0, 'min_strobe_period': 0.05,
+    'max_strobe_period': 10.0,
+}
+
+
+def status_message(uptime_ms: int = 100_000, **fields: Any) -> Any:
+    """Return an ILLUMINATOR_STATUS, some fields other than usual."""
+    return IlluminatorStatus(uptime_ms=uptime_ms, **{**DEFAULT_STATUS, **fields})
+
+
+class FakeLight(Endpoint):
+    """
+    One light whose behaviour is a set of attributes, which a test changes as it goes.
+
+    :ivar results: what commands are answered with, MAV_RESULT_ACCEPTED if not said otherwise;
+        None is silence. A list is used up from its front, the last one for good.
+    :ivar applies: whether an accepted command changes the light.
+    :ivar apply_after: s from the acknowledgement to the change.
+    :ivar stream: s between statuses, 0 for none.
+    :ivar answers: the message ids that it sends on request.
+    :ivar pushes: whether a change is followed by a status.
+    :ivar targeted: whether acknowledgements carry their target.
+    :ivar boot: when it was started; None if its uptime is always 0.
+    :ivar fields: what it reports.
+    """
+
+    def __init__(
+        self, source: Source = Source(1, 243), *, heartbeat_type: int | None = MavType.ILLUMINATOR,
+        stream: float = 1.0, results: Mapping[int, Any] | None = None, **fields: Any,
+    ) -> None:
+        super().__init__()
+        self.source = source
+        self.heartbeat = Heartbeat(source, heartbeat_type or 0)
+        self.beats = heartbeat_type is not None
+        self.results: dict[int, Any] = dict(results or {})
+        self.applies = True
+        self.apply_after = 0.0
+        self.stream = stream
+        self.answers = {STATUS_ID, INFORMATION_ID}
+        self.pushes = False
+        self.targeted = True
+        self.boot: float | None = 0.0
+        self.identity = Identity('maker', 'torch', '1.2', '3', 'T-1')
+        self.fields = {**DEFAULT_STATUS, **fields}
+        self.carried_out: list[Any] = []
+        self.silent = False
+        self._status_due = 0.0
+        self._to_apply: list[tuple[float, Any]] = []
+
+    def link_opened(self, now: float) -> None:
+        self.heartbeat.due = now
+
+    def restart(self, now: float, **fields: Any) -> None:
+        """Lose power and come back with the default settings, or others."""
+        self.boot = now if self.boot is not None else None
+        self.fields = {**DEFAULT_STATUS, **fields}
+        self._status_due = self.heartbeat.due = now
+
+    def receive(self, source: Source, message: Any, now: float) -> None:
+        if self.silent or not isinstance(message, CommandLong | CommandInt):
+            return
+        if (message.target_system, message.target_component) != self.source:
+            return
+        result = self._result(message.command)
+        if result is None:
+            return
+        target = source if self.targeted else (0, 0)
+        self.send(CommandAck(message.command, result, 0, 0, *target))
+        if result == MavResult.ACCEPTED:
+            self.carried_out.append(message)
+            self._carry_out(message, now)
+
+    def _result(self, command: int) -> int | None:
+        result = self.results.get(command, MavResult.ACCEPTED)
+        if isinstance(result, list):
+            return result.pop(0) if len(result) > 1 else result[0]
+        return result
+
+    def _carry_out(self, message: Any, now: float) -> None:
+        if message.command == MavCmd.REQUEST_MESSAGE and message.param1 in self.answers:
+            self.send(self.status(now) if message.param1 == STATUS_ID else self.information())
+        elif message.command == MavCmd.SET_MESSAGE_INTERVAL:
+            self.stream = message.param2 / 1e6
+            self._status_due = now + self.stream
+        elif self.applies and self.apply_after:
+            self._to_apply.append((now + self.apply_after, message))
+        elif self.applies:
+            self._apply(message, now)
+
+    def _apply(self, message: Any, now: float) -> None:
+        if message.command == MavCmd.ILLUMINATOR_ON_OFF:
+            self.fields['enable'] = int(message.param1)
+        elif message.command == MavCmd.DO_ILLUMINATOR_CONFIGURE:
+            self.fields |= {
+                'mode': int(message.param1), 'brightness': message.param2,
+                'strobe_period': message.param3, 'strobe_duty_cycle': message.param4}
+        if self.pushes:
+            self.send(self.status(now))
+
+    def uptime_ms(self, now: float) -> int:
+        """Return what it reports as its uptime."""
+        return 0 if self.boot is None else int((now - self.boot) * 1000)
+
+    def status(self, now: float) -> Any:
+        """Return its ILLUMINATOR_STATUS."""
+        return status_message(self.uptime_ms(now), **self.fields)
+
+    def information(self) -> Any:
+        """Return its COMPONENT_INFORMATION_BASIC."""
+        one = self.identity
+        return ComponentInformationBasic(
+            0, 0, 0, one.vendor.encode(), one.model.encode(), one.software_version.encode(),
+            one.hardware_version.encode(), one.serial_number.encode())
+
+    def send(self, message: Any) -> None:
+        """Send anything."""
+        self.outgoing.append((self.source, message))
+
+    def poll(self, now: float) -> None:
+        for due, message in list(self._to_apply):
+            if now >= due:
+                self._to_apply.remove((due, message))
+                self._apply(message, now)
+        if self.silent:
+            return
+        if self.beats:
+            self.heartbeat.poll(now, self.outgoing)
+        if self.stream and now >= self._status_due:
+            self._status_due = now + self.stream
+            self.send(self.status(now))
+
+    def next_deadline(self) -> float:
+        waiting = min((due for due, _ in self._to_apply), default=math.inf)
+        if self.silent:
+            return waiting
+        return min(waiting, self.heartbeat.due if self.beats else math.inf,
+                   self._status_due if self.stream else math.inf)

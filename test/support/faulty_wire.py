@@ -1,0 +1,92 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A line that loses, repeats, delays and corrupts frames, the same ones each time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import heapq
+import math
+import random
+
+# s; what is reordered is overtaken by what follows it within this time.
+OVERTAKEN_WITHIN = 0.05
+
+
+@dataclass(frozen=True)
+class Faults:
+    """
+    What a line does to frames: shares (0..1) of them, each drawn by itself.
+
+    :param latency: s, for every frame.
+    :param longest_delay: s; a delayed frame takes up to this much longer.
+    """
+
+    drop: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    delay: float = 0.0
+    corrupt: float = 0.0
+    latency: float = 0.002
+    longest_delay: float = 1.0
+
+
+class FaultyWire:
+    """One direction of a line. No clock: time is passed in."""
+
+    def __init__(self, faults: Faults, seed: int | str) -> None:
+        self.faults = faults
+        self._random = random.Random(seed)
+        self._travelling: list[tuple[float, int, bytes]] = []
+        self._count = 0
+
+    def send(self, frame: bytes, now: float) -> None:
+        """Take a frame."""
+        faults = self.faults
+        if self._happens(faults.drop):
+            return
+        for _ in range(2 if self._happens(faults.duplicate) else 1):
+            arrival = now + faults.latency
+            if self._happens(faults.reorder):
+                arrival += self._random.uniform(0, OVERTAKEN_WITHIN)
+            if self._happens(faults.delay):
+                arrival += self._random.uniform(0, faults.longest_delay)
+            data = self._corrupted(frame) if self._happens(faults.corrupt) else frame
+            self._count += 1
+            heapq.heappush(self._travelling, (arrival, self._count, data))
+
+    def receive(self, now: float) -> list[bytes]:
+        """Return what has arrived, in the order of arrival."""
+        arrived = []
+        while self._travelling and self._travelling[0][0] <= now:
+            arrived.append(heapq.heappop(self._travelling)[2])
+        return arrived
+
+    def next_arrival(self) -> float:
+        """Return when something arrives next, infinity if nothing is on its way."""
+        return self._travelling[0][0] if self._travelling else math.inf
+
+    def cut(self) -> None:
+        """Lose what is on its way."""
+        self._travelling.clear()
+
+    def _happens(self, share: float) -> bool:
+        # No draw for what cannot happen: more kinds of faults then change no old seed's run.
+        return share > 0 and self._random.random() < share
+
+    def _corrupted(self, frame: bytes) -> bytes:
+        # One wrong byte is a burst that a 16-bit CRC always finds: none gets through by luck.
+        at = self._random.randrange(len(frame))
+        return frame[:at] + bytes([frame[at] ^ self._random.randrange(1, 256)]) + frame[at + 1:]
