@@ -98,6 +98,8 @@ class _Field(NamedTuple):
     type: str
     code: str
     units: str = ''
+    enum: str = ''
+    display: str = ''
 
 
 def _define(name: str, id_: int, crc_extra: int, fields: list[_Field], order: list[str]) -> Any:
@@ -121,11 +123,13 @@ def _define(name: str, id_: int, crc_extra: int, fields: list[_Field], order: li
         if len(values) > len(names) or set(given) != set(names):
             raise TypeError(f'{name} takes exactly the fields {", ".join(names)}')
         for field, value in given.items():
+            if by_name[field].type == 'char':
+                setattr(self, f'_{field}_raw', value)
+                value = value.partition(b'\0')[0].decode('ascii', errors='replace')
             setattr(self, field, value)
 
     def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> Any:
-        payload = layout.pack(*(getattr(self, n) for n in order))
-        return self._pack(mav, crc_extra, payload, force_mavlink1=force_mavlink1)
+        return self._pack(mav, crc_extra, encode_payload(self), force_mavlink1=force_mavlink1)
 
     return type(f'MAVLink_{name.lower()}_message', (Message,), {
         '__doc__': f'{name} of the MAVLink common message set.',
@@ -136,10 +140,13 @@ def _define(name: str, id_: int, crc_extra: int, fields: list[_Field], order: li
         'fieldnames': names,
         'ordered_fieldnames': order,
         'fieldtypes': [field.type for field in fields],
-        'fielddisplays_by_name': {},
-        'fieldenums_by_name': {},
+        'fielddisplays_by_name': {field.name: field.display for field in fields if field.display},
+        'fieldenums_by_name': {field.name: field.enum for field in fields if field.enum},
         'fieldunits_by_name': {field.name: field.units for field in fields if field.units},
-        'native_format': bytearray(layout.format.encode()),
+        # The types alone, without the lengths of arrays.
+        'native_format': bytearray(
+            b'<' + b''.join(b'c' if by_name[n].type == 'char' else by_name[n].code.encode()
+                            for n in order)),
         'orders': [order.index(n) for n in names],
         'lengths': [1] * len(names),
         'array_lengths': [int(by_name[n].code[:-1] or 0) for n in order],
@@ -157,9 +164,9 @@ def _installed(id_: int, name: str, crc_extra: int, fields: list[_Field], order:
 IlluminatorStatus = _installed(STATUS_ID, 'ILLUMINATOR_STATUS', 66, [
     _Field('uptime_ms', 'uint32_t', 'I', 'ms'),
     _Field('enable', 'uint8_t', 'B'),
-    _Field('mode_bitmask', 'uint8_t', 'B'),
-    _Field('error_status', 'uint32_t', 'I'),
-    _Field('mode', 'uint8_t', 'B'),
+    _Field('mode_bitmask', 'uint8_t', 'B', enum='ILLUMINATOR_MODE'),
+    _Field('error_status', 'uint32_t', 'I', enum='ILLUMINATOR_ERROR_FLAGS', display='bitmask'),
+    _Field('mode', 'uint8_t', 'B', enum='ILLUMINATOR_MODE'),
     _Field('brightness', 'float', 'f', '%'),
     _Field('strobe_period', 'float', 'f', 's'),
     _Field('strobe_duty_cycle', 'float', 'f', '%'),
@@ -171,7 +178,7 @@ IlluminatorStatus = _installed(STATUS_ID, 'ILLUMINATOR_STATUS', 66, [
 
 ComponentInformationBasic = _installed(INFORMATION_ID, 'COMPONENT_INFORMATION_BASIC', 50, [
     _Field('time_boot_ms', 'uint32_t', 'I', 'ms'),
-    _Field('capabilities', 'uint64_t', 'Q'),
+    _Field('capabilities', 'uint64_t', 'Q', enum='MAV_PROTOCOL_CAPABILITY', display='bitmask'),
     _Field('time_manufacture_s', 'uint32_t', 'I', 's'),
     _Field('vendor_name', 'char', '32s'),
     _Field('model_name', 'char', '32s'),
@@ -212,7 +219,16 @@ LAYOUTS: dict[int, Layout] = {
 def encode_payload(message: Any) -> bytes:
     """Return the payload of a message as it goes on the wire, trailing zeros not yet cut."""
     cls = type(message)
-    return bytes(cls.unpacker.pack(*(getattr(message, n) for n in cls.ordered_fieldnames)))
+    return bytes(cls.unpacker.pack(*(wire_value(message, n) for n in cls.ordered_fieldnames)))
+
+
+def wire_value(message: Any, field: str) -> Any:
+    """
+    Return a field as it is on the wire; a char field is bytes, terminated or not.
+
+    pymavlink shows char fields as ASCII text and keeps the bytes beside it.
+    """
+    return getattr(message, f'_{field}_raw', getattr(message, field))
 
 
 def decode_payload(message_id: int, payload: bytes) -> Any:
