@@ -138,16 +138,15 @@ def format_seconds(seconds: float) -> str:
 Done = Callable[[Outcome, float], None]
 
 
-@dataclass
+@dataclass(eq=False)
 class _Entry:
     command: Command
     done: Done
     limit: float
     as_int: bool = False
-    switched: bool = False
     in_progress: bool = False
     tries: int = 0
-    # Tries that were answered "temporarily rejected": those are not lost frames.
+    # Tries that were answered with a reason to try again: those are not lost frames.
     rejected: int = 0
     first_sent: float = 0.0
     last_sent: float = 0.0
@@ -201,14 +200,16 @@ class CommandSender:
         :param limit: the time by which it ends whatever happens, progress or not.
         """
         entry = _Entry(command, done, limit)
-        if command.key in self._active:
+        if now >= limit:
+            done(Outcome(Ending.OUT_OF_TIME), now)
+        elif command.key in self._active:
             waiting = self._waiting.setdefault(command.key, deque())
             if len(waiting) >= MAX_WAITING:
                 done(Outcome(Ending.REFUSED_LOCALLY), now)
             else:
                 waiting.append(entry)
-            return
-        self._begin(entry, now)
+        else:
+            self._begin(entry, now)
 
     def pending(self, target: Source, command: int) -> bool:
         """Return whether a command of this kind is under way."""
@@ -233,6 +234,8 @@ class CommandSender:
         if entry is None:
             self.counters.unexpected_acks += 1
             return
+        if self._answers_another_try(entry, ack.result):
+            return
         if entry.tries == 1 and entry.result is None:
             # An acknowledgement after a resend may be that of either try: no measure (RFC 6298).
             self.round_trip(source).add(now - entry.last_sent)
@@ -248,16 +251,25 @@ class CommandSender:
             entry.rejected += 1
             if entry.due >= min(entry.deadline, entry.limit):
                 self._end(entry, Ending.ANSWERED, now)
-        elif self._other_form_wanted(entry, ack.result):
-            entry.as_int = not entry.as_int
-            entry.switched = True
+        elif (ack.result == MavResult.COMMAND_INT_ONLY and not entry.in_progress
+                and now < entry.limit):
+            entry.as_int = True
+            entry.rejected += 1
             self._transmit(entry, now)
         else:
             self._end(entry, Ending.ANSWERED, now, ack.result_param2)
 
-    def _other_form_wanted(self, entry: _Entry, result: int) -> bool:
-        wanted = MavResult.COMMAND_LONG_ONLY if entry.as_int else MavResult.COMMAND_INT_ONLY
-        return result == wanted and not entry.switched and not entry.in_progress
+    def _answers_another_try(self, entry: _Entry, result: int) -> bool:
+        """
+        Return whether an acknowledgement is for a try that does not matter any more.
+
+        A resend that meets the first try at work is rejected for that, and a COMMAND_LONG may be
+        refused once more after the COMMAND_INT has gone out.
+        """
+        if result == MavResult.COMMAND_INT_ONLY:
+            return entry.as_int
+        return (result == MavResult.TEMPORARILY_REJECTED and entry.in_progress
+                and entry.tries > 1)
 
     def poll(self, now: float) -> None:
         """Resend or end what is due."""
@@ -326,14 +338,21 @@ class CommandSender:
             entry.done(Outcome(ending), now)
             return
         del self._active[key]
-        if waiting:
-            self._begin(waiting.popleft(), now)
+        late = []
+        while waiting and key not in self._active:
+            following = waiting.popleft()
+            if now < following.limit:
+                self._begin(following, now)
+            else:
+                late.append(following)
         if not waiting:
             self._waiting.pop(key, None)
         self.counters.unanswered += ending is Ending.NO_ANSWER
         entry.done(Outcome(
             ending, entry.result, entry.tries, now - entry.first_sent, entry.progress,
             result_param2), now)
+        for other in late:
+            other.done(Outcome(Ending.OUT_OF_TIME), now)
 
 
 def _message(entry: _Entry) -> Any:
