@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import ipaddress
 import re
 from typing import NamedTuple, NoReturn
 
@@ -122,7 +123,7 @@ class _Parser:
                       'component_id')
         scheme, separator, rest = text.partition('://')
         if separator:
-            reader = _WITH_SLASHES.get(scheme)
+            reader = _WITH_SLASHES.get(scheme.lower())
             if reader is None:
                 self.fail(f'unknown scheme {scheme!r}; known are '
                           + ', '.join(f'{name}://' for name in _WITH_SLASHES))
@@ -130,6 +131,10 @@ class _Parser:
         scheme, separator, rest = text.partition(':')
         if separator and scheme in _WITHOUT_SLASHES:
             return _WITHOUT_SLASHES[scheme](self, rest)
+        if separator and scheme in _NOT_HERE:
+            self.fail(f'{scheme + separator!r} of pymavlink is not supported here')
+        if separator and scheme in _WITH_SLASHES:
+            self.fail(f'{scheme + separator!r} lacks "//" behind it')
         if separator:
             # pymavlink takes a bare host:port as an address to listen on with UDP.
             return UdpUrl(self.address(text))
@@ -147,7 +152,7 @@ class _Parser:
         """Return host and port of ``[host][:port]``; a part without default must be there."""
         if match := re.fullmatch(r'\[([^\[\]]*)\](?::(.*))?', text):
             host, port = match.groups()
-            if not re.fullmatch(r'[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%\w+)?', host):
+            if not _is_ip(host, 6):
                 self.fail(f'{host!r} in brackets is no IPv6 address')
         else:
             host, colon, port = text.partition(':')
@@ -156,7 +161,7 @@ class _Parser:
                 self.fail(f'{text!r}: an IPv6 address stands in brackets, as in [::1]:14550')
             if not re.fullmatch(r'[A-Za-z0-9._-]*', host):
                 self.fail(f'{host!r} is no host name')
-            if re.fullmatch(r'[0-9.]+', host) and not _is_ipv4(host):
+            if re.fullmatch(r'[0-9.]+', host) and not _is_ip(host, 4):
                 self.fail(f'{host!r} is no IPv4 address')
         if not host:
             if default_host is None:
@@ -171,26 +176,33 @@ class _Parser:
     def remote(self, text: str, *, default_port: int | None = None) -> Address:
         """Return an address to send to: it needs a host, and not the one that means "any"."""
         address = self.address(text, default_host=None, default_port=default_port)
-        if address.host in ('0.0.0.0', '::'):
+        if _means_any(address.host):
             self.fail(f'{address.host!r} is no address to send to')
         return address
 
     def port(self, text: str) -> int:
         if not re.fullmatch(r'[0-9]+', text):
             self.fail(f'port {text!r} is no number')
-        if not 1 <= int(text) <= 65535:
+        # The length goes first: int() refuses a number of thousands of digits.
+        if len(text) > 5 or not 1 <= int(text) <= 65535:
             self.fail(f'port {text} is outside 1..65535')
         return int(text)
 
     # Schemes
 
     def udp(self, rest: str) -> Url:
-        """Read MAVROS's ``udp://[bind]@[remote]``; without ``@``, MAVSDK's address to bind."""
+        """
+        Read MAVROS's ``udp://[bind]@[remote]`` or, without ``@``, MAVSDK's ``udp://host:port``.
+
+        MAVROS has no use for a remote port without a host. MAVSDK listens where the host means
+        "any", and sends to every other.
+        """
         bind, at, remote = self.no_path(rest).partition('@')
         if not at:
-            return UdpUrl(self.address(bind))
+            address = self.address(bind)
+            return UdpUrl(address) if _means_any(address.host) else self.udp_out(bind)
         bound = self.address(bind, default_port=MAVROS_UDP_BIND_PORT)
-        if not remote:
+        if not self.address(remote, default_port=MAVROS_UDP_REMOTE_PORT).host:
             return UdpUrl(bound)
         return UdpUrl(bound, self.remote(remote, default_port=MAVROS_UDP_REMOTE_PORT))
 
@@ -214,9 +226,12 @@ class _Parser:
                       'always')
 
     def tcp(self, rest: str) -> Url:
-        """Read ``tcp://``: MAVROS has defaults for both parts, and MAVSDK means the same."""
-        return TcpUrl(self.remote(self.no_path(rest) or 'localhost',
-                                  default_port=MAVROS_TCP_PORT))
+        """Read ``tcp://``: a client, with MAVROS's defaults; MAVSDK's listens without a host."""
+        address = self.address(self.no_path(rest) or 'localhost', default_port=MAVROS_TCP_PORT)
+        if _means_any(address.host):
+            self.fail(f'{rest!r} connects to this machine in MAVROS and listens in MAVSDK: say '
+                      f'tcpout://localhost:{address.port} or tcpin://0.0.0.0:{address.port}')
+        return TcpUrl(address)
 
     def tcp_listen(self, rest: str) -> Url:
         return TcpUrl(self.address(self.no_path(rest), default_port=MAVROS_TCP_PORT), True)
@@ -239,8 +254,12 @@ class _Parser:
         return self.serial(rest, True)
 
     def device(self, text: str) -> Url:
-        """Read a bare path: ``/dev/x:baud`` of MAVROS or ``/dev/x,baud`` of pymavlink."""
-        match = re.fullmatch(r'([^,:]+)[,:](.*)', text)
+        """
+        Read a bare path: ``/dev/x:baud`` of MAVROS or ``/dev/x,baud`` of pymavlink.
+
+        The path itself may have colons, as those in /dev/serial/by-path do.
+        """
+        match = re.fullmatch(r'(.+)[,:]([^,:]*)', text)
         if not match:
             self.fail(f'no baud rate behind {text!r}: MAVROS would take 57600 and pymavlink '
                       '115200')
@@ -252,7 +271,7 @@ class _Parser:
         return MemoryUrl(rest)
 
     def baud(self, text: str) -> int:
-        if not re.fullmatch(r'[0-9]+', text) or not 1 <= int(text) <= MAX_BAUD:
+        if not re.fullmatch(r'[0-9]{1,8}', text) or not 1 <= int(text) <= MAX_BAUD:
             self.fail(f'{text!r} is no baud rate')
         return int(text)
 
@@ -264,9 +283,19 @@ class _Parser:
         return rest
 
 
-def _is_ipv4(host: str) -> bool:
-    parts = host.split('.')
-    return len(parts) == 4 and all(part.isdigit() and int(part) <= 255 for part in parts)
+def _is_ip(host: str, version: int) -> bool:
+    try:
+        return ipaddress.ip_address(host).version == version
+    except ValueError:
+        return False
+
+
+def _means_any(host: str) -> bool:
+    """Return whether a host stands for all interfaces."""
+    try:
+        return not host or ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return False
 
 
 _Reader = Callable[[_Parser, str], Url]
@@ -295,3 +324,6 @@ _WITHOUT_SLASHES: dict[str, _Reader] = {
     'tcp': _Parser.tcp_out,
     'tcpin': _Parser.tcp_in,
 }
+
+# What else pymavlink has and would here be taken for a host name before a port.
+_NOT_HERE = ('mcast', 'uds', 'unix', 'ws', 'wss', 'wsserver', 'csv')
