@@ -147,9 +147,11 @@ class Signing:
         Return whether one more stream can be remembered.
 
         Forgetting a stream must not let its old frames in again: only those go that are so old
-        that their replay would be refused as too old for a new stream.
+        that their replay would be refused as too old for a new stream, now and after a step of
+        the clock.
         """
         if len(self._streams) >= MAX_STREAMS:
+            self.timestamp = max(self.timestamp, oldest + NEW_STREAM_TICKS)
             for stream in [s for s, stamp in self._streams.items() if stamp < oldest]:
                 del self._streams[stream]
         return len(self._streams) < MAX_STREAMS

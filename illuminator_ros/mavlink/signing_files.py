@@ -23,12 +23,13 @@ from pathlib import Path
 import re
 import stat
 
-from .signing import KEY_SIZE, TICKS_PER_SECOND
+from .signing import KEY_SIZE, MAX_TICKS, TICKS_PER_SECOND
 
 MIN_PASSPHRASE = 8
 MAX_KEY_FILE = 4096
 # The stored time stamp runs ahead of the last one used by this much, so that a crash between
-# two stores repeats none. The specification asks for a store at least once a minute.
+# two stores repeats none. The specification asks for a store at least once a minute. It is not
+# more than a new stream may be behind, so others with the right time are still believed.
 STORE_MARGIN = 60 * TICKS_PER_SECOND
 
 
@@ -40,9 +41,9 @@ def load_key(path: str) -> bytes:
     """
     Return the 32-byte key that a file holds.
 
-    The file has 32 raw bytes, or 64 hexadecimal digits, or a passphrase of at least 8 characters
-    whose SHA-256 is the key, as in MAVProxy and Mission Planner. 32 printable characters are a
-    passphrase.
+    The file has 32 raw bytes, or 64 hexadecimal digits, or a passphrase: one line of at least 8
+    printable characters whose SHA-256 is the key, as in MAVProxy and Mission Planner. 32 bytes of
+    printable text are a passphrase.
 
     :raises KeyFileError: if it cannot be read, is open to others, or holds none of these.
     """
@@ -54,6 +55,8 @@ def load_key(path: str) -> bytes:
             content = file.read(MAX_KEY_FILE + 1)
     except OSError as error:
         raise KeyFileError(f'key file {path!r}: {error.strerror}') from None
+    except ValueError as error:
+        raise KeyFileError(f'key file {path!r}: {error}') from None
     if stat.S_IMODE(mode) & 0o077:
         raise KeyFileError(
             f'key file {path!r} can be read by others (mode {stat.S_IMODE(mode):04o}); '
@@ -63,13 +66,22 @@ def load_key(path: str) -> bytes:
     text = content.rstrip(b'\r\n')
     if re.fullmatch(rb'[0-9A-Fa-f]{64}', text):
         return bytes.fromhex(text.decode())
-    if len(content) == KEY_SIZE and not re.fullmatch(rb'[ -~]+', text):
+    printable = _printable(text)
+    if len(content) == KEY_SIZE and not printable:
         return content
-    if len(text) < MIN_PASSPHRASE:
+    if len(text) < MIN_PASSPHRASE or not printable:
         raise KeyFileError(
-            f'key file {path!r} holds {len(text)} bytes: neither 32 raw bytes, nor 64 '
-            f'hexadecimal digits, nor a passphrase of at least {MIN_PASSPHRASE} characters')
+            f'key file {path!r} holds {len(content)} bytes: neither 32 raw bytes, nor 64 '
+            f'hexadecimal digits, nor a passphrase of at least {MIN_PASSPHRASE} printable '
+            'characters')
     return hashlib.sha256(text).digest()
+
+
+def _printable(text: bytes) -> bool:
+    try:
+        return text.decode().isprintable()
+    except UnicodeDecodeError:
+        return False
 
 
 class TimestampStore:
@@ -88,20 +100,24 @@ class TimestampStore:
     def load(self) -> int:
         """Return the time stamp to go on from, 0 where none is stored."""
         try:
-            return int(self.path.read_text())
+            timestamp = int(self.path.read_text())
         except (OSError, ValueError):
             return 0
+        return timestamp if 0 <= timestamp <= MAX_TICKS else 0
 
-    def store(self, timestamp: int) -> None:
+    def store(self, timestamp: int, *, last: bool = False) -> None:
         """
         Replace the stored time stamp.
 
+        :param last: no other will be used in this run, so the next goes on right behind it.
+            Otherwise each restart would take the time stamps further ahead of the clock.
         :raises OSError: if the directory cannot be written.
         """
+        following = timestamp if last else timestamp + STORE_MARGIN
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         scratch = self.path.with_name(f'{self.path.name}.{os.getpid()}')
         try:
-            scratch.write_text(f'{timestamp + STORE_MARGIN}\n')
+            scratch.write_text(f'{min(following, MAX_TICKS)}\n')
             os.replace(scratch, self.path)
         finally:
             with contextlib.suppress(OSError):
