@@ -118,7 +118,7 @@ def _serve(arguments: list[str], termination: Termination) -> int:
         # rclpy has an exception of its own for each thing that can be wrong with an argument.
         return _wrong(f'wrong ROS arguments: {error}')
     try:
-        process = BridgeProcess(node)
+        process = BridgeProcess(node, arguments)
     except ParameterError as error:
         return _wrong(f'parameter {error}')
     termination.calls(process.end)

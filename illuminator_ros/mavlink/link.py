@@ -21,6 +21,7 @@ from collections.abc import Callable
 import contextlib
 from dataclasses import dataclass
 import logging
+import math
 import selectors
 import socket
 import threading
@@ -29,21 +30,27 @@ from typing import Any
 
 from .dialect import decode_payload, encode_payload, HANDLED, LAYOUTS, Source
 from .endpoint import Endpoint
-from .framing import Decoder, DecoderCounters, encode_frame, Frame
+from .framing import DecoderCounters, encode_frame, Frame
 from .opener import Opener
+from .reception import Reception
 from .routes import Routes
 from .signing import Signing, SigningCounters
 from .signing_files import TimestampStore
 from .statistics import Traffic
-from .transport import Channel, ChannelLost, Peer
+from .transport import Channel, Peer
 from .url import Url
 
 # s; the loop looks around this often even where nothing is due.
 IDLE = 1.0
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
-# Senders whose incomplete frames are kept apart.
-MAX_DECODERS = 64
+# s that a channel stays open, or a frame over it, until it counts as one that leads somewhere.
+PROBATION = 1.0
+# s; after a fault of ours the loop goes on no faster, and shows no more of them, than this.
+FAULT_PAUSE = 0.1
+FAULT_LOG_INTERVAL = 1.0
+# Different reasons for not opening that are told apart before the first opening.
+MAX_REASONS = 16
 
 _log = logging.getLogger(__name__)
 
@@ -69,6 +76,7 @@ class LinkState:
 
     :param since: when it was opened or lost, on the link's clock, s.
     :param openings: how often it was opened.
+    :param peers: how many have lately sent something good.
     """
 
     is_open: bool
@@ -89,7 +97,8 @@ class Link:
     All of the endpoint is called from that thread and no other; :meth:`call` brings work to it.
 
     :param on_event: called in the link's thread when the link is opened, lost, or cannot be
-        opened at first.
+        opened at first. A channel that is lost again before it has proved to lead anywhere
+        counts as not opened.
     :param store: where the time stamps of signing outlive us; None keeps them nowhere.
     :param clock: s, monotonic.
     :param wall_clock: s, Unix time, for the signing time stamps.
@@ -118,46 +127,57 @@ class Link:
         self._wake_in.setblocking(False)
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._wake_out, selectors.EVENT_READ)
-        self._stopping = False
+        self._stopping = threading.Event()
+        self._starting = threading.Lock()
         self._channel: Channel | None = None
         self._sequences: dict[Source, int] = {}
-        self._decoders: dict[Peer, Decoder] = {}
+        self._reception = Reception(self._signing)
         self._routes = Routes()
-        self._decoding = DecoderCounters()
         self._traffic = Traffic()
-        self._dropped_before = 0
         self._since = clock()
+        # Why the link is not open, as far as others know; '' where it is.
         self._reason = 'not opened yet'
+        self._reasons: set[str] = set()
         self._openings = 0
+        # When the channel counts as one that leads somewhere, infinity once it does; and
+        # whether the one before never did.
+        self._proven_at = math.inf
+        self._doubtful = False
+        self._pause = 0.0
+        self._fault_log_due = -math.inf
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
 
     def start(self) -> None:
         """Start the thread; the first attempt to open follows at once."""
-        self._thread.start()
+        with self._starting:
+            if not self._stopping.is_set():
+                self._thread.start()
 
     def stop(self, timeout: float = 1.0) -> None:
-        """End the thread, s at most, and close the transport."""
-        self._stopping = True
+        """End the thread, s at most, and close the transport; it cannot be started again."""
+        with self._starting:
+            self._stopping.set()
+            if self._thread.ident is None:
+                self._release()
         self._wake()
         self._opener.stop()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(timeout)
 
     def call(self, function: Callable[[float], None]) -> None:
-        """Have ``function(now)`` called in the link's thread."""
+        """Have ``function(now)`` called in the link's thread, unless that has ended."""
         self._calls.append(function)
         self._wake()
 
     def state(self) -> LinkState:
         """Return the link's condition."""
-        channel = self._channel
-        self._traffic.frames_dropped = self._dropped_before + (channel.dropped if channel else 0)
+        channel, reason = self._channel, self._reason
         return LinkState(
-            channel is not None, self._since, channel.name if channel else self._label,
-            self._reason, self._openings, self._routes.peer_count, self._traffic, self._decoding,
-            self._signing.counters)
+            not reason, self._since, channel.name if channel else self._label, reason,
+            self._openings, self._routes.peer_count(self.clock()), self._traffic,
+            self._reception.counters, self._signing.counters)
 
     def _wake(self) -> None:
         # A full buffer has woken the thread already; a closed one has no thread to wake.
@@ -174,33 +194,60 @@ class Link:
 
     def _run(self) -> None:
         self._opener.start()
-        while not self._stopping:
+        while not self._stopping.is_set():
             try:
                 self._turn()
             except Exception:
-                # A fault of ours must not end the link; it is shown, and the next turn comes.
-                _log.exception('internal error in the link')
+                self._show_fault()
+                self._stopping.wait(FAULT_PAUSE)
+        # No channel is handed over any more, and one that just was is among the calls.
+        self._opener.stop()
+        self._run_calls()
         self._store_timestamp()
         self._close()
+        self._release()
+
+    def _release(self) -> None:
         self._selector.close()
         self._wake_out.close()
         self._wake_in.close()
 
     def _turn(self) -> None:
-        wait = min(self.endpoint.next_deadline() - self.clock(), IDLE)
-        ready = self._selector.select(max(wait, 0.0))
-        for key, events in ready:
+        due = min(self.endpoint.next_deadline(), self._reception.next_deadline(),
+                  self._proven_at)
+        wait = min(max(due - self.clock(), self._pause), IDLE)
+        self._pause = 0.0
+        for key, events in self._selector.select(wait):
             if key.fileobj is self._wake_out:
                 with contextlib.suppress(BlockingIOError):
                     self._wake_out.recv(4096)
             elif self._channel is not None:
                 self._serve(key.fileobj, events)
-        for _ in range(len(self._calls)):
-            self._calls.popleft()(self.clock())
-        self.endpoint.poll(self.clock())
+        self._run_calls()
+        if self._channel is not None:
+            self._look_after(self._channel, self.clock())
+        self._guarded(self.endpoint.poll, self.clock())
         self._flush()
         if self.clock() >= self._store_due:
             self._store_timestamp()
+
+    def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Call what is not ours: its fault must not end the link, nor anything else in it."""
+        try:
+            function(*arguments)
+        except Exception:
+            self._pause = FAULT_PAUSE
+            self._show_fault()
+
+    def _show_fault(self) -> None:
+        """Log the exception under way, but not again and again."""
+        if self.clock() >= self._fault_log_due:
+            self._fault_log_due = self.clock() + FAULT_LOG_INTERVAL
+            _log.exception('internal error in the link')
+
+    def _run_calls(self) -> None:
+        for _ in range(len(self._calls)):
+            self._guarded(self._calls.popleft(), self.clock())
 
     def _store_timestamp(self) -> None:
         """Keep the time stamp for the next run ("Timestamp Handling")."""
@@ -224,29 +271,31 @@ class Link:
                     self._flush()
                     if self._channel is None:
                         return
-        except ChannelLost as error:
+        except OSError as error:
             self._lost(error)
 
     def _take(self, channel: Channel, peer: Peer, data: bytes) -> None:
         self._traffic.bytes_received += len(data)
-        decoder = self._decoders.get(peer)
-        if decoder is None:
-            if len(self._decoders) >= MAX_DECODERS:
-                del self._decoders[next(iter(self._decoders))]
-            decoder = self._decoders[peer] = Decoder(counters=self._decoding)
-        for frame in decoder.feed(data):
-            if self._signing.accepts(frame, self._wall_clock()):
-                self._accept(channel, peer, frame)
-
-    def _accept(self, channel: Channel, peer: Peer, frame: Frame) -> None:
         now = self.clock()
+        for frame in self._reception.take(peer, data, now, self._wall_clock()):
+            self._accept(channel, peer, frame, now)
+
+    def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
+        if self._proven_at < math.inf:
+            self._prove(channel, now)
         self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
-            self.endpoint.link_opened(now)
+            self._guarded(self.endpoint.link_opened, now)
         self._routes.heard(frame.source, peer, now)
         if frame.message_id in HANDLED:
-            self.endpoint.receive(
-                frame.source, decode_payload(frame.message_id, frame.payload), now)
+            self._guarded(self.endpoint.receive, frame.source,
+                          decode_payload(frame.message_id, frame.payload), now)
+
+    def _look_after(self, channel: Channel, now: float) -> None:
+        if now >= self._proven_at:
+            self._prove(channel, now)
+        for peer, frame in self._reception.give_up(now, self._wall_clock()):
+            self._accept(channel, peer, frame, now)
 
     def _flush(self) -> None:
         """Send what the endpoint has to say; without a channel it is said to nobody."""
@@ -256,7 +305,7 @@ class Link:
             if self._channel is not None:
                 try:
                     self._send(self._channel, source, message)
-                except ChannelLost as error:
+                except OSError as error:
                     self._lost(error)
 
     def _send(self, channel: Channel, source: Source, message: Any) -> None:
@@ -268,47 +317,60 @@ class Link:
         if self._signing.signs:
             frame = self._signing.sign(frame, self._wall_clock())
         peers = self._routes.towards(message, channel.peers(self.clock()), self.clock())
+        dropped = channel.dropped
         channel.send(frame, peers)
+        self._traffic.frames_dropped += channel.dropped - dropped
         self._traffic.frames_sent += len(peers)
         self._traffic.bytes_sent += len(frame) * len(peers)
 
     def _opened(self, channel: Channel, now: float) -> None:
-        if self._stopping:
+        if self._stopping.is_set():
             channel.close()
             return
         self._channel = channel
+        self._proven_at = now + PROBATION
         channel.register(self._selector)
-        self.endpoint.link_opened(now)
+        self._guarded(self.endpoint.link_opened, now)
         self._flush()
         # Sending the first heartbeat may already have shown that it leads nowhere.
-        if self._channel is channel:
-            self._since, self._reason = now, ''
-            self._openings += 1
-            self._opener.succeeded()
-            self._on_event(LinkEvent(True, channel.name))
+        if self._channel is channel and not self._doubtful:
+            self._announce(channel, now)
+
+    def _prove(self, channel: Channel, now: float) -> None:
+        """Note that the channel leads somewhere: so its loss is answered at once."""
+        self._proven_at = math.inf
+        self._opener.succeeded()
+        if self._reason:
+            self._announce(channel, now)
+
+    def _announce(self, channel: Channel, now: float) -> None:
+        self._since, self._reason = now, ''
+        self._openings += 1
+        self._guarded(self._on_event, LinkEvent(True, channel.name))
 
     def _failed(self, reason: str) -> None:
-        # Once it has been open, its loss was one line in the log and its return will be another.
-        if reason != self._reason and not self._openings:
-            self._on_event(LinkEvent(False, self._label, reason))
         self._reason = reason
+        # Once it has been open, its loss was one line in the log and its return will be another.
+        if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self._openings:
+            self._reasons.add(reason)
+            self._guarded(self._on_event, LinkEvent(False, self._label, reason))
 
     def _lost(self, error: OSError) -> None:
         if self._channel is None:
             return
-        was_open = not self._reason
-        name = self._channel.name
+        name, was_open = self._channel.name, not self._reason
+        self._doubtful = self._proven_at < math.inf
         self._close()
+        self._opener.start()
         reason = error.strerror or str(error)
         now = self.clock()
         if was_open:
             self._since, self._reason = now, reason
-            self._on_event(LinkEvent(False, name, reason))
+            self._guarded(self._on_event, LinkEvent(False, name, reason))
         else:
             self._failed(reason)
-        self.endpoint.link_closed(now)
+        self._guarded(self.endpoint.link_closed, now)
         self._traffic.restart()
-        self._opener.start()
 
     def _close(self) -> None:
         if self._channel is None:
@@ -316,8 +378,9 @@ class Link:
         for key in list(self._selector.get_map().values()):
             if key.fileobj is not self._wake_out:
                 self._selector.unregister(key.fileobj)
-        self._dropped_before += self._channel.dropped
-        self._channel.close()
-        self._channel = None
-        self._decoders.clear()
+        channel, self._channel = self._channel, None
+        with contextlib.suppress(OSError):
+            channel.close()
+        self._proven_at = math.inf
+        self._reception.clear()
         self._routes.clear()

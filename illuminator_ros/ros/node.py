@@ -80,9 +80,10 @@ class IlluminatorNode(Node):
         self.create_timer(0.25, lambda: None, group, self._steady)
 
     def bind(self, light: Light, now: float) -> None:
-        """Serve a light from now on; called in the link's thread."""
+        """Serve a light from now on, and tell what is known of it; in the link's thread."""
         self.light = light
         light.observer = self.outputs
+        self.outputs.catch_up(light)
         if self._overrides:
             light.agreement.want(self._overrides, now)
 

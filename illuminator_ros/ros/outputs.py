@@ -28,7 +28,7 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool
 
 from ..illuminator.light import Light
-from ..illuminator.model import Configuration, Identity, Limits, Mode, shortest, Status
+from ..illuminator.model import Configuration, FIELDS, Identity, Limits, Mode, shortest, Status
 from ..illuminator.observer import Cause, LightObserver
 from .conversions import status_messages, STATUS_TOPICS, temperature_message
 from .parameters import DEVICE_SPECS, period_range
@@ -61,6 +61,18 @@ class Outputs(LightObserver):
         self._mirroring = threading.RLock()
         self._mirrored_by: int | None = None
         node.add_on_set_parameters_callback(self._may_set)
+
+    def catch_up(self, light: Light) -> None:
+        """Tell what has happened before somebody listened."""
+        if light.connected:
+            self.connected(light)
+        if light.identification.identity:
+            self.identified(light, light.identification.identity)
+        if light.status:
+            self.status(light, light.status)
+        if light.agreement.agreed:
+            self.configured(
+                light, light.agreement.agreed, list(FIELDS), Cause.FIRST_STATUS)
 
     def connected(self, light: Light) -> None:
         """See :meth:`LightObserver.connected`."""

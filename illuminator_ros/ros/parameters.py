@@ -156,6 +156,8 @@ class LinkParameters:
     signing_mode: SigningMode
     signing_key_file: str
     connection_url: str
+    frame_id: str
+    diagnostics_period: float
 
 
 def declare_link_parameters(node: Node) -> LinkParameters:
@@ -181,7 +183,7 @@ def declare_link_parameters(node: Node) -> LinkParameters:
         **{name: values[name] for name in (
             'heartbeat_timeout', 'command_timeout', 'command_retries', 'status_interval',
             'off_on_shutdown', 'restore_configuration', 'signing_key_file',
-            'connection_url')})
+            'connection_url', 'frame_id', 'diagnostics_period')})
 
 
 def _parse_names(entries: list[str]) -> dict[Source, str]:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from typing import Any
 
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -25,7 +26,6 @@ from rclpy.node import Node
 
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings
-from ..illuminator.operation import Result
 from ..mavlink.link import Link, LinkEvent
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
@@ -41,11 +41,15 @@ class BridgeProcess:
     """
     Connects the nodes of the lights on one link with that link.
 
+    :param node: that of the first light.
+    :param arguments: the command line, which the nodes of further lights follow too.
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, node: IlluminatorNode) -> None:
+    def __init__(self, node: IlluminatorNode, arguments: list[str]) -> None:
         self.node = node
+        self.nodes = [node]
+        self._arguments = without_node_name(arguments)
         self.parameters = parameters = declare_link_parameters(node)
         self.controller = Controller(
             parameters.identity, Settings(
@@ -57,10 +61,7 @@ class BridgeProcess:
         self.link = Link(
             parameters.url, self.controller, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
-        node.serve(
-            self.link, self.controller, url=parameters.connection_url,
-            frame_id=node.get_parameter('frame_id').value,
-            period=node.get_parameter('diagnostics_period').value)
+        self._serve(node)
         _forward_logs(node)
         self._ended = threading.Event()
         self._executor = SingleThreadedExecutor(context=node.context)
@@ -94,7 +95,32 @@ class BridgeProcess:
         if self.node.light is None and wanted:
             self.node.bind(light, self.link.clock())
         else:
-            self.node.get_logger().info(f'light {light.source} heard, and not served')
+            # Making a node takes long: not here, where all lights would wait for it.
+            self._executor.create_task(self._add_node, light)
+
+    def _serve(self, node: IlluminatorNode) -> None:
+        node.serve(
+            self.link, self.controller, url=self.parameters.connection_url,
+            frame_id=self.parameters.frame_id, period=self.parameters.diagnostics_period)
+
+    def _add_node(self, light: Light) -> None:
+        """Make the node of a further light, on the executor."""
+        system, component = light.source
+        name = (self.parameters.names.get(light.source)
+                or f'{self.node.get_name()}_{system}_{component}')
+        logger = self.node.get_logger()
+        try:
+            node = IlluminatorNode(
+                name, namespace=self.node.get_namespace(), context=self.node.context,
+                cli_args=self._arguments, use_global_arguments=False)
+            self._serve(node)
+        except Exception as error:
+            logger.error(f'light {light.source} gets no node: {error}')
+            return
+        logger.info(f'light {light.source} is served by {node.get_fully_qualified_name()}')
+        self.nodes.append(node)
+        self._executor.add_node(node)
+        self.link.call(lambda now: node.bind(light, now))
 
     def _link_event(self, event: LinkEvent) -> None:
         logger = self.node.get_logger()
@@ -102,20 +128,39 @@ class BridgeProcess:
             logger.info(f'link open: {event.name}')
         else:
             logger.warning(f'link not open: {event.name}: {event.reason}; trying again')
-        self.node.link_changed()
+        for node in list(self.nodes):
+            node.link_changed()
 
     def _stop(self) -> None:
-        """Switch the light off if that is wanted, and close the link; takes 0.65 s at most."""
-        light = self.node.light
-        if self.parameters.off_on_shutdown and light is not None and light.connected:
-            done = threading.Event()
+        """Switch the lights off if that is wanted, and close the link; takes 0.65 s at most."""
+        if self.parameters.off_on_shutdown:
+            lights = [node.light for node in self.nodes if node.light and node.light.connected]
+            answers = threading.Semaphore(0)
 
-            def answered(result: Result, now: float) -> None:
-                done.set()
+            def off(now: float) -> None:
+                for light in lights:
+                    light.enable(False, now, lambda result, now: answers.release())
 
-            self.link.call(lambda now: light.enable(False, now, answered))
-            done.wait(OFF_LIMIT)
+            self.link.call(off)
+            deadline = time.monotonic() + OFF_LIMIT
+            for _ in lights:
+                answers.acquire(timeout=max(deadline - time.monotonic(), 0))
         self.link.stop(STOP_LIMIT)
+
+
+def without_node_name(arguments: list[str]) -> list[str]:
+    """
+    Return the ROS arguments without those that name the node.
+
+    ``-r __node:=spot`` names every node of a process; further lights keep names of their own.
+    """
+    kept: list[str] = []
+    for argument in arguments:
+        if argument.startswith(('__node:=', '__name:=')) and kept[-1:] in (['-r'], ['--remap']):
+            kept.pop()
+        else:
+            kept.append(argument)
+    return kept
 
 
 def _signing(parameters: LinkParameters) -> tuple[Signing, TimestampStore | None]:
