@@ -104,9 +104,26 @@ class Decoder:
     layouts: Mapping[int, Layout] = field(default_factory=lambda: LAYOUTS)
     counters: DecoderCounters = field(default_factory=DecoderCounters)
     _rest: bytes = b''
+    _taken: int = 0
+
+    @property
+    def incomplete(self) -> int | None:
+        """Where in the stream the frame begins whose rest is awaited, None if there is none."""
+        return self._taken - len(self._rest) if self._rest else None
+
+    def give_up(self) -> list[Frame]:
+        """Return the good frames behind the beginning of one whose rest does not come."""
+        frames: list[Frame] = []
+        while self._rest:
+            rest, self._rest = self._rest[1:], b''
+            self._taken -= len(rest)
+            self.counters.skipped_bytes += 1
+            frames += self.feed(rest)
+        return frames
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return the frames that ``data`` completes, in order."""
+        self._taken += len(data)
         data = self._rest + data if self._rest else data
         frames: list[Frame] = []
         position = end = 0

@@ -20,49 +20,93 @@ from collections.abc import Callable
 import logging
 import random
 import threading
+import time
 
 from .transport import Channel, open_channel
 from .url import Url
 
-# s between tries: the first, doubling up to the last. With connecting itself (0.8 s at most) a
-# link is back within 1 s of the other side.
-BACKOFF = (0.05, 0.5)
+# s between tries: the first, doubling up to the last.
+FIRST_PAUSE, LAST_PAUSE = 0.05, 0.5
+# s between the beginnings of two tries, at most: a try may itself take almost as long, and the
+# link is to be back within 1 s of the other side.
+LONGEST_PERIOD = 0.9
 
 _log = logging.getLogger(__name__)
+
+
+class Backoff:
+    """
+    The pauses between tries.
+
+    :param jitter: returns a number of 0..1, so that several bridges do not knock in step.
+    """
+
+    def __init__(self, jitter: Callable[[], float] = random.random) -> None:
+        self._jitter = jitter
+        self._failures = 0
+
+    def failed(self) -> None:
+        """Note that a try has failed."""
+        self._failures += 1
+
+    def succeeded(self) -> None:
+        """Note that what was opened works, so that its loss is answered at once."""
+        self._failures = 0
+
+    def pause(self, spent: float) -> float:
+        """
+        Return how long to wait before the next try, s.
+
+        :param spent: what the last one took, s.
+        """
+        if not self._failures:
+            return 0.0
+        longest = min(FIRST_PAUSE * 2.0 ** min(self._failures - 1, 16), LAST_PAUSE)
+        pause = longest * (0.5 + 0.5 * self._jitter())
+        return min(pause, max(LONGEST_PERIOD - spent, FIRST_PAUSE))
 
 
 class Opener:
     """
     Tries to open a connection URL in a thread that ends when it has succeeded.
 
-    :param opened: called in that thread with the open channel.
+    Every try counts as failed until :meth:`succeeded` says otherwise: what can be opened need
+    not lead anywhere.
+
+    :param opened: called in that thread with the open channel, never after :meth:`stop`.
     :param failed: called in that thread with the reason, after each failure.
     """
 
     def __init__(
         self, url: Url, opened: Callable[[Channel], None], failed: Callable[[str], None],
+        *, backoff: Backoff | None = None,
     ) -> None:
         self._url = url
         self._opened = opened
         self._failed = failed
+        self._backoff = backoff or Backoff()
         self._stopping = threading.Event()
-        self._failures = 0
+        # Held while a channel changes hands, so that none is handed over to nobody.
+        self._handing_over = threading.Lock()
 
     def start(self) -> None:
         """Start to try; the first try comes at once unless the last channel was of no use."""
         threading.Thread(target=self._run, name='mavlink-open', daemon=True).start()
 
     def stop(self) -> None:
-        """Give up, after the try that is under way."""
-        self._stopping.set()
+        """Give up; what a try that is under way still opens is closed again."""
+        with self._handing_over:
+            self._stopping.set()
 
     def succeeded(self) -> None:
         """Note that the channel works, so that the next loss is answered at once."""
-        self._failures = 0
+        self._backoff.succeeded()
 
     def _run(self) -> None:
-        while not self._stopping.wait(self._pause()):
-            self._failures += 1
+        spent = 0.0
+        while not self._stopping.wait(self._backoff.pause(spent)):
+            self._backoff.failed()
+            begun = time.monotonic()
             try:
                 channel = open_channel(self._url)
             except OSError as error:
@@ -71,16 +115,13 @@ class Opener:
                 _log.exception('internal error while opening')
                 self._failed(repr(error))
             else:
-                if self._stopping.is_set():
-                    channel.close()
-                else:
-                    self._opened(channel)
+                self._hand_over(channel)
                 return
+            spent = time.monotonic() - begun
 
-    def _pause(self) -> float:
-        if not self._failures:
-            return 0.0
-        first, last = BACKOFF
-        longest = min(first * 2.0 ** min(self._failures - 1, 16), last)
-        # Jitter, so that several bridges do not knock in step.
-        return longest * random.uniform(0.5, 1.0)
+    def _hand_over(self, channel: Channel) -> None:
+        with self._handing_over:
+            if not self._stopping.is_set():
+                self._opened(channel)
+                return
+        channel.close()

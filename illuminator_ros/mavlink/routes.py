@@ -28,6 +28,8 @@ MAX_ROUTES = 256
 MAX_WAYS = 4
 # s without a frame, after which a way is forgotten.
 EXPIRY = 10.0
+# s between looks for what has expired, where there is no room: a frame must not cost a look.
+LOOK_INTERVAL = 1.0
 
 
 class Routes:
@@ -40,43 +42,56 @@ class Routes:
 
     def __init__(self) -> None:
         self._ways: dict[Source, dict[Peer, float]] = {}
+        # When a component was last heard over more peers than are remembered.
+        self._crowded: dict[Source, float] = {}
+        self._look_due = -math.inf
 
-    @property
-    def peer_count(self) -> int:
-        """Return how many peers lead somewhere."""
-        return len({peer for ways in list(self._ways.values()) for peer in list(ways)})
+    def __len__(self) -> int:
+        return len(self._ways)
+
+    def peer_count(self, now: float) -> int:
+        """Return how many peers lead somewhere; from any thread."""
+        return len({peer for ways in self._ways.copy().values()
+                    for peer, heard in ways.copy().items() if now - heard <= EXPIRY})
 
     def heard(self, source: Source, peer: Peer, now: float) -> None:
         """Note that a component was heard over a peer."""
         ways = self._ways.get(source)
         if ways is None:
-            if len(self._ways) >= MAX_ROUTES:
-                self._expire(now)
-                if len(self._ways) >= MAX_ROUTES:
-                    return
+            if len(self._ways) >= MAX_ROUTES and not self._expire(now):
+                return
             ways = self._ways[source] = {}
-        if peer in ways or len(ways) < MAX_WAYS:
-            ways[peer] = now
-        else:
+        if peer not in ways and len(ways) >= MAX_WAYS:
             for old in [way for way, heard in ways.items() if now - heard > EXPIRY]:
                 del ways[old]
-            if len(ways) < MAX_WAYS:
-                ways[peer] = now
+            if len(ways) >= MAX_WAYS:
+                self._crowded[source] = now
+                return
+        ways[peer] = now
 
     def towards(self, message: Any, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
         """Return those of the peers that lead to the message's target, all where none does."""
         system = getattr(message, 'target_system', 0)
         if not system or len(peers) < 2:
             return peers
-        ways = self._ways.get(Source(system, getattr(message, 'target_component', 0)), {})
+        target = Source(system, getattr(message, 'target_component', 0))
+        if now - self._crowded.get(target, -math.inf) <= EXPIRY:
+            return peers
+        ways = self._ways.get(target, {})
         known = [peer for peer in peers if now - ways.get(peer, -math.inf) <= EXPIRY]
         return known or peers
 
     def clear(self) -> None:
         """Forget all: the link is closed."""
         self._ways.clear()
+        self._crowded.clear()
 
-    def _expire(self, now: float) -> None:
-        for source, ways in list(self._ways.items()):
-            if all(now - heard > EXPIRY for heard in ways.values()):
-                del self._ways[source]
+    def _expire(self, now: float) -> bool:
+        """Forget what has not been heard for long, and return whether there is room."""
+        if now >= self._look_due:
+            self._look_due = now + LOOK_INTERVAL
+            for source, ways in list(self._ways.items()):
+                if all(now - heard > EXPIRY for heard in ways.values()):
+                    del self._ways[source]
+                    self._crowded.pop(source, None)
+        return len(self._ways) < MAX_ROUTES

@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import contextlib
+import errno
 import os
 import selectors
+import termios
 from typing import Any, TYPE_CHECKING
 
 from ..url import SerialUrl
@@ -48,6 +50,8 @@ def open_serial(url: SerialUrl) -> Channel:
             rtscts=url.hardware_flow_control)
     except serial.SerialException as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
+        if error.errno == errno.EAGAIN:
+            reason = 'it is in use by another program'
         raise OSError(error.errno, f'cannot open {url.device}: {reason}') from None
     except (ValueError, OSError) as error:
         raise OSError(f'cannot open {url.device} at {url.baud} baud: {error}') from None
@@ -99,5 +103,8 @@ class _SerialChannel(Channel):
             self._selector.modify(self._fd, events)
 
     def close(self) -> None:
+        # Closing would wait for what flow control holds back, up to 30 s.
+        with contextlib.suppress(OSError, termios.error):
+            termios.tcflush(self._fd, termios.TCOFLUSH)
         with contextlib.suppress(OSError):
             self._port.close()

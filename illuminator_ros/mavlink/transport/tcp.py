@@ -18,16 +18,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import contextlib
+import errno
 import selectors
 import socket
 from typing import Any
 
 from ..url import Address
 from .base import Channel, ChannelLost, FrameQueue, Peer
+from .resolve import resolve
 
-# s; the link tries again soon enough, and must be back within 1 s of the other side.
+# s over all addresses of a name; the link must be back within 1 s of the other side.
 CONNECT_TIMEOUT = 0.8
+# ms without an acknowledgement after which a connection is lost. TCP itself would repeat ever
+# more rarely: after a longer silence a cable plugged in again would go unnoticed for seconds.
+USER_TIMEOUT = 2000
 MAX_CLIENTS = 16
+# We have no descriptors or memory left to accept with.
+NO_ROOM = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
 READ_SIZE = 65536
 
 
@@ -42,7 +49,7 @@ class _Stream:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         # A peer that vanished without a word is noticed in seconds, not in hours.
         for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
-                              ('TCP_USER_TIMEOUT', 5000)):
+                              ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
             if hasattr(socket, option):
                 connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
@@ -74,19 +81,7 @@ class TcpClient(Channel):
     """A connection to a server."""
 
     def __init__(self, address: Address) -> None:
-        try:
-            connection = socket.create_connection(address, CONNECT_TIMEOUT)
-        except socket.gaierror as error:
-            raise OSError(f'cannot resolve {address.host!r}: {error.strerror}') from None
-        except TimeoutError:
-            raise OSError(f'no answer from {address}') from None
-        except OSError as error:
-            raise OSError(error.errno, f'cannot connect to {address}: {error.strerror}') from None
-        if connection.getsockname() == connection.getpeername():
-            # A connection to a free local port may be made with itself (RFC 793, 3.4).
-            connection.close()
-            raise OSError(f'cannot connect to {address}: nobody listens')
-        self._stream = _Stream(connection)
+        self._stream = _Stream(_connect(address))
         self.name = f'tcp to {address}'
 
     def register(self, selector: selectors.BaseSelector) -> None:
@@ -130,21 +125,48 @@ class TcpClient(Channel):
         self._stream.socket.close()
 
 
+def _connect(address: Address) -> socket.socket:
+    """Return a connection to the first of a name's addresses that answers."""
+    found = resolve(address, socket.SOCK_STREAM)
+    reason = OSError(f'cannot connect to {address}')
+    for family, sockaddr in found:
+        connection = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            connection.settimeout(CONNECT_TIMEOUT / len(found))
+            connection.connect(sockaddr)
+            if connection.getsockname() != connection.getpeername():
+                return connection
+            # A connection to a free local port may be made with itself (RFC 793, 3.4).
+            reason = OSError(f'cannot connect to {address}: nobody listens')
+        except TimeoutError:
+            reason = OSError(f'no answer from {address}')
+        except OSError as error:
+            reason = OSError(error.errno, f'cannot connect to {address}: {error.strerror}')
+        connection.close()
+    raise reason
+
+
 class TcpServer(Channel):
-    """A listening socket and its clients, each a peer. A client that goes is no loss."""
+    """
+    A listening socket and its clients, each a peer. A client that goes is no loss.
+
+    Where there are :data:`MAX_CLIENTS`, a new one takes the place of the oldest that has not
+    sent anything good; it is turned away where all have.
+    """
 
     def __init__(self, address: Address) -> None:
-        family = socket.AF_INET6 if ':' in address.host else socket.AF_INET
+        family, sockaddr = resolve(address, socket.SOCK_STREAM)[0]
         self._listener = socket.socket(family, socket.SOCK_STREAM)
         try:
             self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._listener.bind(tuple(address))
+            self._listener.bind(sockaddr)
             self._listener.listen()
             self._listener.setblocking(False)
         except OSError as error:
             self._listener.close()
             raise OSError(error.errno, f'cannot listen on {address}: {error.strerror}') from None
         self._clients: dict[socket.socket, _Stream] = {}
+        self._heard: set[socket.socket] = set()
         self.name = f'tcp server {Address(*self._listener.getsockname()[:2])}'
 
     def register(self, selector: selectors.BaseSelector) -> None:
@@ -172,20 +194,36 @@ class TcpServer(Channel):
     def _accept(self) -> None:
         try:
             connection, _ = self._listener.accept()
-        except BlockingIOError:
-            return
         except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
+            if error.errno in NO_ROOM:
+                raise ChannelLost(error.errno, error.strerror) from None
+            # Nobody there any more, or a fault of the connection and not of the listener.
+            return
         if len(self._clients) >= MAX_CLIENTS:
+            silent = next((c for c in self._clients if c not in self._heard), None)
+            if silent is None:
+                connection.close()
+                return
+            self._drop(silent)
+        try:
+            self._clients[connection] = _Stream(connection)
+        except OSError:
             connection.close()
             return
-        self._clients[connection] = _Stream(connection)
         self._selector.register(connection, selectors.EVENT_READ)
 
     def _drop(self, connection: socket.socket) -> None:
+        self._heard.discard(connection)
         if self._clients.pop(connection, None):
             self._selector.unregister(connection)
             connection.close()
+
+    def heard(self, peer: Any, now: float) -> bool:
+        """See :meth:`Channel.heard`."""
+        new = peer in self._clients and peer not in self._heard
+        if new:
+            self._heard.add(peer)
+        return new
 
     def peers(self, now: float) -> Sequence[Peer]:
         """See :meth:`Channel.peers`."""
@@ -219,4 +257,5 @@ class TcpServer(Channel):
         for client in list(self._clients):
             client.close()
         self._clients.clear()
+        self._heard.clear()
         self._listener.close()

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import contextlib
+import errno
 import ipaddress
 import selectors
 import socket
@@ -25,6 +26,7 @@ from typing import Any
 
 from ..url import Address, UdpUrl
 from .base import Channel, ChannelLost, Peer
+from .resolve import resolve
 
 # Peers that a listening socket sends to. A new one is not let in over a live one.
 MAX_PEERS = 32
@@ -34,6 +36,8 @@ PEER_EXPIRY = 10.0
 BATCH = 256
 # What a flight controller sends at once must fit; the kernel may allow less.
 RECEIVE_BUFFER = 4 * 1024 * 1024
+# The kernel or the network device has no room just now.
+NO_ROOM = {errno.ENOBUFS, errno.ENOMEM}
 
 
 class UdpChannel(Channel):
@@ -46,10 +50,10 @@ class UdpChannel(Channel):
     """
 
     def __init__(self, url: UdpUrl) -> None:
-        remote = _resolve(url.remote) if url.remote else None
+        remote = resolve(url.remote, socket.SOCK_DGRAM)[0] if url.remote else None
         family = remote[0] if remote else socket.AF_INET
         if url.bind.host:
-            family, bind = _resolve(url.bind)
+            family, bind = resolve(url.bind, socket.SOCK_DGRAM)[0]
         else:
             bind = ('::' if family == socket.AF_INET6 else '0.0.0.0', url.bind.port)
         if remote and remote[0] != family:
@@ -122,6 +126,9 @@ class UdpChannel(Channel):
             except (BlockingIOError, ConnectionError):
                 self.dropped += 1
             except OSError as error:
+                if error.errno in NO_ROOM:
+                    self.dropped += 1
+                    continue
                 if peer not in self._peers:
                     raise ChannelLost(error.errno, error.strerror) from None
                 # One learnt peer out of reach is no loss of the link.
@@ -131,16 +138,6 @@ class UdpChannel(Channel):
     def close(self) -> None:
         """See :meth:`Channel.close`."""
         self._socket.close()
-
-
-def _resolve(address: Address) -> tuple[int, Any]:
-    """Return family and socket address. IPv4 goes first: most MAVLink programs know no other."""
-    try:
-        found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)
-    except socket.gaierror as error:
-        raise OSError(f'cannot resolve {address.host!r}: {error.strerror}') from None
-    family, _, _, _, sockaddr = min(found, key=lambda entry: entry[0] != socket.AF_INET)
-    return family, sockaddr
 
 
 def _same_host(peer: Any, remote: Any) -> bool:
