@@ -43,6 +43,7 @@ from illuminator_ros.mavlink.endpoint import Endpoint
 from illuminator_ros.mavlink.framing import Decoder, encode_frame
 
 BRIDGE = Source(1, 194)
+ONE_LIGHT = (DeviceProperties(),)
 # s on the clock of a pair at its beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
 # Turns at one moment: more of them mean that a link's thread would spin.
@@ -155,7 +156,7 @@ class Pair:
     """
 
     def __init__(
-        self, lights: Sequence[DeviceProperties] | Endpoint = (DeviceProperties(),), *,
+        self, lights: Sequence[DeviceProperties] | Endpoint = ONE_LIGHT, *,
         settings: Settings | None = None, there: Faults | None = None,
         back: Faults | None = None, seed: int | str = 0, uptime: float = 100.0,
         command_timeout: float = 0.5, command_retries: int = 3,
@@ -224,6 +225,8 @@ class Pair:
         for end in (self.far, self.near):
             end.endpoint.poll(self.now)
             end.flush(self.now)
+        for light in self.controller.lights.values():
+            assert self.controller.next_deadline() <= light.next_deadline(), 'a link would sleep'
 
     def run(self, seconds: float) -> None:
         """Let time pass."""

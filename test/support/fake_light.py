@@ -36,6 +36,7 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
 
+LIGHT = Source(1, 243)
 DEFAULT_STATUS = {
     'enable': 0, 'mode_bitmask': 3, 'error_status': 0, 'mode': 1, 'brightness': 100.0,
     'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'temp_c': 25.0, 'min_strobe_period': 0.05,
@@ -65,7 +66,7 @@ class FakeLight(Endpoint):
     """
 
     def __init__(
-        self, source: Source = Source(1, 243), *, heartbeat_type: int | None = MavType.ILLUMINATOR,
+        self, source: Source = LIGHT, *, heartbeat_type: int | None = MavType.ILLUMINATOR,
         stream: float = 1.0, results: Mapping[int, Any] | None = None, **fields: Any,
     ) -> None:
         super().__init__()
