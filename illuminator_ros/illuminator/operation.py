@@ -130,7 +130,8 @@ class Operation(ABC):
         self._outcome = outcome
         self._accepted_at = now
         self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
-        self._ask(now)
+        # At the next look around, not now: many lights send a status behind the acknowledgement.
+        self._ask_at = now
 
     def _ask(self, now: float) -> None:
         self._ask_at = now + ASK_INTERVAL

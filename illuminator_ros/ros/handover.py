@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import threading
+import time
 from typing import Any, Generic, TypeVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -27,19 +29,26 @@ from ..mavlink.link import Link
 
 T = TypeVar('T')
 
+# s for which the executor itself stands still for an answer. Going to sleep and being woken
+# costs it more than a light on a fast link needs to answer.
+PATIENCE = 0.002
+
 
 class Handover(Generic[T]):
     """
     Lets a coroutine on the executor wait for what happens in the link's thread.
 
-    Completing an rclpy future from another thread does not wake an executor (rclpy before
-    7.1.9), a guard condition does. While a callback waits, nothing else does: each has a
-    callback group in which others may run.
+    While it waits, other callbacks go on: each has a callback group in which others may run.
+    Only where the last answer came within :data:`PATIENCE` is the next awaited on the spot for
+    that long.
     """
 
     def __init__(self, node: Node, link: Link) -> None:
         self._link = link
+        self._patient = True
         self.group = ReentrantCallbackGroup()
+        # Completing an rclpy future from another thread does not wake an executor (rclpy before
+        # 7.1.9), a guard condition does.
         self._guard = node.create_guard_condition(lambda: None, self.group)
 
     async def ask(self, request: Callable[[float, Callable[[T], None]], None]) -> T:
@@ -49,18 +58,30 @@ class Handover(Generic[T]):
         The request must answer exactly once, then or later; if it fails, so does this.
         """
         future: Any = Future()
+        arrived = threading.Lock()
+        arrived.acquire()
+        awaited = threading.Lock()
+
+        def wake() -> None:
+            arrived.release()
+            if not awaited.acquire(blocking=False):
+                self._guard.trigger()
 
         def answer(value: T) -> None:
             future.set_result(value)
-            self._guard.trigger()
+            wake()
 
         def run(now: float) -> None:
             try:
                 request(now, answer)
             except Exception as error:
                 future.set_exception(error)
-                self._guard.trigger()
+                wake()
 
+        asked = time.monotonic()
         self._link.call(run)
+        if not (self._patient and arrived.acquire(timeout=PATIENCE)):
+            awaited.acquire(blocking=False)
         result: T = await future
+        self._patient = time.monotonic() - asked < PATIENCE
         return result
