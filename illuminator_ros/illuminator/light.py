@@ -80,6 +80,8 @@ class Light:
         self.agreement = Agreement(self)
         self._switching = OperationQueue()
         self._status_due = math.inf
+        # Whether it was lost since the newest status.
+        self._was_away = False
         self._refreshes: list[Refresh] = []
 
     # What comes in
@@ -94,8 +96,8 @@ class Light:
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
-        returned = not self.connected
         self.heard(now)
+        was_away, self._was_away = self._was_away, False
         meaning = Uptime.RUNNING
         if self.status is not None:
             meaning = compare_uptime(
@@ -107,13 +109,14 @@ class Light:
         self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
         self.measures_temperature |= bool(status.temperature)
-        if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and returned):
+        if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and was_away):
             self._restarted(now)
-        self.observer.status(self, status)
         if self._switching.current:
             self._switching.current.status(status, now)
         self.agreement.take_status(status, now)
         self._tell_refreshes(lambda refresh: refresh.status(now))
+        # Last, since it takes longest: whoever waits for the status has been answered by then.
+        self.observer.status(self, status)
 
     def take_information(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
@@ -125,6 +128,7 @@ class Light:
         """Note that the light is not heard any more."""
         if self.connected:
             self.connected = False
+            self._was_away = True
             self._status_due = math.inf
             self.observer.lost(self, reason)
 
@@ -204,7 +208,8 @@ class Light:
 
     def poll(self, now: float) -> None:
         """Do what is due."""
-        if self.connected and now - self.heard_at >= self.settings.heartbeat_timeout:
+        # The sum and not the difference, which is what next_deadline() returns: floats differ.
+        if self.connected and now >= self.heard_at + self.settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}')
         if now >= self._status_due:
             self._status_due = now + STATUS_TIMEOUT

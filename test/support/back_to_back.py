@@ -127,6 +127,8 @@ class _End:
     def flush(self, now: float) -> None:
         while self.endpoint.outgoing:
             source, message = self.endpoint.outgoing.popleft()
+            if not self.wire.is_open:
+                continue
             self.sent.append((now, message))
             sequence = self._sequences.get(source, 0)
             self._sequences[source] = (sequence + 1) & 0xFF
@@ -240,8 +242,8 @@ class Pair:
         while not condition():
             assert self.step(until), f'not so within {within} s'
 
-    def settle(self, seconds: float = 3.0) -> Pair:
-        """Let both sides get to know each other."""
+    def settle(self, seconds: float = 3.5) -> Pair:
+        """Let both sides get to know each other, and end where nothing is on its way."""
         self.run(seconds)
         return self
 
@@ -249,18 +251,22 @@ class Pair:
 
     def open(self) -> None:
         """Open the line."""
+        self._switch(is_open=True)
         self.controller.link_opened(self.now)
         self.other.link_opened(self.now)
         self.turn()
 
     def close(self) -> None:
         """Lose the line, and what is on it."""
-        for end in (self.near, self.far):
-            end.wire.cut()
-            end.decoder = Decoder()
+        self._switch(is_open=False)
         self.controller.link_closed(self.now)
         self.other.link_closed(self.now)
         self.turn()
+
+    def _switch(self, *, is_open: bool) -> None:
+        for end in (self.near, self.far):
+            end.wire.switch(is_open=is_open)
+            end.decoder = Decoder()
 
     # Requests
 

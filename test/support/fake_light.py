@@ -140,7 +140,7 @@ class FakeLight(Endpoint):
 
     def uptime_ms(self, now: float) -> int:
         """Return what it reports as its uptime."""
-        return 0 if self.boot is None else int((now - self.boot) * 1000)
+        return 0 if self.boot is None else int((now - self.boot) * 1000) % 2 ** 32
 
     def status(self, now: float) -> Any:
         """Return its ILLUMINATOR_STATUS."""

@@ -44,10 +44,15 @@ class Faults:
 
 
 class FaultyWire:
-    """One direction of a line. No clock: time is passed in."""
+    """
+    One direction of a line. No clock: time is passed in.
+
+    :ivar is_open: whether what is sent goes anywhere.
+    """
 
     def __init__(self, faults: Faults, seed: int | str) -> None:
         self.faults = faults
+        self.is_open = True
         self._random = random.Random(seed)
         self._travelling: list[tuple[float, int, bytes]] = []
         self._count = 0
@@ -55,7 +60,7 @@ class FaultyWire:
     def send(self, frame: bytes, now: float) -> None:
         """Take a frame."""
         faults = self.faults
-        if self._happens(faults.drop):
+        if not self.is_open or self._happens(faults.drop):
             return
         for _ in range(2 if self._happens(faults.duplicate) else 1):
             arrival = now + faults.latency
@@ -78,8 +83,9 @@ class FaultyWire:
         """Return when something arrives next, infinity if nothing is on its way."""
         return self._travelling[0][0] if self._travelling else math.inf
 
-    def cut(self) -> None:
-        """Lose what is on its way."""
+    def switch(self, *, is_open: bool) -> None:
+        """Open or cut the line; what is on its way is lost."""
+        self.is_open = is_open
         self._travelling.clear()
 
     def _happens(self, share: float) -> bool:
