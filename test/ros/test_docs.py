@@ -1,0 +1,128 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The documents say what the code says."""
+
+from importlib import import_module
+from pathlib import Path
+import re
+from typing import Any
+
+import pytest
+import yaml
+
+from illuminator_ros.bridge import usage
+from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.ros.conversions import STATUS_TOPICS
+from illuminator_ros.ros.diagnostics import FLAG_LEVELS
+from illuminator_ros.ros.parameters import (
+    DEVICE_PARAMETERS,
+    LINK_PARAMETERS,
+    ParameterSpec,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / 'README.md').read_text()
+DESIGN = (ROOT / 'doc' / 'design.md').read_text()
+PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
+LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
+
+
+def table(document: str, first_heading: str) -> list[list[str]]:
+    """Return the rows of the table whose first column has this heading."""
+    rows = iter(document.splitlines())
+    for line in rows:
+        if line.startswith(f'| {first_heading} |'):
+            next(rows)
+            break
+    else:
+        raise AssertionError(f'no table {first_heading!r}')
+    found = []
+    for line in rows:
+        if not line.startswith('|'):
+            break
+        found.append([cell.strip() for cell in line.strip('|').split('|')])
+    return found
+
+
+def test_readme_has_each_link_parameter_with_its_default_and_meaning() -> None:
+    def row(spec: ParameterSpec) -> list[str]:
+        default = '' if spec.default in ('', ['']) else f'`{spec.default}`'
+        return [f'`{spec.name}`', f'{default} {spec.unit}'.strip()]
+
+    rows = table(README, 'parameter of the link')
+    assert [cells[:2] for cells in rows] == [row(spec) for spec in LINK_PARAMETERS]
+
+
+def test_readme_has_each_parameter_of_the_light() -> None:
+    rows = table(README, 'parameter of the light')
+    assert [cells[0] for cells in rows] == [f'`{spec.name}`' for spec in DEVICE_PARAMETERS]
+    assert [cells[3] for cells in rows] == [spec.unit for spec in DEVICE_PARAMETERS]
+
+
+def test_readme_has_each_status_topic_with_its_type() -> None:
+    rows = {cells[0]: cells[1] for cells in table(README, 'published')}
+    for name, type_ in STATUS_TOPICS.items():
+        assert rows[f'`~/{name}`'] == f'`std_msgs/{type_.__name__}`'
+
+
+def test_yaml_has_each_link_parameter_with_its_default() -> None:
+    content = yaml.safe_load((ROOT / 'config' / 'bridge.yaml').read_text())
+    given = content['/**']['ros__parameters']
+    assert given == {spec.name: spec.default for spec in LINK_PARAMETERS}
+    assert all(type(given[spec.name]) is type(spec.default) for spec in LINK_PARAMETERS)
+
+
+def test_yaml_mentions_each_parameter_of_the_light() -> None:
+    text = (ROOT / 'config' / 'bridge.yaml').read_text()
+    for spec in DEVICE_PARAMETERS:
+        assert re.search(rf'^    # {spec.name}: ', text, re.MULTILINE)
+
+
+@pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)
+def test_help_has_each_parameter(spec: Any) -> None:
+    assert re.search(rf'^  {spec.name} +.*{re.escape(spec.description)}', usage(), re.MULTILINE)
+
+
+def test_protocol_page_has_each_flag_with_its_level_and_text() -> None:
+    rows = {cells[0]: cells[1:] for cells in table(PROTOCOL, 'ILLUMINATOR_ERROR_FLAGS')}
+    for flag in ErrorFlag:
+        level, text = FLAG_LEVELS[flag]
+        assert rows[f'{flag.name} ({flag.value})'] == [LEVELS[level], text]
+
+
+def test_design_page_has_the_bounds_of_the_code() -> None:
+    constants = [constant for cells in table(DESIGN, 'store')
+                 for constant in re.findall(r'`([\w.]+)`', cells[1])]
+    assert constants, 'the table names no constants'
+    for cells in table(DESIGN, 'store'):
+        numbers = [int(number) for number in re.findall(r'\d+', cells[1].partition('(')[0])]
+        names = re.findall(r'`([\w.]+)`', cells[1])
+        module_name = ''
+        values = []
+        for name in names:
+            *module, constant = name.split('.')
+            module_name = '.'.join(module) or module_name
+            values.append(getattr(_module(module_name), constant))
+        in_bytes = 1024 if 'KiB' in cells[1] else 1
+        assert [number * in_bytes for number in numbers[:len(values)]] == values, cells
+
+
+def _module(name: str) -> Any:
+    for package in ('illuminator', 'mavlink', 'mavlink.transport'):
+        try:
+            return import_module(f'illuminator_ros.{package}.{name}')
+        except ModuleNotFoundError:
+            continue
+    raise AssertionError(f'no module {name}')
