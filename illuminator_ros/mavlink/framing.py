@@ -99,31 +99,33 @@ class Decoder:
 
     Keeps at most one incomplete frame (:data:`MAX_FRAME` bytes). Frames with an id that is not
     in ``layouts`` cannot be checked and are never returned.
+
+    :ivar taken: the bytes taken, which are the position in the stream.
     """
 
     layouts: Mapping[int, Layout] = field(default_factory=lambda: LAYOUTS)
     counters: DecoderCounters = field(default_factory=DecoderCounters)
+    taken: int = 0
     _rest: bytes = b''
-    _taken: int = 0
 
     @property
     def incomplete(self) -> int | None:
         """Where in the stream the frame begins whose rest is awaited, None if there is none."""
-        return self._taken - len(self._rest) if self._rest else None
+        return self.taken - len(self._rest) if self._rest else None
 
-    def give_up(self) -> list[Frame]:
-        """Return the good frames behind the beginning of one whose rest does not come."""
+    def give_up(self, position: int) -> list[Frame]:
+        """Return the good frames behind beginnings before a position whose rest does not come."""
         frames: list[Frame] = []
-        while self._rest:
+        while self.incomplete is not None and self.incomplete < position:
             rest, self._rest = self._rest[1:], b''
-            self._taken -= len(rest)
+            self.taken -= len(rest)
             self.counters.skipped_bytes += 1
             frames += self.feed(rest)
         return frames
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return the frames that ``data`` completes, in order."""
-        self._taken += len(data)
+        self.taken += len(data)
         data = self._rest + data if self._rest else data
         frames: list[Frame] = []
         position = end = 0
@@ -139,6 +141,11 @@ class Decoder:
             frames.append(frame)
             self.counters.skipped_bytes += start - end
             position = end = start + size
+            if frame.signature is not None:
+                # The checksum does not cover the signature. Where that was cut short, what looks
+                # like its end is the beginning of the next frame.
+                within = data.find(STX_V2, end - SIGNATURE, end)
+                position = within if within >= 0 else end
         else:
             start = len(data)
         self.counters.frames += len(frames)

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from .framing import Decoder, DecoderCounters, Frame
 from .signing import Signing
@@ -27,6 +28,14 @@ MAX_DECODERS = 64
 # s; the longest frame takes 0.3 s at 9600 baud. What has not come by then is no frame but noise
 # that looks like the beginning of one, and good frames are held back behind it.
 STALL = 0.5
+
+
+class _Wait(NamedTuple):
+    """For the rest of a frame: where it begins, what had come of the stream, and when (s)."""
+
+    start: int
+    taken: int
+    since: float
 
 
 class Reception:
@@ -40,8 +49,7 @@ class Reception:
         self.counters = DecoderCounters()
         self._signing = signing
         self._decoders: dict[Peer, Decoder] = {}
-        # Where the frame begins that a peer has not completed, and since when it is awaited.
-        self._stalled: dict[Peer, tuple[int, float]] = {}
+        self._waits: dict[Peer, _Wait] = {}
 
     def __len__(self) -> int:
         return len(self._decoders)
@@ -53,38 +61,44 @@ class Reception:
             if len(self._decoders) >= MAX_DECODERS:
                 oldest = next(iter(self._decoders))
                 del self._decoders[oldest]
-                self._stalled.pop(oldest, None)
+                self._waits.pop(oldest, None)
             decoder = self._decoders[peer] = Decoder(counters=self.counters)
         frames = decoder.feed(data)
-        start = decoder.incomplete
-        if start is None:
-            self._stalled.pop(peer, None)
-        elif peer not in self._stalled or self._stalled[peer][0] != start:
-            self._stalled[peer] = start, now
+        self._watch(peer, decoder, now)
         return self._believed(frames, unix_time)
 
+    def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
+        start = decoder.incomplete
+        if start is None:
+            self._waits.pop(peer, None)
+        elif peer not in self._waits or self._waits[peer].start != start:
+            self._waits[peer] = _Wait(start, decoder.taken, now)
+
     def give_up(self, now: float, unix_time: float) -> list[tuple[Peer, Frame]]:
-        """Return the frames behind what looked like the beginning of one for too long."""
+        """
+        Return the frames behind what looked like the beginning of one for too long.
+
+        What has come since may be the beginning of a good one, and is waited for.
+        """
         if now < self.next_deadline():
             return []
         found = []
-        for peer, (_, since) in list(self._stalled.items()):
-            if now >= since + STALL:
-                del self._stalled[peer]
-                frames = self._decoders[peer].give_up()
+        for peer, wait in list(self._waits.items()):
+            if now >= wait.since + STALL:
+                decoder = self._decoders[peer]
+                frames = decoder.give_up(wait.taken)
+                self._watch(peer, decoder, now)
                 found += [(peer, frame) for frame in self._believed(frames, unix_time)]
         return found
 
     def next_deadline(self) -> float:
         """Return when :meth:`give_up` has something to do, infinity if never."""
-        if not self._stalled:
-            return math.inf
-        return min(since for _, since in self._stalled.values()) + STALL
+        return min((wait.since for wait in self._waits.values()), default=math.inf) + STALL
 
     def clear(self) -> None:
         """Forget what is incomplete: the link is closed."""
         self._decoders.clear()
-        self._stalled.clear()
+        self._waits.clear()
 
     def _believed(self, frames: list[Frame], unix_time: float) -> list[Frame]:
         return [frame for frame in frames if self._signing.accepts(frame, unix_time)]
