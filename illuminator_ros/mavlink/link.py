@@ -203,7 +203,7 @@ class Link:
         # No channel is handed over any more, and one that just was is among the calls.
         self._opener.stop()
         self._run_calls()
-        self._store_timestamp()
+        self._store_timestamp(last=True)
         self._close()
         self._release()
 
@@ -249,12 +249,12 @@ class Link:
         for _ in range(len(self._calls)):
             self._guarded(self._calls.popleft(), self.clock())
 
-    def _store_timestamp(self) -> None:
+    def _store_timestamp(self, *, last: bool = False) -> None:
         """Keep the time stamp for the next run ("Timestamp Handling")."""
         self._store_due = self.clock() + STORE_INTERVAL
         if self._store is not None:
             try:
-                self._store.store(self._signing.timestamp)
+                self._store.store(self._signing.timestamp, last=last)
             except OSError as error:
                 self._store = None
                 _log.error('cannot keep the signing time stamp, a restart may repeat some: %s',
