@@ -1,0 +1,45 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One message of each kind that is handled.
+
+No field is at its default, and float32 has each number exactly.
+"""
+
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    ComponentInformationBasic,
+    Heartbeat,
+    IlluminatorStatus,
+)
+
+STATUS = IlluminatorStatus(
+    uptime_ms=123456, enable=1, mode_bitmask=3, error_status=5, mode=2, brightness=62.5,
+    strobe_period=0.25, strobe_duty_cycle=40.0, temp_c=71.5, min_strobe_period=0.0625,
+    max_strobe_period=10.0)
+INFORMATION = ComponentInformationBasic(
+    time_boot_ms=5000, capabilities=1 << 40, time_manufacture_s=1_600_000_000,
+    vendor_name=b'Maker', model_name=b'Torch', software_version=b'1.2.3',
+    hardware_version=b'B', serial_number=b'SN-7')
+EVERY_MESSAGE = (
+    Heartbeat(44, 8, 1, 77, 4, 3),
+    CommandInt(1, 243, 2, 405, 1, 1, 1.0, 2.0, 3.0, 4.0, -5, 6, 7.0),
+    CommandLong(1, 243, 406, 2, 1.0, 50.0, 0.25, 40.0, 5.0, 6.0, 7.0),
+    CommandAck(405, 5, 30, -2, 1, 194),
+    STATUS,
+    INFORMATION,
+)

@@ -1,0 +1,151 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+pymavlink's generator as an oracle.
+
+It makes a dialect module from the definitions below, which has what pymavlink's wheels lack: a
+parser and an encoder, none of them ours, that know the illuminator's messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import contextlib
+from functools import cache
+import importlib.util
+import io
+from pathlib import Path
+import tempfile
+from typing import Any
+
+from pymavlink.generator import mavgen
+
+from illuminator_ros.mavlink.dialect import Source
+
+# Message id, name and fields (type, name, further attributes), in the order of common.xml.
+# None stands where the extension fields begin.
+DEFINITIONS: dict[int, tuple[str, list[tuple[str, str, str] | None]]] = {
+    0: ('HEARTBEAT', [
+        ('uint8_t', 'type', ''), ('uint8_t', 'autopilot', ''), ('uint8_t', 'base_mode', ''),
+        ('uint32_t', 'custom_mode', ''), ('uint8_t', 'system_status', ''),
+        ('uint8_t_mavlink_version', 'mavlink_version', '')]),
+    75: ('COMMAND_INT', [
+        ('uint8_t', 'target_system', ''), ('uint8_t', 'target_component', ''),
+        ('uint8_t', 'frame', ''), ('uint16_t', 'command', ''), ('uint8_t', 'current', ''),
+        ('uint8_t', 'autocontinue', ''), ('float', 'param1', ''), ('float', 'param2', ''),
+        ('float', 'param3', ''), ('float', 'param4', ''), ('int32_t', 'x', ''),
+        ('int32_t', 'y', ''), ('float', 'z', '')]),
+    76: ('COMMAND_LONG', [
+        ('uint8_t', 'target_system', ''), ('uint8_t', 'target_component', ''),
+        ('uint16_t', 'command', ''), ('uint8_t', 'confirmation', ''),
+        *(('float', f'param{number}', '') for number in range(1, 8))]),
+    77: ('COMMAND_ACK', [
+        ('uint16_t', 'command', ''), ('uint8_t', 'result', ''), None,
+        ('uint8_t', 'progress', ''), ('int32_t', 'result_param2', ''),
+        ('uint8_t', 'target_system', ''), ('uint8_t', 'target_component', '')]),
+    396: ('COMPONENT_INFORMATION_BASIC', [
+        ('uint32_t', 'time_boot_ms', 'units="ms"'),
+        ('uint64_t', 'capabilities', 'enum="MAV_PROTOCOL_CAPABILITY" display="bitmask"'),
+        ('uint32_t', 'time_manufacture_s', 'units="s"'),
+        ('char[32]', 'vendor_name', ''), ('char[32]', 'model_name', ''),
+        ('char[24]', 'software_version', ''), ('char[24]', 'hardware_version', ''),
+        ('char[32]', 'serial_number', '')]),
+    440: ('ILLUMINATOR_STATUS', [
+        ('uint32_t', 'uptime_ms', 'units="ms"'), ('uint8_t', 'enable', ''),
+        ('uint8_t', 'mode_bitmask', 'enum="ILLUMINATOR_MODE"'),
+        ('uint32_t', 'error_status', 'enum="ILLUMINATOR_ERROR_FLAGS" display="bitmask"'),
+        ('uint8_t', 'mode', 'enum="ILLUMINATOR_MODE"'), ('float', 'brightness', 'units="%"'),
+        ('float', 'strobe_period', 'units="s"'), ('float', 'strobe_duty_cycle', 'units="%"'),
+        ('float', 'temp_c', ''), ('float', 'min_strobe_period', 'units="s"'),
+        ('float', 'max_strobe_period', 'units="s"')]),
+}
+LIGHT = Source(1, 243)
+ENUMS = ('MAV_PROTOCOL_CAPABILITY', 'ILLUMINATOR_MODE', 'ILLUMINATOR_ERROR_FLAGS')
+
+
+@cache
+def reference() -> Any:
+    """Return the generated module."""
+    with tempfile.TemporaryDirectory() as directory:
+        definitions, module = Path(directory, 'definitions.xml'), Path(directory, 'reference.py')
+        definitions.write_text(_xml())
+        options = mavgen.Opts(
+            str(module), wire_protocol='2.0', language='Python3', validate=False)
+        with contextlib.redirect_stdout(io.StringIO()):
+            assert mavgen.mavgen(options, [str(definitions)])
+        spec = importlib.util.spec_from_file_location('reference', module)
+        assert spec is not None
+        assert spec.loader is not None
+        loaded = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(loaded)
+    return loaded
+
+
+def _xml() -> str:
+    def field(definition: tuple[str, str, str] | None) -> str:
+        if definition is None:
+            return '<extensions/>'
+        type_, name, more = definition
+        return f'<field type="{type_}" name="{name}" {more}>-</field>'
+
+    enums = ''.join(
+        f'<enum name="{name}"><entry value="1" name="{name}_ONE"/></enum>' for name in ENUMS)
+    messages = ''.join(
+        f'<message id="{id_}" name="{name}"><description>-</description>'
+        f'{"".join(map(field, fields))}</message>'
+        for id_, (name, fields) in DEFINITIONS.items())
+    return (f'<mavlink><version>3</version><dialect>0</dialect><enums>{enums}</enums>'
+            f'<messages>{messages}</messages></mavlink>')
+
+
+class Peer:
+    """
+    A component that runs on pymavlink alone.
+
+    :param key: 32 bytes, with which it signs and which it asks for; None for no signing.
+    :param timestamp: of the next frame that it signs.
+    """
+
+    def __init__(
+        self, source: Source = LIGHT, *, key: bytes | None = None, link_id: int = 0,
+        timestamp: int = 0,
+    ) -> None:
+        self.mavlink = reference().MAVLink(None, source.system, source.component)
+        self.mavlink.robust_parsing = True
+        if key is not None:
+            signing = self.mavlink.signing
+            signing.secret_key, signing.sign_outgoing = key, True
+            signing.link_id, signing.timestamp = link_id, timestamp
+
+    def encode(self, message: Any, sequence: int = 0, *, version: int = 2) -> bytes:
+        """Return the frame of a message of the :func:`reference` dialect."""
+        self.mavlink.seq = sequence
+        return bytes(message.pack(self.mavlink, force_mavlink1=version == 1))
+
+    def decode(self, data: bytes) -> list[Any]:
+        """Return the messages that it reads, those that it refuses as BAD_DATA."""
+        return self.mavlink.parse_buffer(data) or []
+
+
+def twin(message: Any) -> Any:
+    """Return a message of ours as one of the :func:`reference` dialect."""
+    fields = {name: getattr(message, f'_{name}_raw', getattr(message, name))
+              for name in message.fieldnames}
+    return reference().mavlink_map[message.id](**fields)
+
+
+def fields_of(messages: Iterable[Any]) -> list[dict[str, Any]]:
+    """Return names and fields of messages, to compare those of different dialects."""
+    return [message.to_dict() for message in messages]
