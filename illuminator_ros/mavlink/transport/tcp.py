@@ -24,7 +24,7 @@ import socket
 from typing import Any
 
 from ..url import Address
-from .base import Channel, ChannelLost, FrameQueue, Peer
+from .base import Channel, ChannelLost, FrameQueue, MAX_QUEUED, Peer
 from .resolve import resolve
 
 # s over all addresses of a name; the link must be back within 1 s of the other side.
@@ -46,6 +46,8 @@ class _Stream:
         self.queue = FrameQueue()
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # The kernel would queue megabytes: minutes of commands that nobody waits for any more.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         # A peer that vanished without a word is noticed in seconds, not in hours.
         for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),

@@ -1,0 +1,194 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Links in threads of their own, over real sockets, and somebody to talk to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import os
+import threading
+from typing import Any
+
+from support.waiting import eventually, Log, PATIENCE
+
+from illuminator_ros.illuminator.controller import Controller
+from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.observer import LightObserver
+from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
+from illuminator_ros.mavlink.link import Link, LinkEvent
+from illuminator_ros.mavlink.url import parse_url, Url
+
+BRIDGE = Source(1, 194)
+OPENER = 'mavlink-open'
+
+
+class Talker(Endpoint):
+    """
+    Somebody who sends heartbeats, and keeps what comes in.
+
+    :ivar heard: source and message, in order.
+    :ivar greetings: how often there was somebody new to greet.
+    :ivar turns: how often the link's thread has gone round.
+    """
+
+    def __init__(self, source: Source = BRIDGE, mav_type: int = 18) -> None:
+        super().__init__()
+        self.heartbeat = Heartbeat(source, mav_type)
+        self.heard: Log[tuple[Source, Any]] = Log()
+        self.greetings: Log[float] = Log()
+        self.closings: Log[float] = Log()
+        self.turns = 0
+
+    def link_opened(self, now: float) -> None:
+        self.heartbeat.send(now, self.outgoing)
+        self.greetings.append(now)
+
+    def link_closed(self, now: float) -> None:
+        self.closings.append(now)
+
+    def receive(self, source: Source, message: Any, now: float) -> None:
+        self.heard.append((source, message))
+
+    def poll(self, now: float) -> None:
+        self.heartbeat.poll(now, self.outgoing)
+
+    def next_deadline(self) -> float:
+        self.turns += 1
+        return self.heartbeat.due
+
+    def wait_for(self, source: Source, since: int = 0) -> Any:
+        """Return the first message of a source, of those from a position on."""
+        return self.heard.wait_for(lambda entry: entry[0] == source, since=since)[1]
+
+
+class LiveLink:
+    """
+    A link and its events.
+
+    :ivar events: what the link has reported.
+    """
+
+    def __init__(self, url: str | Url, endpoint: Endpoint | None = None, **options: Any) -> None:
+        self.endpoint: Any = endpoint or Talker()
+        self.events: Log[LinkEvent] = Log()
+        parsed = parse_url(url) if isinstance(url, str) else url
+        self.link = Link(parsed, self.endpoint, label=str(url), on_event=self.events.append,
+                         **options)
+        self.link.start()
+
+    def wait_open(self, count: int = 1) -> LinkEvent:
+        """Wait until the link was opened for the count-th time."""
+        return self.events.wait_for(lambda event: event.is_open, count=count)
+
+    def wait_lost(self, count: int = 1) -> LinkEvent:
+        """Wait until the link was lost, or could not be opened, for the count-th time."""
+        return self.events.wait_for(lambda event: not event.is_open, count=count)
+
+    def history(self) -> list[bool]:
+        """Return for each event whether it was an opening."""
+        return [event.is_open for event in self.events]
+
+    def ask(self, function: Callable[[float], Any], within: float = PATIENCE) -> Any:
+        """Return what a function returns in the link's thread."""
+        answers: Log[Any] = Log()
+        self.link.call(lambda now: answers.append(function(now)))
+        return answers.wait_for(lambda answer: True, within=within)
+
+    def stop(self) -> None:
+        """End it, and wait for its threads."""
+        self.link.stop(PATIENCE)
+
+
+class Lights(LiveLink):
+    """Simulated lights on a link."""
+
+    def __init__(self, url: str, properties: DeviceProperties | None = None) -> None:
+        super().__init__(url, Devices([properties or DeviceProperties()], 0.0))
+
+
+class _Watcher(LightObserver):
+    def __init__(self, log: Log[tuple[str, Light]]) -> None:
+        self._log = log
+
+    def connected(self, light: Light) -> None:
+        self._log.append(('connected', light))
+
+    def lost(self, light: Light, reason: str) -> None:
+        self._log.append(('lost', light))
+
+
+class Bridge(LiveLink):
+    """
+    The drone's side on a link, without ROS.
+
+    :ivar lights: what happened to lights: ``connected`` or ``lost``, and the light.
+    """
+
+    def __init__(self, url: str, **options: Any) -> None:
+        self.lights: Log[tuple[str, Light]] = Log()
+        super().__init__(url, Controller(BRIDGE, Settings(), on_light=self._found), **options)
+
+    def _found(self, light: Light) -> None:
+        light.observer = _Watcher(self.lights)
+
+    def wait_connected(self, count: int = 1) -> Light:
+        """Return the light that was connected the count-th time."""
+        return self.lights.wait_for(lambda entry: entry[0] == 'connected', count=count)[1]
+
+    def enable(self, on: bool, light: Light | None = None) -> Result:
+        """Switch a light on or off, and return what became of it."""
+        results: Log[Result] = Log()
+        one = light or self.wait_connected()
+        self.link.call(lambda now: one.enable(on, now, lambda result, now: results.append(result)))
+        return results.wait_for(lambda result: True)
+
+
+def wait_for_openers() -> None:
+    """Wait until no thread is trying to open anything."""
+    for thread in threading.enumerate():
+        if thread.name == OPENER:
+            thread.join(PATIENCE)
+
+
+def resources() -> tuple[int, int]:
+    """Return the numbers of threads and of open descriptors of this process."""
+    return threading.active_count(), len(os.listdir('/proc/self/fd'))
+
+
+def wait_for_resources(threads: int, descriptors: int) -> None:
+    """Wait until there are no more threads and descriptors than that; an error if they stay."""
+    def few() -> bool:
+        now = resources()
+        return now[0] <= threads and now[1] <= descriptors
+
+    eventually(few, f'{resources()} threads and descriptors, not {(threads, descriptors)}')
+
+
+class Jump:
+    """A clock that can be set forward."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.ahead = 0.0
+
+    def __call__(self) -> float:
+        return self._clock() + self.ahead
+
+
+NEVER = math.inf

@@ -1,0 +1,112 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A channel without a link around it, and sockets for its other side."""
+
+from __future__ import annotations
+
+import selectors
+import socket
+import time
+from typing import Any
+
+from support.waiting import PATIENCE
+
+from illuminator_ros.mavlink.transport import Channel
+
+
+class OpenChannel:
+    """A channel with its selector."""
+
+    def __init__(self, channel: Channel) -> None:
+        self.channel = channel
+        self.selector = selectors.DefaultSelector()
+        channel.register(self.selector)
+
+    def receive(self, count: int = 1) -> list[tuple[Any, bytes]]:
+        """Wait for pieces of data and return them with their origins."""
+        found: list[tuple[Any, bytes]] = []
+        until = time.monotonic() + PATIENCE
+        while len(found) < count:
+            assert time.monotonic() < until, f'only {found} came'
+            found += self.turn(PATIENCE)
+        return found
+
+    def turn(self, patience: float = 0.0) -> list[tuple[Any, bytes]]:
+        """Do what there is to do, waiting for it so long at most (s); return what came."""
+        found: list[tuple[Any, bytes]] = []
+        for key, events in self.selector.select(patience):
+            if events & selectors.EVENT_WRITE:
+                self.channel.writable(key.fileobj)
+            if events & selectors.EVENT_READ:
+                found += self.channel.receive(key.fileobj)
+        return found
+
+    def receive_bytes(self, size: int) -> bytes:
+        """Wait for so many bytes, from anybody, and return them."""
+        data = b''
+        while len(data) < size:
+            data += b''.join(piece for _, piece in self.receive())
+        return data
+
+    def broadcast(self, frame: bytes, now: float = 0.0) -> None:
+        """Send a frame to everybody."""
+        self.channel.send(frame, self.channel.peers(now))
+
+    def close(self) -> None:
+        """Close it."""
+        self.channel.close()
+        self.selector.close()
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = '127.0.0.1') -> int:
+    """Return a port that nobody uses."""
+    with bound_socket(host, kind) as probe:
+        return int(probe.getsockname()[1])
+
+
+def bound_socket(
+    host: str = '127.0.0.1', kind: socket.SocketKind = socket.SOCK_DGRAM, port: int = 0,
+) -> socket.socket:
+    """Return a socket on a free port, whose calls block for a limited time."""
+    host = host.strip('[]')
+    family = socket.AF_INET6 if ':' in host else socket.AF_INET
+    one = socket.socket(family, kind)
+    one.settimeout(PATIENCE)
+    one.bind((host, port))
+    return one
+
+
+def listening_socket(host: str = '127.0.0.1', port: int = 0) -> socket.socket:
+    """Return a TCP socket that listens."""
+    host = host.strip('[]')
+    family = socket.AF_INET6 if ':' in host else socket.AF_INET
+    one = socket.socket(family, socket.SOCK_STREAM)
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    one.settimeout(PATIENCE)
+    one.bind((host, port))
+    one.listen()
+    return one
+
+
+def has_nothing(one: socket.socket) -> bool:
+    """Return whether nothing has arrived at a socket by now."""
+    one.setblocking(False)
+    try:
+        one.recv(65536)
+    except BlockingIOError:
+        return True
+    finally:
+        one.settimeout(PATIENCE)
+    return False

@@ -1,0 +1,69 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A serial line without hardware: a pseudo-terminal behind a path that stays the same."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import select
+
+from support.waiting import PATIENCE
+
+
+class PtyDevice:
+    """
+    The far end of a serial line, whose near end is the device ``path``.
+
+    :ivar path: a symbolic link, as udev makes them.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self.path = directory / 'ttyLIGHT'
+        self._far = -1
+        self.plug_in()
+
+    def plug_in(self) -> None:
+        """Make the device appear, another one than before."""
+        far, near = os.openpty()
+        name = os.ttyname(near)
+        os.close(near)
+        scratch = self.path.with_name('scratch')
+        scratch.symlink_to(name)
+        os.replace(scratch, self.path)
+        self._far = far
+        os.set_blocking(far, False)
+
+    def pull_out(self) -> None:
+        """Make the device disappear."""
+        self.path.unlink(missing_ok=True)
+        if self._far >= 0:
+            os.close(self._far)
+            self._far = -1
+
+    def write(self, data: bytes) -> None:
+        """Send bytes to whoever has opened the device."""
+        while data:
+            select.select([], [self._far], [], PATIENCE)
+            data = data[os.write(self._far, data):]
+
+    def read(self, patience: float = PATIENCE) -> bytes:
+        """Return what has been sent to the device; b'' if nothing comes."""
+        if not select.select([self._far], [], [], patience)[0]:
+            return b''
+        try:
+            return os.read(self._far, 65536)
+        except (BlockingIOError, OSError):
+            return b''

@@ -1,0 +1,73 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Waiting for what other threads do, without sleeping."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import threading
+import time
+from typing import Generic, TypeVar
+
+T = TypeVar('T')
+
+# s; only a broken promise takes that long, however busy the machine is.
+PATIENCE = 20.0
+
+
+class Log(Generic[T]):
+    """A list that other threads append to and that can be waited for."""
+
+    def __init__(self) -> None:
+        self._entries: list[T] = []
+        self._changed = threading.Condition()
+
+    def append(self, entry: T) -> None:
+        """Add an entry."""
+        with self._changed:
+            self._entries.append(entry)
+            self._changed.notify_all()
+
+    def __iter__(self) -> Iterator[T]:
+        with self._changed:
+            return iter(list(self._entries))
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __getitem__(self, index: int) -> T:
+        return self._entries[index]
+
+    def wait_for(
+        self, wanted: Callable[[T], object], *, count: int = 1, since: int = 0,
+        within: float = PATIENCE,
+    ) -> T:
+        """Return the count-th entry that is wanted, of those from a position on."""
+        def found() -> list[T]:
+            return [entry for entry in self._entries[since:] if wanted(entry)]
+
+        with self._changed:
+            if not self._changed.wait_for(lambda: len(found()) >= count, within):
+                raise AssertionError(f'not within {within} s; there is {self._entries[-20:]}')
+            return found()[count - 1]
+
+
+def eventually(condition: Callable[[], object], what: str, within: float = PATIENCE) -> None:
+    """Wait for something that nobody tells."""
+    until = time.monotonic() + within
+    pause = threading.Event()
+    while not condition():
+        assert time.monotonic() < until, f'not within {within} s: {what}'
+        pause.wait(0.005)
