@@ -259,6 +259,8 @@ class _Parser:
 
         The path itself may have colons, as those in /dev/serial/by-path do.
         """
+        if '://' in text:
+            self.fail(f'{text!r} is no device path')
         match = re.fullmatch(r'(.+)[,:]([^,:]*)', text)
         if not match:
             self.fail(f'no baud rate behind {text!r}: MAVROS would take 57600 and pymavlink '
