@@ -39,10 +39,12 @@ def enter(name: str, run: Callable[[Termination], int]) -> int:
     """
     termination = Termination()
     try:
-        return run(termination)
+        status = run(termination)
     except ModuleNotFoundError as error:
         package = (error.name or '').partition('.')[0]
         if package not in _REMEDIES:
             raise
         print(f'{name}: {package} is not installed: {_REMEDIES[package]}', file=sys.stderr)
         return 1
+    termination.finish()
+    return status
