@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 import socket
 import threading
@@ -25,29 +25,16 @@ import time
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
-from support.live_link import Jump, LiveLink, Talker
-from support.open_channel import bound_socket, free_port, OpenChannel
+from support.live_link import LiveLink, Talker
+from support.open_channel import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
 
 from illuminator_ros.mavlink import opener
 from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.link import KNOCK_INTERVAL, SILENCE
 from illuminator_ros.mavlink.reception import STALL
 
 Run = Callable[[LiveLink], LiveLink]
-
-
-@pytest.fixture
-def clock() -> Jump:
-    """Return a clock that can be set forward."""
-    return Jump()
-
-
-def jump(link: LiveLink, clock: Jump, seconds: float) -> None:
-    """Let time pass for a link."""
-    clock.ahead += seconds
-    link.link.call(lambda now: None)
 
 
 @pytest.mark.parametrize('url', [
@@ -84,76 +71,73 @@ def test_a_line_that_takes_nothing_makes_no_work(
     device.pull_out()
 
 
-def heard(link: LiveLink, other: OpenChannel) -> int:
-    """Have a link hear somebody, and return how many greetings there were by then."""
-    count = len(link.endpoint.heard) + 1
-    other.broadcast(heartbeat_frame(LIGHT))
-    link.endpoint.heard.wait_for(lambda heard: True, count=count)
-    return len(link.endpoint.greetings)
+class Simulation:
+    """A link to one peer, and when its endpoint was told what."""
+
+    def __init__(self) -> None:
+        self.endpoint = Talker()
+        self.heard_at: list[float] = []
+        taken = self.endpoint.receive
+
+        def receive(source: Source, message: object, now: float) -> None:
+            self.heard_at.append(now)
+            taken(source, message, now)
+
+        self.endpoint.receive = receive  # type: ignore[method-assign]
+        self.link = SimulatedLink(self.endpoint, lambda data, peer: None, now=0.0)
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes."""
+        self.link.receive((data, 'peer'))
+
+    @property
+    def greeted_at(self) -> list[float]:
+        """When somebody new was, or might have been, within hearing."""
+        return list(self.endpoint.greetings)
 
 
-def test_nobody_is_greeted_again_while_somebody_is_heard(
-    run: Run, clock: Jump, channel: Callable[[str], OpenChannel],
+@pytest.fixture
+def simulation() -> Iterator[Simulation]:
+    """Return a link on which no time passes by itself, opened at 0 s."""
+    one = Simulation()
+    yield one
+    one.link.stop()
+
+
+def test_greetings_go_out_until_somebody_is_heard(simulation: Simulation) -> None:
+    # A router that has restarted passes nothing on to whom it has not heard, and both our
+    # heartbeat and then the other side's must have come within a second.
+    simulation.link.run(0.6)
+    simulation.receive(heartbeat_frame(LIGHT))
+    simulation.link.run(1.0)
+    assert simulation.greeted_at == [0.0, 0.25, 0.5, 0.6]
+
+
+def test_nobody_is_greeted_again_while_somebody_is_heard(simulation: Simulation) -> None:
+    for _ in range(5):
+        simulation.receive(heartbeat_frame(LIGHT))
+        simulation.link.run(1.4)
+    assert simulation.greeted_at == [0.0, 0.0]
+
+
+def test_greetings_go_out_once_nobody_is_heard_any_more(simulation: Simulation) -> None:
+    simulation.receive(heartbeat_frame(LIGHT))
+    simulation.link.run(2.1)
+    assert simulation.greeted_at == [0.0, 0.0, 1.5, 1.75, 2.0]
+
+
+def test_noise_is_no_sign_of_life(simulation: Simulation) -> None:
+    simulation.receive(heartbeat_frame(LIGHT))
+    simulation.link.run(1.0)
+    simulation.receive(b'noise' + heartbeat_frame(LIGHT)[:-1] + b'x')
+    simulation.link.run(0.6)
+    assert simulation.greeted_at == [0.0, 0.0, 1.5]
+
+
+def test_good_frames_behind_a_false_start_are_taken_when_it_is_given_up(
+    simulation: Simulation,
 ) -> None:
-    other = channel('memory://talk')
-    link = run(LiveLink('memory://talk', clock=clock))
-    link.wait_open()
-    greeted = heard(link, other)
-    for _ in range(3):
-        jump(link, clock, SILENCE - 0.5)
-        assert heard(link, other) == greeted
-
-
-@pytest.mark.parametrize('before', [False, True], ids=['nobody yet', 'nobody any more'])
-def test_greetings_go_out_while_nobody_is_heard(
-    run: Run, clock: Jump, channel: Callable[[str], OpenChannel], before: bool,
-) -> None:
-    # A router that has restarted passes nothing on to whom it has not heard.
-    link = run(LiveLink('memory://silence', clock=clock))
-    link.wait_open()
-    if before:
-        heard(link, channel('memory://silence'))
-        jump(link, clock, SILENCE - KNOCK_INTERVAL)
-    greeted = len(link.endpoint.greetings)
-    for count in range(1, 4):
-        jump(link, clock, KNOCK_INTERVAL)
-        link.endpoint.greetings.wait_for(lambda at: True, count=greeted + count)
-
-
-def test_greetings_come_often_enough_and_not_more_often(run: Run, clock: Jump) -> None:
-    # Our heartbeat at a router and then the other side's must both have come within a second.
-    link = run(LiveLink('memory://alone', clock=clock))
-    link.endpoint.greetings.wait_for(lambda at: True, count=4)
-    moments = list(link.endpoint.greetings)
-    assert min(b - a for a, b in zip(moments, moments[1:], strict=False)) >= 0.25
-    assert KNOCK_INTERVAL <= 0.25
-
-
-def test_noise_is_no_sign_of_life(run: Run, clock: Jump) -> None:
-    port = free_port()
-    link = run(LiveLink(f'udpin://127.0.0.1:{port}', clock=clock))
-    link.wait_open()
-    with bound_socket() as noisy:
-        for count in (2, 3):
-            noisy.sendto(b'\xfd\xfe noise', ('127.0.0.1', port))
-            jump(link, clock, KNOCK_INTERVAL)
-            assert link.endpoint.greetings.wait_for(lambda at: True, count=count)
-
-
-def test_good_frames_behind_a_false_start_are_taken_at_the_moment_that_it_is_given_up() -> None:
-    endpoint = Talker()
-    link = SimulatedLink(endpoint, lambda data, peer: None)
-    came_at = []
-    monitored = endpoint.receive
-
-    def receive(source: Source, message: object, now: float) -> None:
-        came_at.append(now)
-        monitored(source, message, now)
-
-    endpoint.receive = receive  # type: ignore[method-assign]
-    begun = link.now
-    link.receive((heartbeat_frame(LIGHT), 'peer'))
-    link.receive((b'\xfe\xfa\x00\x01\x01\x6e' + heartbeat_frame(LIGHT), 'peer'))
-    link.run(2.0)
-    link.stop()
-    assert came_at == [begun, begun + STALL]
+    simulation.receive(heartbeat_frame(LIGHT))
+    simulation.receive(b'\xfe\xfa\x00\x01\x01\x6e' + heartbeat_frame(LIGHT))
+    simulation.link.run(2.0)
+    assert simulation.heard_at == [0.0, STALL]

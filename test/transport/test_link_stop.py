@@ -206,6 +206,7 @@ def test_what_was_opened_and_not_taken_yet_is_closed() -> None:
     go_on.set()
     link.stop()
     assert link.has_ended()
+    assert link.history() == []
 
 
 def test_an_ended_link_tells_that_it_is_closed() -> None:
