@@ -17,11 +17,16 @@
 from __future__ import annotations
 
 import itertools
+import threading
+from types import SimpleNamespace
 
 import pytest
 
-from illuminator_ros.mavlink.opener import Backoff
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.opener import Backoff, Opener
+from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
+from illuminator_ros.mavlink.url import MemoryUrl, Url
 
 
 def pauses(count: int, *, jitter: float = 1.0, spent: float = 0.0) -> list[float]:
@@ -84,3 +89,26 @@ def test_a_loss_of_what_worked_is_answered_at_once() -> None:
 
 def test_failures_beyond_any_number_are_no_error() -> None:
     assert pauses(5000)[-1] == 0.5
+
+
+def test_the_time_that_a_try_takes_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, spent, ended = [0.0], [], threading.Event()
+
+    class Recorded(Backoff):
+        def pause(self, seconds: float) -> float:
+            spent.append(seconds)
+            if len(spent) > 2:
+                one.stop()
+                ended.set()
+            return 0.0
+
+    def fail_slowly(url: Url) -> Channel:
+        now[0] += 0.7
+        raise OSError('nobody there')
+
+    monkeypatch.setattr(opener, 'open_channel', fail_slowly)
+    monkeypatch.setattr(opener, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    one = Opener(MemoryUrl('x'), lambda channel: None, lambda reason: None, backoff=Recorded())
+    one.start()
+    assert ended.wait(20.0)
+    assert spent == pytest.approx([0.0, 0.7, 0.7])

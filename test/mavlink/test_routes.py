@@ -20,7 +20,13 @@ import pytest
 from support.frames import LIGHT
 
 from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
-from illuminator_ros.mavlink.routes import EXPIRY, MAX_ROUTES, MAX_WAYS, Routes
+from illuminator_ros.mavlink.routes import (
+    EXPIRY,
+    LOOK_INTERVAL,
+    MAX_ROUTES,
+    MAX_WAYS,
+    Routes,
+)
 
 PEERS = ('a', 'b', 'c')
 
@@ -102,6 +108,27 @@ def test_components_that_have_fallen_silent_make_room(routes: Routes) -> None:
     routes.heard(Source(3, 0), 'c', EXPIRY + 1)
     assert routes.towards(to(Source(3, 0)), PEERS, EXPIRY + 1) == ['c']
     assert len(routes) == 1
+
+
+def test_a_full_table_is_looked_through_once_in_a_while(routes: Routes) -> None:
+    # A look costs as much as hundreds of frames.
+    for number in range(MAX_ROUTES - 1):
+        routes.heard(Source(2, number), 'a', 0.0)
+    new = Source(3, 0)
+    remembered = []
+    for now in (EXPIRY - 0.1, EXPIRY + 0.1, EXPIRY + LOOK_INTERVAL):
+        routes.heard(new, 'c', now)
+        remembered.append(routes.towards(to(new), PEERS, now) == ['c'])
+    assert remembered == [False, False, True]
+
+
+def test_what_is_known_of_crowded_components_is_bounded_too() -> None:
+    routes = Routes()
+    for batch in range(3):
+        for number in range(MAX_ROUTES):
+            for peer in range(MAX_WAYS + 1):
+                routes.heard(Source(batch, number), peer, batch * (EXPIRY + LOOK_INTERVAL))
+    assert len(routes._crowded) <= MAX_ROUTES
 
 
 def test_peers_are_counted_while_something_comes_from_them(routes: Routes) -> None:
