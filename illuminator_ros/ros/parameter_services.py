@@ -44,7 +44,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 
 from ..illuminator.model import checked, InvalidValue, Limits
-from .parameters import cast, DEVICE_SPECS
+from .parameters import DEVICE_SPECS
 
 # Sets values in the device; returns '' or why not.
 Configure = Callable[[dict[str, Any]], Awaitable[str]]
@@ -187,4 +187,4 @@ class ParameterServices:
 
 
 def _value(message: Any) -> Any:
-    return cast(message.name, Parameter.from_parameter_msg(message).value)
+    return Parameter.from_parameter_msg(message).value

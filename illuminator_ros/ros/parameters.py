@@ -255,14 +255,6 @@ def misspelt(node: Node) -> list[str]:
     return warnings
 
 
-def cast(name: str, value: Any) -> Any:
-    """Return an integer as the double that a parameter of the light is; else the value."""
-    spec = DEVICE_SPECS.get(name)
-    if spec and isinstance(spec.default, float) and type(value) is int:
-        return float(value)
-    return value
-
-
 def period_range(max_period: float, reported: float) -> ParameterDescriptor:
     """Return the descriptor of ``strobe_period`` for a light that reports these values, s."""
     spec = DEVICE_SPECS['strobe_period']
