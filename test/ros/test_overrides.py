@@ -14,6 +14,7 @@
 
 """Parameters of the light given at the start (DESIGN.md, 3.3)."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,32 @@ def test_without_any_nothing_is_sent(own_ros: Ros, port: int, light: ServedLight
         Parameters(own_ros).wait(brightness=90.0, mode='external_sync')
 
         assert light.commands(CONFIGURE) == []
+
+
+def test_what_one_bridge_has_can_be_given_to_the_next(
+    own_ros: Ros, port: int, light: ServedLight, tmp_path: Path,
+) -> None:
+    """As ``ros2 param dump`` and ``--params-file`` do."""
+    file = tmp_path / 'dump.yaml'
+    with light:
+        with running_bridge(own_ros.domain, port, heartbeat_timeout=2, signing_mode="'off'"):
+            parameters = Parameters(own_ros)
+            parameters.wait(brightness=90.0)
+            parameters.set(brightness=55)
+            names = parameters.names()
+            dump = dict(zip(names, parameters.get(*names), strict=True))
+        # JSON is YAML, but for the arrays that rcl makes of lists.
+        file.write_text(json.dumps({'/illuminator': {'ros__parameters': {
+            name: list(value) if isinstance(value, list | tuple) else value
+            for name, value in dump.items()}}}))
+        light.report(brightness=10.0)
+
+        with running_bridge(own_ros.domain, port, '--params-file', str(file)) as bridge:
+            bridge.wait_for('light 1/243 configured: ')
+
+            assert light.fake.fields['brightness'] == 55.0
+            assert bridge.count('WARN') + bridge.count('ERROR') == 0
+            assert parameters.get('heartbeat_timeout') == [2.0]
 
 
 class TestRestart:
