@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping
 import math
 from typing import Any, TYPE_CHECKING
 
-from .model import checked, Configuration, FIELDS, InvalidValue, Status
+from .model import checked, Configuration, FIELDS, InvalidValue, NOTHING, Status
 from .observer import Cause
 from .operation import Configure, Done, OperationQueue, Result, unexplained
 
@@ -55,12 +55,16 @@ class Agreement:
         # Overrides, or what a restart has undone: still to be sent.
         self._wanted: dict[str, Any] = {}
         self._wanted_at = 0.0
+        # Whether it was said that they wait in vain.
+        self._told = False
         self._restoring = False
         self._contradictions = 0
         # Whether it is open what the last command did: it failed, or was not waited for.
         self._doubtful = False
         # What the light has accepted and then not shown.
         self._unfulfilled: Configuration | None = None
+        # What was last asked for or told: small steps away from it add up to a change.
+        self._reference: Configuration | None = None
 
     # Requests
 
@@ -180,8 +184,8 @@ class Agreement:
         What the status shows in other steps than asked for is what is agreed; what it shows
         otherwise for a good reason (heat, external sync) is not.
         """
-        reported = status.configuration() if status else None
-        if reported:
+        if status:
+            reported = status.configuration(wanted)
             far = wanted.differences(reported)
             wanted = wanted.with_changes({
                 name: getattr(reported, name)
@@ -195,6 +199,8 @@ class Agreement:
 
     def _adopt(self, configuration: Configuration, cause: Cause) -> None:
         old, self.agreed = self.agreed, configuration
+        if cause is not Cause.ROUNDING:
+            self._reference = configuration
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
@@ -225,9 +231,9 @@ class Agreement:
         if current is not None:
             current.status(status, sent_by, now)
             return
-        reported = status.configuration()
-        if reported is None:
+        if self.agreed is None and not status.complete:
             return
+        reported = status.configuration(self.agreed or NOTHING)
         if self._unfulfilled and not unexplained(
                 self._unfulfilled, reported, status.error_flags, step=True):
             self._fulfilled()
@@ -244,7 +250,8 @@ class Agreement:
     def _follow(self, status: Status, agreed: Configuration, reported: Configuration) -> None:
         names = unexplained(agreed, reported, status.error_flags, step=False)
         if names:
-            far = unexplained(agreed, reported, status.error_flags, step=True)
+            far = unexplained(
+                self._reference or agreed, reported, status.error_flags, step=True)
             self._adopt(
                 agreed.with_changes({name: getattr(reported, name) for name in names}),
                 Cause.LIGHT if far else Cause.ROUNDING)
@@ -258,11 +265,12 @@ class Agreement:
         self._queue.poll(now)
         if self._queue.current is not None or not self._light.connected:
             return
-        if self._setpoint is not None:
+        # First what is sent once and tried again seldom: a stream of setpoints never ends.
+        if now >= self._wanted_due:
+            self._send_wanted(now)
+        if self._setpoint is not None and self._queue.current is None:
             value, self._setpoint = self._setpoint, None
             self._send_setpoint(value, now)
-        elif now >= self._wanted_due:
-            self._send_wanted(now)
 
     @property
     def _replaceable(self) -> Configure | None:
@@ -278,7 +286,7 @@ class Agreement:
         if self._wanted and self.agreed is not None:
             return self._wanted_at
         # A light that sends no status has nothing to add to a complete set.
-        if all(name in self._wanted for name in FIELDS):
+        if all(name in self._wanted for name in FIELDS) or self._wanted and not self._told:
             return self._wanted_at + STATUS_PATIENCE
         return math.inf
 
@@ -300,6 +308,14 @@ class Agreement:
     def _send_wanted(self, now: float) -> None:
         self._wanted_at = now + RESTORE_INTERVAL
         observer, light = self._light.observer, self._light
+        try:
+            self.with_changes(self._wanted)
+        except InvalidValue as error:
+            # They still wait for a status; but whoever gave them should know.
+            self._told = True
+            self.discrepancy = f'{", ".join(self._wanted)} not sent: {error}'
+            observer.restored(light, False, self.discrepancy)
+            return
         for name, value in list(self._wanted.items()):
             try:
                 checked(name, value, light.limits)

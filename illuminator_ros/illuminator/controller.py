@@ -94,6 +94,9 @@ class Controller(Endpoint):
 
     def receive(self, source: Source, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
+        if not source.system:
+            # 0 is the address of everybody, and what is sent to it switches every light.
+            return
         if source == self.identity:
             if isinstance(message, HeartbeatMessage):
                 self.clash_at = now

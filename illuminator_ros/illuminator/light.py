@@ -102,7 +102,7 @@ class Light:
         meaning = Uptime.RUNNING
         if self.status is not None:
             meaning = compare_uptime(
-                self.status.uptime_ms, status.uptime_ms, now - self.status_at)
+                self.status.uptime_ms, status.uptime_ms, now - self.status_at, away=was_away)
         if meaning is Uptime.LATE:
             return
         self.status = status

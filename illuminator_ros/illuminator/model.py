@@ -24,6 +24,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum, IntFlag
 import math
+import reprlib
 import struct
 from typing import Any
 
@@ -197,10 +198,10 @@ def checked(name: str, value: Any, limits: Limits | None = None) -> Mode | float
         if isinstance(value, Mode) and value in MODES.values():
             return value
         if not isinstance(value, str) or value not in MODES:
-            raise InvalidValue(f'mode {value!r} is none of {", ".join(MODES)}')
+            raise InvalidValue(f'mode {reprlib.repr(value)} is none of {", ".join(MODES)}')
         return MODES[value]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidValue(f'{name} {value!r} is no number')
+        raise InvalidValue(f'{name} {reprlib.repr(value)} is not a number')
     unit = _UNITS[name]
     if not math.isfinite(value):
         raise InvalidValue(f'{name} {value} is not a finite number')
@@ -275,14 +276,29 @@ class Status:
             number('temp_c', ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C),
             Limits(message.min_strobe_period, message.max_strobe_period), tuple(invalid))
 
-    def configuration(self) -> Configuration | None:
-        """Return the configuration that the light reports, None if a part is not believable."""
-        if (self.brightness is None or self.strobe_period is None
-                or self.strobe_duty_cycle is None):
-            return None
-        period = shortest(self.strobe_period) if self.strobe_period >= SHORTEST_PERIOD else 0.0
+    @property
+    def complete(self) -> bool:
+        """Whether every part of the configuration is believable."""
+        return None not in (self.brightness, self.strobe_period, self.strobe_duty_cycle)
+
+    def configuration(self, otherwise: Configuration) -> Configuration:
+        """
+        Return the configuration that the light reports.
+
+        :param otherwise: what stands in for a part that is not believable.
+        """
+        brightness, duty = self.brightness, self.strobe_duty_cycle
+        period = self.strobe_period
+        if period is not None and period < SHORTEST_PERIOD:
+            period = 0.0
         return Configuration(
-            self.mode, shortest(self.brightness), period, shortest(self.strobe_duty_cycle))
+            self.mode,
+            otherwise.brightness if brightness is None else shortest(brightness),
+            otherwise.strobe_period if period is None else shortest(period),
+            otherwise.strobe_duty_cycle if duty is None else shortest(duty))
+
+
+NOTHING = Configuration(Mode.UNKNOWN, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

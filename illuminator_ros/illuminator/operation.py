@@ -115,6 +115,10 @@ class Operation(ABC):
     def found(self, status: Status) -> str:
         """Return what the light is instead, for people."""
 
+    def proof(self, status: Status) -> str:
+        """Return how far a status that does not contradict shows the change, for people."""
+        return 'confirmed by ILLUMINATOR_STATUS'
+
     @property
     def confirming(self) -> bool:
         """Whether the light has accepted, and the status is awaited."""
@@ -159,7 +163,7 @@ class Operation(ABC):
             self._outdated = True
         elif self.shown_by(status):
             self.accepted(status)
-            self._finish(self._success('confirmed by ILLUMINATOR_STATUS', now), now)
+            self._finish(self._success(self.proof(status), now), now)
         else:
             self._contradiction = status
 
@@ -278,9 +282,16 @@ class Configure(Operation):
 
     def shown_by(self, status: Status) -> bool:
         """See :meth:`Operation.shown_by`."""
-        reported = status.configuration()
-        return reported is not None and not unexplained(
-            self.wanted, reported, status.error_flags, step=True)
+        return not unexplained(
+            self.wanted, status.configuration(self.wanted), status.error_flags, step=True)
+
+    def proof(self, status: Status) -> str:
+        """See :meth:`Operation.proof`."""
+        reported = status.configuration(self.wanted)
+        hidden = [name for name in self.wanted.differences(reported) if name in self.changes]
+        if not hidden or status.error_flags & DIMMING_FLAGS:
+            return super().proof(status)
+        return f'accepted (ILLUMINATOR_STATUS shows {reported.describe(hidden)})'
 
     def accepted(self, status: Status | None) -> None:
         """See :meth:`Operation.accepted`."""
@@ -293,9 +304,7 @@ class Configure(Operation):
 
     def found(self, status: Status) -> str:
         """See :meth:`Operation.found`."""
-        reported = status.configuration()
-        if reported is None:
-            return ', '.join(status.invalid)
+        reported = status.configuration(self.wanted)
         return reported.describe(
             unexplained(self.wanted, reported, status.error_flags, step=True))
 
@@ -308,6 +317,8 @@ def unexplained(
 
     There are two good reasons: it dims itself because it is hot, and under external sync its
     output follows another signal.
+
+    :param step: whether the light's own rounding is passed over.
     """
     names = agreed.differences(reported, step=step)
     # A light that does not say which mode it is in does not contradict.
@@ -315,7 +326,7 @@ def unexplained(
         names = [name for name in names if name != 'mode']
     if flags & DIMMING_FLAGS and reported.brightness < agreed.brightness:
         names = [name for name in names if name != 'brightness']
-    if agreed.mode is reported.mode is Mode.EXTERNAL_SYNC and step:
+    if agreed.mode is reported.mode is Mode.EXTERNAL_SYNC:
         names = []
     return names
 

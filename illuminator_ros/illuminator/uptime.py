@@ -29,6 +29,8 @@ MAX_LATE = 5.0
 # Slack for clocks and links: s, and a share of the time passed.
 SLACK = 2.0
 DRIFT = 0.05
+# s by which a light may seem to have started before its last status came: that one was late.
+BOOT_SLACK = 0.05
 # How wrong the clock of a light may be, as a share: an oscillator without a crystal.
 CLOCK_ERROR = 0.02
 # s for which a status is compared with. A clock that is still more wrong makes statuses look
@@ -45,11 +47,15 @@ class Uptime(Enum):
     NO_CLOCK = 'no clock'
 
 
-def compare_uptime(last_ms: int, new_ms: int, elapsed: float) -> Uptime:
+def compare_uptime(
+    last_ms: int, new_ms: int, elapsed: float, *, away: bool = True,
+) -> Uptime:
     """
     Compare the uptime of a status with that of the newest one before.
 
     :param elapsed: s between the two on our clock, >= 0.
+    :param away: whether the light was lost in between. Only then can it have restarted and show
+        a greater uptime; otherwise it is we who stood still.
 
     The uptime wraps after 49.7 days. A light that was out of hearing for long may have restarted
     and show a greater uptime than before, but never one greater than the time since.
@@ -62,7 +68,7 @@ def compare_uptime(last_ms: int, new_ms: int, elapsed: float) -> Uptime:
     forward = (new_ms - last_ms) % WRAP_MS < WRAP_MS / 2
     if abs(ahead) <= slack and forward:
         return Uptime.RUNNING
-    if new_ms <= 1000.0 * (elapsed + SLACK / 4):
+    if new_ms <= 1000.0 * (elapsed + BOOT_SLACK) and (away or not forward):
         return Uptime.RESTARTED
     if forward:
         return Uptime.RUNNING

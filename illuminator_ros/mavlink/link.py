@@ -147,6 +147,8 @@ class Link:
         # whether the one before never did.
         self._proven_at = math.inf
         self._doubtful = False
+        # Whether a frame has come over the channel.
+        self._spoken = False
         self._knock_at = math.inf
         self._pause = 0.0
         self._fault_log_due = -math.inf
@@ -287,8 +289,10 @@ class Link:
             self._accept(channel, peer, frame, now)
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
-        if self._proven_at < math.inf:
-            self._prove(channel, now)
+        if not self._spoken:
+            self._spoken = True
+            self._opener.answered()
+            self._announce_again(channel, now)
         self._knock_at = now + SILENCE
         self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
@@ -339,18 +343,23 @@ class Link:
             return
         self._channel = channel
         self._proven_at = now + PROBATION
+        self._spoken = False
         self._knock_at = now + KNOCK_INTERVAL
         channel.register(self._selector)
         self._guarded(self.endpoint.link_opened, now)
         self._flush()
         # Sending the first heartbeat may already have shown that it leads nowhere.
-        if self._channel is channel and not self._doubtful:
+        if not self._doubtful:
             self._announce(channel, now)
 
     def _prove(self, channel: Channel, now: float) -> None:
-        """Note that the channel leads somewhere: so its loss is answered at once."""
+        """Note that the channel has lasted: so its loss is answered at once."""
         self._proven_at = math.inf
         self._opener.succeeded()
+        self._announce_again(channel, now)
+
+    def _announce_again(self, channel: Channel, now: float) -> None:
+        """Announce a channel that was doubted until now."""
         if self._reason:
             self._announce(channel, now)
 
@@ -370,7 +379,7 @@ class Link:
         if self._channel is None:
             return
         name, was_open = self._channel.name, not self._reason
-        self._doubtful = self._proven_at < math.inf
+        self._doubtful = self._proven_at < math.inf and not self._spoken
         self._close()
         self._opener.start()
         reason = error.strerror or str(error)

@@ -53,6 +53,10 @@ class Backoff:
         """Note that what was opened works, so that its loss is answered at once."""
         self._failures = 0
 
+    def answered(self) -> None:
+        """Note that what was opened leads somewhere; if it does not last, the pause is short."""
+        self._failures = min(self._failures, 1)
+
     def pause(self, spent: float) -> float:
         """
         Return how long to wait before the next try, s.
@@ -97,6 +101,10 @@ class Opener:
         """Give up; what a try that is under way still opens is closed again."""
         with self._handing_over:
             self._stopping.set()
+
+    def answered(self) -> None:
+        """Note that something came over the channel; see :meth:`Backoff.answered`."""
+        self._backoff.answered()
 
     def succeeded(self) -> None:
         """Note that the channel works, so that the next loss is answered at once."""

@@ -36,6 +36,9 @@ TICKS_PER_SECOND = 100_000
 MAX_TICKS = (1 << 48) - 1
 # A stream that is not known yet may be this far behind ("Timestamp Handling").
 NEW_STREAM_TICKS = 60 * TICKS_PER_SECOND
+# How far ahead of our clock a peer is followed: 10 years. A computer without a battery may wake
+# up some years in the past; a receiver that forgets the rollover of GPS weeks is 19.6 years off.
+FOLLOWED_TICKS = 10 * 365 * 86_400 * TICKS_PER_SECOND
 MAX_STREAMS = 256
 KEY_SIZE = 32
 
@@ -142,8 +145,10 @@ class Signing:
         elif stamp <= last:
             return False
         self._streams[stream] = stamp
-        # A peer with a better clock, or a longer memory, is followed.
-        self.timestamp = max(self.timestamp, stamp)
+        # A peer with a better clock, or a longer memory, is followed; but not one whose clock is
+        # mad, or everybody with the right time would be too old from now on.
+        if stamp <= ticks(unix_time) + FOLLOWED_TICKS:
+            self.timestamp = max(self.timestamp, stamp)
         return True
 
     def _room(self, oldest: int) -> bool:

@@ -116,3 +116,9 @@ def test_the_shortest_number_is_the_same_float32(bits):
 @pytest.mark.parametrize(('value', 'expected'), [(1e39, INF), (-1e39, -INF), (0.5, 0.5)])
 def test_what_does_not_fit_a_float_field_is_infinite_there(value, expected):
     assert float32(value) == expected
+
+
+def test_an_error_about_a_huge_value_is_short():
+    with pytest.raises(InvalidValue) as caught:
+        checked('brightness', [0.5] * 1_000_000)
+    assert len(str(caught.value)) < 200

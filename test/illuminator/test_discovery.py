@@ -171,3 +171,8 @@ def test_the_statuses_that_a_light_sends_are_all_passed_on(pair):
     received = [message for _, _, message in pair.near.received
                 if isinstance(message, IlluminatorStatus)]
     assert len(pair.recorder.statuses) == len(received) >= before + 10
+
+
+def test_the_address_of_everybody_is_nobody():
+    pair = Pair(FakeLight(Source(0, 7))).settle()
+    assert not pair.controller.lights

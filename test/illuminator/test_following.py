@@ -130,7 +130,7 @@ def test_going_to_external_sync_is_followed_and_its_signal_is_not(fake, faked):
     for brightness in (10.0, 90.0, 20.0):
         fake.fields['brightness'] = brightness
         faked.run(2.0)
-    assert [cause for cause, _ in faked.recorder.changes[at_first:] if cause is Cause.LIGHT] == []
+    assert faked.recorder.changes[at_first:] == []
 
 
 @pytest.mark.parametrize('change', [
@@ -163,3 +163,11 @@ def test_a_change_from_outside_during_a_command_is_followed_after_it(fake, faked
     assert not faked.wait_for(answer).success
     faked.run(2.0)
     assert faked.recorder.changes[1:] == [(Cause.LIGHT, {'strobe_period': 2.0})]
+
+
+def test_small_steps_add_up_to_a_change_that_is_told(fake, faked):
+    for _ in range(5):
+        fake.fields['brightness'] -= 0.4
+        faked.run(1.0)
+    assert faked.light.agreement.agreed.brightness == 78.0
+    assert [cause for cause, _ in faked.recorder.changes].count(Cause.LIGHT) == 2

@@ -16,6 +16,7 @@
 
 import pytest
 from support.back_to_back import Pair, START
+from support.fake_light import FakeLight
 
 from illuminator_ros.illuminator.agreement import RESTORE_INTERVAL
 from illuminator_ros.illuminator.light import Settings
@@ -268,3 +269,16 @@ class TestWithoutRestoring:
         pair.run(10.0)
         assert len(sent(pair)) == 1
         assert pair.recorder.changes[-1] == (Cause.LIGHT, {'brightness': 100.0})
+
+
+def test_overrides_that_wait_for_a_status_in_vain_are_told_once():
+    fake = FakeLight(strobe_duty_cycle=float('nan'))
+    pair = overriding(fake, brightness=60.0)
+    pair.run(30.0)
+    (success, message), = pair.recorder.restorations
+    assert not success
+    assert message.startswith('brightness not sent: the light has not reported its configuration')
+    assert pair.light.agreement.discrepancy == message
+    fake.fields['strobe_duty_cycle'] = 0.0
+    pair.run(3.0)
+    assert fake.fields['brightness'] == 60.0

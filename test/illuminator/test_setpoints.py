@@ -91,12 +91,12 @@ def test_a_setpoint_that_is_agreed_already_is_not_sent(pair):
 
 def test_a_setpoint_is_sent_again_where_the_light_may_have_taken_another(fake, faked):
     # It takes 30 and cannot say so: until it is heard, it may be at 30 or at 100.
-    fake.results[CONFIGURE] = None
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = None
     publish(faked, 30.0)
     fake.fields['brightness'] = 30.0
     fake.stream = 0.0
     faked.run(1.0)
-    fake.results[CONFIGURE] = MavResult.ACCEPTED
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = MavResult.ACCEPTED
     publish(faked, 100.0)
     faked.run(1.0)
     assert fake.fields['brightness'] == 100.0
@@ -126,7 +126,7 @@ def test_what_was_overtaken_before_it_was_confirmed_does_not_count_as_agreed(fak
     publish(faked, 30.0)
     faked.run(0.1)
     fake.applies = True
-    fake.results[CONFIGURE] = [MavResult.DENIED, MavResult.ACCEPTED]
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = [MavResult.DENIED, MavResult.ACCEPTED]
     publish(faked, 40.0)
     faked.run(0.1)
     publish(faked, 30.0)
@@ -149,7 +149,7 @@ def test_setpoints_are_as_good_as_commands_for_what_is_agreed(pair):
 
 
 def test_failures_are_told_and_the_stream_goes_on(fake, faked):
-    fake.results[CONFIGURE] = [MavResult.FAILED, MavResult.ACCEPTED]
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = [MavResult.FAILED, MavResult.ACCEPTED]
     publish(faked, 30.0, 40.0)
     faked.run(0.5)
     assert faked.recorder.failed_setpoints[0].startswith('refused: MAV_RESULT_FAILED')
@@ -157,9 +157,9 @@ def test_failures_are_told_and_the_stream_goes_on(fake, faked):
 
 
 def test_a_light_that_does_not_answer_does_not_stop_the_stream_for_ever(fake, faked):
-    fake.results[CONFIGURE] = None
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = None
     publish(faked, *ramp(50), rate=10)
-    fake.results[CONFIGURE] = MavResult.ACCEPTED
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = MavResult.ACCEPTED
     publish(faked, 77.0)
     faked.run(1.5)
     assert fake.fields['brightness'] == 77.0
@@ -174,12 +174,12 @@ def test_without_a_light_within_reach_it_is_told(fake, faked):
 
 def test_a_setpoint_does_not_wait_for_a_light_that_was_lost_meanwhile(fake, faked):
     # An old setpoint that takes effect when the light comes back would surprise.
-    fake.results[CONFIGURE] = None
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = None
     publish(faked, 30.0, 40.0)
     faked.close()
     assert 'the light is lost: the link was lost' in faked.recorder.failed_setpoints
     faked.run(5.0)
-    fake.results[CONFIGURE] = MavResult.ACCEPTED
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = MavResult.ACCEPTED
     faked.open()
     faked.run(5.0)
     assert fake.fields['brightness'] == 100.0
@@ -214,3 +214,12 @@ def test_a_command_is_served_between_setpoints(pair):
     pair.run(1.0)
     agreed = pair.light.agreement.agreed
     assert (agreed.brightness, agreed.strobe_period) == (50.0, 2.0)
+
+
+def test_overrides_are_not_starved_by_a_stream(fake, faked):
+    fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = [None, None, None, MavResult.ACCEPTED]
+    faked.light.agreement.want({'strobe_period': 2.0}, faked.now)
+    for value in range(400):
+        faked.light.agreement.set_brightness(value % 100 / 1.0, faked.now)
+        faked.run(0.02)
+    assert fake.fields['strobe_period'] == 2.0

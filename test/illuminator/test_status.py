@@ -17,7 +17,7 @@
 import pytest
 from support.fake_light import status_message
 
-from illuminator_ros.illuminator.model import Limits, Mode, Status
+from illuminator_ros.illuminator.model import Configuration, Limits, Mode, NOTHING, Status
 from illuminator_ros.mavlink.dialect import decode_payload, encode_payload, STATUS_ID
 
 NAN, INF = float('nan'), float('inf')
@@ -99,18 +99,21 @@ def test_everything_wrong_is_named_at_once():
 
 def test_the_configuration_is_the_shortest_numbers_that_were_meant():
     configuration = read(brightness=60.1, strobe_period=0.1, strobe_duty_cycle=33.3
-                         ).configuration()
+                         ).configuration(NOTHING)
     assert (configuration.brightness, configuration.strobe_period,
             configuration.strobe_duty_cycle) == (60.1, 0.1, 33.3)
 
 
 @pytest.mark.parametrize('name', ['brightness', 'strobe_period', 'strobe_duty_cycle'])
-def test_a_status_with_an_unbelievable_part_has_no_configuration(name):
-    assert read(**{name: NAN}).configuration() is None
+def test_what_is_agreed_stands_in_for_an_unbelievable_part(name):
+    agreed = Configuration(Mode.INTERNAL_CONTROL, 41.0, 0.5, 42.0)
+    status = read(**{name: NAN})
+    assert not status.complete
+    assert getattr(status.configuration(agreed), name) == getattr(agreed, name)
 
 
 def test_a_wrong_temperature_does_not_spoil_the_configuration():
-    assert read(temp_c=NAN).configuration() is not None
+    assert read(temp_c=NAN).complete
 
 
 @pytest.mark.parametrize(('low', 'high', 'known'), [

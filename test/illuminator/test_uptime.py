@@ -23,6 +23,16 @@ LATE, NO_CLOCK = Uptime.LATE, Uptime.NO_CLOCK
 HOUR_MS, DAY_MS = 3_600_000, 86_400_000
 
 
+def test_a_light_that_was_never_lost_has_not_restarted_and_overtaken_itself():
+    # We stood still for 5 s while the light had just started; its statuses were queued.
+    assert compare_uptime(3_000, 4_000, 5.0, away=False) is RUNNING
+    assert compare_uptime(3_000, 4_000, 5.0, away=True) is RESTARTED
+
+
+def test_two_statuses_swapped_just_after_the_start_are_no_restart():
+    assert compare_uptime(200, 100, 0.001, away=False) is LATE
+
+
 @pytest.mark.parametrize(('last_ms', 'new_ms', 'elapsed', 'meaning'), [
     # A stream, with what clocks and lines do to it.
     (10_000, 11_000, 1.0, RUNNING),

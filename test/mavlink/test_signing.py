@@ -286,3 +286,10 @@ def test_forgotten_stream_lets_no_replay_in_even_if_the_clock_steps_back(
     assert signing.accepts(signed(stamp_at(NOW + newcomer)), NOW + 61)
     for now in (NOW + 61, NOW, NOW - 3600):
         assert not signing.accepts(signed(STAMP, source=Source(100, 0)), now)
+
+
+def test_a_mad_clock_is_believed_and_not_followed() -> None:
+    signing = checker()
+    assert signing.accepts(signed(LAST_STAMP), NOW)
+    assert signing.timestamp <= STAMP
+    assert signing.accepts(signed(STAMP, source=Source(1, 9)), NOW)

@@ -30,6 +30,7 @@ from support.waiting import Log
 
 from illuminator_ros.mavlink import link as link_module
 from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.opener import FIRST_PAUSE
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 
 Run = Callable[[LiveLink], LiveLink]
@@ -175,6 +176,7 @@ def test_a_server_that_has_dropped_connections_is_open_once_it_keeps_one(
 def test_a_link_that_has_worked_is_tried_again_at_once(
     run: Run, port: int, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(link_module, 'PROBATION', 0.0)
     pauses = record_pauses(monkeypatch)
     with listening_socket(port=port) as server:
         link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
@@ -184,6 +186,20 @@ def test_a_link_that_has_worked_is_tried_again_at_once(
                 link.endpoint.heard.wait_for(lambda heard: True, count=count)
     link.wait_lost(3)
     assert [pauses[i] for i in range(3)] == [0.0, 0.0, 0.0]
+
+
+def test_a_server_that_speaks_and_closes_is_given_a_pause(
+    run: Run, port: int, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pauses = record_pauses(monkeypatch)
+    with listening_socket(port=port) as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
+        for count in (1, 2, 3):
+            with server.accept()[0] as connection:
+                connection.sendall(heartbeat_frame())
+                link.endpoint.heard.wait_for(lambda heard: True, count=count)
+    link.wait_lost(3)
+    assert [pauses[i] for i in range(3)] == [0.0, FIRST_PAUSE, FIRST_PAUSE]
 
 
 def test_a_remote_without_a_way_to_it_is_not_open_and_reported_once(

@@ -28,7 +28,7 @@ from support.open_channel import free_port, OpenChannel
 from support.waiting import PATIENCE
 
 from illuminator_ros.mavlink.transport import ChannelLost
-from illuminator_ros.mavlink.transport.tcp import MAX_CLIENTS
+from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 
 
 @pytest.fixture
@@ -133,6 +133,18 @@ def test_a_client_that_never_said_anything_good_makes_room(
     newest = connect()
     assert say(ours, newest) in ours.channel.peers(0.0)
     assert is_closed(silent[0])
+
+
+def test_a_client_that_has_gone_silent_makes_room(
+    ours: OpenChannel, connect: Connect,
+) -> None:
+    clients = [connect() for _ in range(MAX_CLIENTS)]
+    for now, client in enumerate(clients):
+        ours.channel.heard(say(ours, client), float(now))
+    ours.channel.peers(EXPIRY + 0.5)
+    newest = connect()
+    assert say(ours, newest) in ours.channel.peers(EXPIRY + 0.5)
+    assert is_closed(clients[0])
 
 
 class _FailingListener:

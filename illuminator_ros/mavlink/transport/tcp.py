@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 import contextlib
 import errno
+import math
 import selectors
 import socket
 from typing import Any
@@ -33,9 +34,12 @@ CONNECT_TIMEOUT = 0.8
 # more rarely: after a longer silence a cable plugged in again would go unnoticed for seconds.
 USER_TIMEOUT = 2000
 MAX_CLIENTS = 16
+# s without a good frame, after which a client gives way to a new one.
+EXPIRY = 10.0
 # We have no descriptors or memory left to accept with.
 NO_ROOM = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
-READ_SIZE = 65536
+# Bytes read before other work gets its turn.
+READ_SIZE = 4096
 
 
 class _Stream:
@@ -152,8 +156,8 @@ class TcpServer(Channel):
     """
     A listening socket and its clients, each a peer. A client that goes is no loss.
 
-    Where there are :data:`MAX_CLIENTS`, a new one takes the place of the oldest that has not
-    sent anything good; it is turned away where all have.
+    Where there are :data:`MAX_CLIENTS`, a new one takes the place of the one that has been silent
+    for longest; it is turned away where all have sent something good within :data:`EXPIRY`.
     """
 
     def __init__(self, address: Address) -> None:
@@ -168,7 +172,9 @@ class TcpServer(Channel):
             self._listener.close()
             raise OSError(error.errno, f'cannot listen on {address}: {error.strerror}') from None
         self._clients: dict[socket.socket, _Stream] = {}
-        self._heard: set[socket.socket] = set()
+        # When something good last came, s.
+        self._heard: dict[socket.socket, float] = {}
+        self._now = -math.inf
         self.name = f'tcp server {Address(*self._listener.getsockname()[:2])}'
 
     def register(self, selector: selectors.BaseSelector) -> None:
@@ -202,8 +208,8 @@ class TcpServer(Channel):
             # Nobody there any more, or a fault of the connection and not of the listener.
             return
         if len(self._clients) >= MAX_CLIENTS:
-            silent = next((c for c in self._clients if c not in self._heard), None)
-            if silent is None:
+            silent = min(self._clients, key=lambda c: self._heard.get(c, -math.inf))
+            if self._now - self._heard.get(silent, -math.inf) <= EXPIRY:
                 connection.close()
                 return
             self._drop(silent)
@@ -215,20 +221,22 @@ class TcpServer(Channel):
         self._selector.register(connection, selectors.EVENT_READ)
 
     def _drop(self, connection: socket.socket) -> None:
-        self._heard.discard(connection)
+        self._heard.pop(connection, None)
         if self._clients.pop(connection, None):
             self._selector.unregister(connection)
             connection.close()
 
     def heard(self, peer: Any, now: float) -> bool:
         """See :meth:`Channel.heard`."""
+        self._now = now
         new = peer in self._clients and peer not in self._heard
-        if new:
-            self._heard.add(peer)
+        if peer in self._clients:
+            self._heard[peer] = now
         return new
 
     def peers(self, now: float) -> Sequence[Peer]:
         """See :meth:`Channel.peers`."""
+        self._now = now
         return tuple(self._clients)
 
     def send(self, frame: bytes, peers: Sequence[Peer]) -> None:

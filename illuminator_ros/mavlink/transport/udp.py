@@ -33,7 +33,7 @@ MAX_PEERS = 32
 # s without a checked frame, after which a peer is forgotten. MAVSDK takes 10 s too.
 PEER_EXPIRY = 10.0
 # Datagrams read before other work gets its turn.
-BATCH = 256
+BATCH = 64
 # What a flight controller sends at once must fit; the kernel may allow less.
 RECEIVE_BUFFER = 4 * 1024 * 1024
 # The kernel or the network device has no room just now.
