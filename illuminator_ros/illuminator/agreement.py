@@ -55,6 +55,11 @@ class Agreement:
         # What the light has accepted and then not shown.
         self._unfulfilled: Configuration | None = None
 
+    @property
+    def changing(self) -> bool:
+        """Whether a command of ours is under way."""
+        return self._queue.current is not None
+
     # Requests
 
     def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
@@ -203,7 +208,7 @@ class Agreement:
                 # It kept its configuration, or got it back from somebody else.
                 self._wanted.clear()
                 self._restoring = False
-        else:
+        elif self._light.sharing.settled and not self._light.sharing.recognised:
             self._follow(status, self.agreed, reported)
 
     def _follow(self, status: Status, agreed: Configuration, reported: Configuration) -> None:

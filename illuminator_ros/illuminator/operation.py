@@ -86,6 +86,8 @@ class Operation(ABC):
         self._submitted = now
         self._outcome: Outcome | None = None
         self._contradiction: Status | None = None
+        # Statuses in a row that show the change.
+        self._shown = 0
         self._accepted_at = math.inf
         self._confirm_until = math.inf
         self._ask_at = math.inf
@@ -141,11 +143,15 @@ class Operation(ABC):
         """Take a status that is newer than all before."""
         if not self.confirming:
             return
-        if self.shown_by(status):
+        if not self.shown_by(status):
+            self._contradiction = status
+            self._shown = 0
+            return
+        self._shown += 1
+        # Of several lights that report in turn, not only the first must show it.
+        if self._shown >= (2 if self.light.sharing.recognised else 1):
             self.accepted(status)
             self._finish(self._success('confirmed by ILLUMINATOR_STATUS', now), now)
-        else:
-            self._contradiction = status
 
     def supersede(self, now: float) -> None:
         """End an accepted change without its confirmation: a newer one replaces it."""
@@ -170,7 +176,9 @@ class Operation(ABC):
         if self._contradiction is not None:
             found = ', '.join(filter(None, (
                 self.found(self._contradiction),
-                *flag_names(self._contradiction.error_flags))))
+                *flag_names(self._contradiction.error_flags),
+                f'several lights answer as {self.light.source}'
+                if self.light.sharing.recognised else '')))
             self._failure(f'but ILLUMINATOR_STATUS shows {found}', now, contradicted=True)
         elif self.light.sends_status:
             waited = format_seconds(now - self._accepted_at)
@@ -211,7 +219,8 @@ class Enable(Operation):
 
     def command(self) -> Command:
         """See :meth:`Operation.command`."""
-        return Command(self.light.source, MavCmd.ILLUMINATOR_ON_OFF, (float(self.on),))
+        return Command(self.light.source, MavCmd.ILLUMINATOR_ON_OFF,
+                       (float(self.on), float(self.light.instance)))
 
     def shown_by(self, status: Status) -> bool:
         """See :meth:`Operation.shown_by`."""
@@ -256,7 +265,8 @@ class Configure(Operation):
     def command(self) -> Command:
         """See :meth:`Operation.command`."""
         return Command(
-            self.light.source, MavCmd.DO_ILLUMINATOR_CONFIGURE, self.wanted.params())
+            self.light.source, MavCmd.DO_ILLUMINATOR_CONFIGURE,
+            (*self.wanted.params(), float(self.light.instance)))
 
     def shown_by(self, status: Status) -> bool:
         """See :meth:`Operation.shown_by`."""
