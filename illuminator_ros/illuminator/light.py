@@ -141,6 +141,7 @@ class Light:
             self._status_due = math.inf
             self.sharing.clear()
             self.observer.lost(self, reason)
+            self.agreement.lost(reason)
 
     def _restarted(self, now: float) -> None:
         self.restarts += 1

@@ -46,6 +46,10 @@ IDLE = 1.0
 STORE_INTERVAL = 30.0
 # s that a channel stays open, or a frame over it, until it counts as one that leads somewhere.
 PROBATION = 1.0
+# s without anything good from anybody, longer than between heartbeats; and then between
+# greetings. A router that has restarted passes nothing on to us until it has heard us.
+SILENCE = 1.5
+KNOCK_INTERVAL = 0.25
 # s; after a fault of ours the loop goes on no faster, and shows no more of them, than this.
 FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
@@ -143,6 +147,7 @@ class Link:
         # whether the one before never did.
         self._proven_at = math.inf
         self._doubtful = False
+        self._knock_at = math.inf
         self._pause = 0.0
         self._fault_log_due = -math.inf
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
@@ -214,7 +219,7 @@ class Link:
 
     def _turn(self) -> None:
         due = min(self.endpoint.next_deadline(), self._reception.next_deadline(),
-                  self._proven_at)
+                  self._proven_at, self._knock_at)
         wait = min(max(due - self.clock(), self._pause), IDLE)
         self._pause = 0.0
         for key, events in self._selector.select(wait):
@@ -283,6 +288,7 @@ class Link:
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if self._proven_at < math.inf:
             self._prove(channel, now)
+        self._knock_at = now + SILENCE
         self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
             self._guarded(self.endpoint.link_opened, now)
@@ -296,6 +302,9 @@ class Link:
             self._prove(channel, now)
         for peer, frame in self._reception.give_up(now, self._wall_clock()):
             self._accept(channel, peer, frame, now)
+        if now >= self._knock_at:
+            self._knock_at = now + KNOCK_INTERVAL
+            self._guarded(self.endpoint.link_opened, now)
 
     def _flush(self) -> None:
         """Send what the endpoint has to say; without a channel it is said to nobody."""
@@ -329,6 +338,7 @@ class Link:
             return
         self._channel = channel
         self._proven_at = now + PROBATION
+        self._knock_at = now + KNOCK_INTERVAL
         channel.register(self._selector)
         self._guarded(self.endpoint.link_opened, now)
         self._flush()
@@ -381,6 +391,6 @@ class Link:
         channel, self._channel = self._channel, None
         with contextlib.suppress(OSError):
             channel.close()
-        self._proven_at = math.inf
+        self._proven_at = self._knock_at = math.inf
         self._reception.clear()
         self._routes.clear()
