@@ -39,7 +39,7 @@ from .model import Identity, Status
 MAX_LIGHTS = 128
 # Lost lights that are looked for at once, so that a slow line is not filled.
 MAX_ASKED = 8
-# s for which a heartbeat from our own address counts as a clash.
+# s for which a message from our own address counts as a clash.
 CLASH_MEMORY = 10.0
 
 
@@ -53,7 +53,7 @@ class Controller(Endpoint):
     :param identity: our own address.
     :param on_light: called with each light when it is first heard.
     :ivar lights: those found so far, by address, in the order in which they were found.
-    :ivar clash_at: when a heartbeat from our own address was last heard.
+    :ivar clash_at: when somebody else was last heard from our own address.
     :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
     """
 
@@ -95,8 +95,8 @@ class Controller(Endpoint):
     def receive(self, source: Source, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         if source == self.identity:
-            if isinstance(message, HeartbeatMessage):
-                self.clash_at = now
+            # What we have sent ourselves and comes back does not get here: the link drops it.
+            self.clash_at = now
             return
         if isinstance(message, IlluminatorStatus):
             light = self._light(source)
