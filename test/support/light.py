@@ -55,6 +55,7 @@ class _Recorder(FakeLight):
     A fake light that keeps what it got, and can answer late.
 
     :ivar delays: s from each command to its being taken, by MAV_CMD.
+    :ivar steps: what it rounds brightness to, 0 for nothing.
     :ivar most_at_once: how many commands, resends not counted, it ever had to take at a time.
     """
 
@@ -64,6 +65,7 @@ class _Recorder(FakeLight):
         self.received: list[Any] = []
         self.changed = threading.Condition()
         self.delays: dict[int, float] = {}
+        self.steps = 0.0
         self.most_at_once = 0
         self._late: list[tuple[float, Source, Any]] = []
 
@@ -79,6 +81,12 @@ class _Recorder(FakeLight):
             self.most_at_once = max(self.most_at_once, len(first_tries))
         else:
             super().receive(source, message, now)
+
+    def status(self, now: float) -> Any:
+        if self.steps:
+            self.fields['brightness'] = (
+                round(self.fields['brightness'] / self.steps) * self.steps)
+        return super().status(now)
 
     def poll(self, now: float) -> None:
         while self._late and self._late[0][0] <= now:

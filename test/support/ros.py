@@ -257,23 +257,27 @@ class Parameters:
         """Set parameters with one call of set_parameters; return the results."""
         return list(self.start_set(**values).result().results)
 
-    def start_set(self, **values: Any) -> Call:
+    def start_set(self, *, atomically: bool = False, **values: Any) -> Call:
         """Begin to set parameters."""
-        return self.start(SetParameters, 'set_parameters', parameters=messages(values))
+        type_, service = ((SetParametersAtomically, 'set_parameters_atomically')
+                          if atomically else (SetParameters, 'set_parameters'))
+        return self.start(type_, service, parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()])
 
     def set_atomically(self, **values: Any) -> Any:
         """Set all parameters or none; return the result."""
-        return self.start(SetParametersAtomically, 'set_parameters_atomically',
-                          parameters=messages(values)).result().result
+        return self.start_set(atomically=True, **values).result().result
 
     def wait(self, **values: Any) -> None:
         """Wait until parameters have these values."""
         eventually(lambda: self.get(*values) == list(values.values()))
 
-
-def messages(values: Mapping[str, Any]) -> list[Any]:
-    """Return Parameter messages; a value that is a ParameterValue is taken as it is."""
-    return [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+    def wait_range(self, name: str, high: float) -> None:
+        """Wait until the range of a number ends at ``high``."""
+        def ends() -> float:
+            [descriptor] = self.describe(name)
+            return float(descriptor.floating_point_range[0].to_value)
+        eventually(lambda: ends() == high)
 
 
 def start_bridge(
