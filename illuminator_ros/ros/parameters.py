@@ -110,6 +110,7 @@ LINK_PARAMETERS = (
                   high=255),
     ParameterSpec('target_component', 0, 'component id of the light to serve; 0 = any', low=0,
                   high=255),
+    ParameterSpec('only_target', False, 'leave lights alone that the target does not select'),
     ParameterSpec('names', [''], 'node names of further lights, such as 1/244=belly'),
     ParameterSpec('heartbeat_timeout', 3.0, 'silence after which the light is lost', 's', 1.1,
                   3600.0),
@@ -146,6 +147,7 @@ class LinkParameters:
     url: Url
     identity: Source
     target: Source
+    only_target: bool
     names: Mapping[Source, str]
     heartbeat_timeout: float
     command_timeout: float
@@ -179,15 +181,16 @@ def declare_link_parameters(node: Node) -> LinkParameters:
     return LinkParameters(
         url=url, identity=Source(values['system_id'], values['component_id']),
         target=Source(values['target_system'], values['target_component']),
-        names=_parse_names(values['names']), signing_mode=SigningMode(values['signing_mode']),
+        names=_parse_names(values['names'], node.get_name()),
+        signing_mode=SigningMode(values['signing_mode']),
         **{name: values[name] for name in (
-            'heartbeat_timeout', 'command_timeout', 'command_retries', 'status_interval',
-            'off_on_shutdown', 'restore_configuration', 'signing_key_file',
+            'only_target', 'heartbeat_timeout', 'command_timeout', 'command_retries',
+            'status_interval', 'off_on_shutdown', 'restore_configuration', 'signing_key_file',
             'connection_url', 'frame_id', 'diagnostics_period')})
 
 
-def _parse_names(entries: list[str]) -> dict[Source, str]:
-    names = {}
+def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
+    names: dict[Source, str] = {}
     for entry in filter(None, entries):
         ids, equals, name = entry.partition('=')
         system, slash, component = ids.partition('/')
@@ -196,6 +199,8 @@ def _parse_names(entries: list[str]) -> dict[Source, str]:
             raise ParameterError(f'names: {entry!r} is not of the form 1/244=belly')
         if not (name.replace('_', 'a').isalnum() and name.isascii() and not name[0].isdigit()):
             raise ParameterError(f'names: {name!r} in {entry!r} is no node name')
+        if name in (first, *names.values()):
+            raise ParameterError(f'names: {name!r} in {entry!r} is taken already')
         names[Source(int(system), int(component))] = name
     return names
 
