@@ -72,12 +72,10 @@ class IlluminatorNode(Node):
         self.outputs = Outputs(self, frame_id, self._check_levels)
         self.inputs = Inputs(self, link, lambda: self.light, self.absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
-        # On a steady clock: with use_sim_time and no /clock a ROS timer never fires. A timer
-        # that fires often also lets the executor notice SIGTERM, which it otherwise may miss.
+        # On a steady clock: with use_sim_time and no /clock a ROS timer never fires.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        group = ReentrantCallbackGroup()
-        self.create_timer(period, self.publish_diagnostics, group, self._steady)
-        self.create_timer(0.25, lambda: None, group, self._steady)
+        self.create_timer(period, self.publish_diagnostics, ReentrantCallbackGroup(),
+                          self._steady)
 
     def bind(self, light: Light, now: float) -> None:
         """Serve a light from now on, and tell what is known of it; in the link's thread."""
