@@ -107,12 +107,13 @@ class Sharing:
 
         :param commanded: whether a command of ours may have changed the light.
         """
-        has_clock = any(one.uptime_ms != status.uptime_ms for one in self._recent)
-        if has_clock and status in self._recent:
+        uptime = status.uptime_ms
+        has_clock = any(one.uptime_ms != uptime for one in self._recent)
+        if has_clock and any(one.uptime_ms == uptime and one == status for one in self._recent):
             # The same frame, by another way.
             return
         if has_clock or not self._recent:
-            self._starts.add(now * 1000.0 - status.uptime_ms)
+            self._starts.add(now * 1000.0 - uptime)
         self._recent.append(status)
         if not commanded:
             repeated = self._states.add(status)
@@ -135,6 +136,8 @@ class Sharing:
 
 def _same_state(one: Status, other: Status) -> bool:
     """Return whether a light may show both without having been changed."""
+    if _shown(one) == _shown(other):
+        return True
     if one.mode is other.mode is Mode.EXTERNAL_SYNC:
         # Its output follows another signal.
         return True
@@ -146,6 +149,11 @@ def _same_state(one: Status, other: Status) -> bool:
         return True
     names = unexplained(first, second, 0, step=True)
     return not [name for name in names if not (hot and name == 'brightness')]
+
+
+def _shown(status: Status) -> tuple[object, ...]:
+    return (status.enabled, status.mode, status.brightness, status.strobe_period,
+            status.strobe_duty_cycle)
 
 
 def _same_start(one: float, other: float) -> bool:
