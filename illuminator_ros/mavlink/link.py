@@ -211,8 +211,9 @@ class Link:
         # No channel is handed over any more, and one that just was is among the calls.
         self._opener.stop()
         self._run_calls()
-        self._store_timestamp(last=True)
+        self._guarded(self._store_timestamp, True)
         self._close()
+        self._since, self._reason = self.clock(), 'stopped'
         self._release()
 
     def _release(self) -> None:
@@ -237,7 +238,7 @@ class Link:
         self._guarded(self.endpoint.poll, self.clock())
         self._flush()
         if self.clock() >= self._store_due:
-            self._store_timestamp()
+            self._guarded(self._store_timestamp)
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         """Call what is not ours: its fault must not end the link, nor anything else in it."""
@@ -257,7 +258,7 @@ class Link:
         for _ in range(len(self._calls)):
             self._guarded(self._calls.popleft(), self.clock())
 
-    def _store_timestamp(self, *, last: bool = False) -> None:
+    def _store_timestamp(self, last: bool = False) -> None:
         """Keep the time stamp for the next run ("Timestamp Handling")."""
         self._store_due = self.clock() + STORE_INTERVAL
         if self._store is not None:

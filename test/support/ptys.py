@@ -16,13 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import contextlib
 import itertools
 import os
 from pathlib import Path
 import select
 import threading
-import time
 
 from support.frames import frame_of
 from support.waiting import PATIENCE
@@ -77,17 +77,18 @@ class PtyDevice:
         except (BlockingIOError, OSError):
             return b''
 
-    def connect_light(self) -> _Light:
+    def connect_light(self, clock: Callable[[], float]) -> _Light:
         """Let a simulated light use the far end, until it is stopped."""
-        return _Light(self._far)
+        return _Light(self._far, clock)
 
 
 class _Light:
     """A simulated light at the far end of a serial line."""
 
-    def __init__(self, line: int) -> None:
+    def __init__(self, line: int, clock: Callable[[], float]) -> None:
         self._line = line
-        self._endpoint = Devices([DeviceProperties()], time.monotonic())
+        self._clock = clock
+        self._endpoint = Devices([DeviceProperties()], clock())
         self._decoder = Decoder()
         self._stopping, self._stop = os.pipe()
         self._thread = threading.Thread(target=self._run)
@@ -102,7 +103,7 @@ class _Light:
     def _run(self) -> None:
         sequence = itertools.count()
         while True:
-            now = time.monotonic()
+            now = self._clock()
             self._endpoint.poll(now)
             while self._endpoint.outgoing:
                 source, message = self._endpoint.outgoing.popleft()
@@ -126,4 +127,4 @@ class _Light:
             if frame.message_id in HANDLED:
                 self._endpoint.receive(
                     frame.source, decode_payload(frame.message_id, frame.payload),
-                    time.monotonic())
+                    self._clock())

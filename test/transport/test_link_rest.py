@@ -38,7 +38,7 @@ Run = Callable[[LiveLink], LiveLink]
 @pytest.fixture
 def clock() -> Jump:
     """Return a clock that can be set forward."""
-    return Jump(time.monotonic)
+    return Jump()
 
 
 def jump(link: LiveLink, clock: Jump, seconds: float) -> None:

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 import socket
 import threading
-import time
 from typing import Any, Protocol
 
 import pytest
@@ -43,13 +42,14 @@ class Other(Protocol):
 
 
 class _TcpServer:
-    def __init__(self) -> None:
+    def __init__(self, clock: Jump) -> None:
+        self._clock = clock
         self._port = free_port(socket.SOCK_STREAM)
         self.url = f'tcp://127.0.0.1:{self._port}'
         self._lights: LiveLink | None = None
 
     def come(self) -> None:
-        self._lights = Lights(f'tcpin://127.0.0.1:{self._port}')
+        self._lights = Lights(f'tcpin://127.0.0.1:{self._port}', clock=self._clock)
         self._lights.wait_open()
 
     def go(self) -> None:
@@ -58,7 +58,8 @@ class _TcpServer:
 
 
 class _SerialDevice:
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, clock: Jump, directory: Path) -> None:
+        self._clock = clock
         self._device = PtyDevice(directory)
         self._device.pull_out()
         self.url = f'serial://{self._device.path}:57600'
@@ -66,7 +67,7 @@ class _SerialDevice:
 
     def come(self) -> None:
         self._device.plug_in()
-        self._light = self._device.connect_light()
+        self._light = self._device.connect_light(self._clock)
 
     def go(self) -> None:
         if self._light:
@@ -78,13 +79,14 @@ class _SerialDevice:
 class _UdpLight:
     """A light that takes another port each time."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Jump) -> None:
+        self._clock = clock
         self._port = free_port()
         self.url = f'udpin://127.0.0.1:{self._port}'
         self._lights: LiveLink | None = None
 
     def come(self) -> None:
-        self._lights = Lights(f'udpout://127.0.0.1:{self._port}')
+        self._lights = Lights(f'udpout://127.0.0.1:{self._port}', clock=self._clock)
 
     def go(self) -> None:
         if self._lights:
@@ -94,10 +96,10 @@ class _UdpLight:
 class _Router:
     """A light behind a UDP router, which is what goes and comes."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Jump) -> None:
         self._relay = Relay()
         self.url = f'udpout://127.0.0.1:{self._relay.near_port}'
-        self._lights = Lights(f'udpout://127.0.0.1:{self._relay.far_port}')
+        self._lights = Lights(f'udpout://127.0.0.1:{self._relay.far_port}', clock=clock)
 
     def come(self) -> None:
         self._relay.start()
@@ -110,25 +112,27 @@ class _Router:
         self._lights.stop()
 
 
+@pytest.fixture
+def clock() -> Jump:
+    """Return a clock that can be set forward, so that silence takes no time."""
+    return Jump()
+
+
 @pytest.fixture(params=['tcp', 'serial', 'udp', 'router'])
-def other(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Other]:
+def other(
+    request: pytest.FixtureRequest, tmp_path: Path, clock: Jump,
+) -> Iterator[Other]:
     """Return the other side of a link, not there yet."""
     one: Any
     if request.param == 'serial':
         pytest.importorskip('serial', reason='pyserial is not installed')
-        one = _SerialDevice(tmp_path)
+        one = _SerialDevice(clock, tmp_path)
     else:
-        one = {'tcp': _TcpServer, 'udp': _UdpLight, 'router': _Router}[request.param]()
+        one = {'tcp': _TcpServer, 'udp': _UdpLight, 'router': _Router}[request.param](clock)
     yield one
     one.go()
     if isinstance(one, _Router):
         one.close()
-
-
-@pytest.fixture
-def clock() -> Jump:
-    """Return a clock that can be set forward, so that silence takes no time."""
-    return Jump(time.monotonic)
 
 
 @pytest.fixture
