@@ -87,6 +87,9 @@ class ParameterSpec:
             value = float(value)
         if wanted is list and isinstance(value, list | tuple):
             value = list(value)
+        if value is False and 'off' in self.choices:
+            # For YAML, on the command line too, a bare off is a boolean.
+            value = 'off'
         if type(value) is not wanted:
             raise ParameterError(f'{self.name}: {value!r} is no {_TYPE_NAMES[wanted]}')
         if self.choices and value not in self.choices:
@@ -199,9 +202,12 @@ def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
             raise ParameterError(f'names: {entry!r} is not of the form 1/244=belly')
         if not (name.replace('_', 'a').isalnum() and name.isascii() and not name[0].isdigit()):
             raise ParameterError(f'names: {name!r} in {entry!r} is no node name')
-        if name in (first, *names.values()):
-            raise ParameterError(f'names: {name!r} in {entry!r} is taken already')
-        names[Source(int(system), int(component))] = name
+        source = Source(int(system), int(component))
+        if source in names or name in names.values():
+            raise ParameterError(f'names: {entry!r} repeats an address or a name')
+        if name == first:
+            raise ParameterError(f'names: {entry!r} is the name of the first node')
+        names[source] = name
     return names
 
 

@@ -38,6 +38,9 @@ from .spinner import Spinner
 OFF_LIMIT = 0.5
 STOP_LIMIT = 0.15
 THREADS_LIMIT = 0.1
+# s between looks at whether diagnostics are due or have got worse. One thread does for all nodes:
+# timers of their own would have as many executors wake up each time.
+TICK = 0.25
 
 
 class BridgeProcess:
@@ -73,12 +76,23 @@ class BridgeProcess:
         _forward_logs(node)
         self._ended = threading.Event()
         self._spinners = [Spinner(node)]
-        self._threads: list[threading.Thread] = []
+        self._tick = min(TICK, parameters.diagnostics_period)
+        self._threads = [threading.Thread(target=self._poll, name='diagnostics', daemon=True)]
         # Nodes are made one after the other: each takes time of everybody.
         self._making = threading.Lock()
 
+    def _poll(self) -> None:
+        while not self._ended.wait(self._tick):
+            for node in list(self.nodes):
+                try:
+                    node.poll(self._tick / 2)
+                except Exception as error:
+                    node.get_logger().error(
+                        f'internal error: {error!r}', throttle_duration_sec=5.0)
+
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
+        self._threads[0].start()
         self.link.start()
         self._spinners[0].run()
         self._stop()
@@ -151,7 +165,7 @@ class BridgeProcess:
         else:
             logger.warning(f'link not open: {event.name}: {event.reason}; trying again')
         for node in list(self.nodes):
-            node.link_changed()
+            node.publish_diagnostics()
 
     def _stop(self) -> None:
         """Switch the lights off if that is wanted, and end all; takes 0.75 s at most."""

@@ -138,12 +138,8 @@ def test_a_wrong_parameter_of_a_further_light_is_named_and_the_others_go_on(
     assert light_of(own_ros, '/illuminator', lights) == FIRST
 
 
-@pytest.mark.parametrize(('names', 'reason'), [
-    ('["1/244=belly", "1/245=belly"]', "'belly' in '1/245=belly' is taken already"),
-    ('["1/244=illuminator"]', "'illuminator' in '1/244=illuminator' is taken already"),
-])
-def test_a_name_cannot_be_given_twice(own_ros: Ros, names: str, reason: str) -> None:
-    done = run('illuminator_ros.bridge', '--ros-args', '-p', f'names:={names}',
-               env={'ROS_DOMAIN_ID': str(own_ros.domain)})
+def test_no_light_can_have_the_name_of_the_first_node(own_ros: Ros) -> None:
+    done = run('illuminator_ros.bridge', '--ros-args', '-r', '__node:=spot',
+               '-p', 'names:=["1/244=spot"]', env={'ROS_DOMAIN_ID': str(own_ros.domain)})
     assert done.returncode == 2
-    assert f'parameter names: {reason}' in done.stderr
+    assert "parameter names: '1/244=spot' is the name of the first node" in done.stderr
