@@ -186,6 +186,9 @@ class BridgeProcess:
         deadline = time.monotonic() + THREADS_LIMIT
         for thread in self._threads:
             thread.join(max(deadline - time.monotonic(), 0))
+        # Left to the interpreter's end, many nodes take long where no signal's limit holds.
+        for node in self.nodes:
+            node.destroy_node()
 
 
 def without_node_name(arguments: list[str]) -> list[str]:
