@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A silent light among others: does it delay them?
+A silent light among others: by how much it delays them.
 
   python3 bench/parallel.py         needs ROS
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import sys
 
+from .entry import enter
 from .termination import Termination
 
 
@@ -27,10 +28,11 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name.
     """
-    termination = Termination()
-    # Slow to import: a signal meanwhile must end the process as one later does.
-    from .simulation import run
-    return run(args, termination)
+    def run(termination: Termination) -> int:
+        from . import simulation
+        return simulation.run(args, termination)
+
+    return enter('simulator', run)
 
 
 if __name__ == '__main__':

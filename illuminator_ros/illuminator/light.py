@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from ..mavlink.command import Command, CommandSender, format_seconds, Outcome
+from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
 from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 from .agreement import Agreement
 from .identification import Identification
@@ -29,7 +29,7 @@ from .observer import LightObserver
 from .operation import Done, Enable, OperationQueue, Result
 from .refresh import Refresh
 from .sharing import Sharing
-from .uptime import compare_uptime, Uptime
+from .uptime import compare_uptime, SendingTimes, Uptime
 
 # s without a status after which the light is asked for one, and between the askings.
 STATUS_TIMEOUT = 2.5
@@ -88,6 +88,7 @@ class Light:
         self._status_due = math.inf
         # Whether it was lost since the newest status.
         self._was_away = False
+        self._sending_times = SendingTimes()
         self._refreshes: list[Refresh] = []
 
     # What comes in
@@ -120,9 +121,11 @@ class Light:
         self.measures_temperature |= bool(status.temperature)
         if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and was_away):
             self._restarted(now)
+        sent_by = (now if self.sharing.recognised
+                   else self._sending_times.sent_by(status.uptime_ms, now))
         if self._switching.current:
-            self._switching.current.status(status, now)
-        self.agreement.take_status(status, now)
+            self._switching.current.status(status, sent_by, now)
+        self.agreement.take_status(status, sent_by, now)
         self._tell_refreshes(lambda refresh: refresh.status(now))
         # Last, since it takes longest: whoever waits for the status has been answered by then.
         self.observer.status(self, status)
@@ -145,6 +148,7 @@ class Light:
 
     def _restarted(self, now: float) -> None:
         self.restarts += 1
+        self._sending_times = SendingTimes()
         self.observer.restarted(self)
         self._set_up(now)
         self.agreement.restarted(now)
@@ -197,6 +201,13 @@ class Light:
         else:
             self._switching.submit(Enable(self, on, done, now=now), now)
             self.changed()
+
+    def cancel(self, now: float) -> None:
+        """End all requests, so that the next one is sent at once: a node's last to its light."""
+        self._switching.cancel(now)
+        self.agreement.cancel(now)
+        self.sender.end_all(now, Ending.CANCELLED, self.source)
+        self.changed()
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
