@@ -43,6 +43,7 @@ setup(
     entry_points={
         'console_scripts': [
             'bridge = illuminator_ros.bridge:main',
+            'conformance = illuminator_ros.conformance:main',
             'simulator = illuminator_ros.simulator:main',
         ],
     },

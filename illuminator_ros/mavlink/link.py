@@ -28,7 +28,7 @@ import threading
 import time
 from typing import Any
 
-from .dialect import decode_payload, encode_payload, HANDLED, LAYOUTS, Source
+from .dialect import decode_payload, encode_payload, HANDLED, Source
 from .endpoint import Endpoint
 from .framing import DecoderCounters, encode_frame, Frame
 from .opener import Opener
@@ -313,7 +313,7 @@ class Link:
         self._sequences[source] = (sequence + 1) & 0xFF
         frame = encode_frame(
             message.id, encode_payload(message), sequence=sequence, source=source,
-            crc_extra=LAYOUTS[message.id].crc_extra, signed=self._signing.signs)
+            crc_extra=message.crc_extra, signed=self._signing.signs)
         if self._signing.signs:
             frame = self._signing.sign(frame, self._wall_clock())
         peers = self._routes.towards(message, channel.peers(self.clock()), self.clock())
