@@ -1,3 +1,17 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """
 What a light is tested on: talks to it, and keeps all that was said. No I/O; time is passed in.
 
@@ -55,6 +69,10 @@ LOW = 10.0
 T = TypeVar('T')
 
 
+# What is wrong, and the lines of the exchange that show it.
+Finding = tuple[str, list[str]]
+
+
 class LightGone(Exception):
     """The light has fallen silent."""
 
@@ -110,6 +128,11 @@ class Transaction:
         return 'no acknowledgement' if self.result is None else result_name(self.result)
 
 
+    def finding(self, what: str = '') -> Finding:
+        """Return what is wrong with the answer, and the lines that show it."""
+        return f'{self.text}: {what or self.answer}', self.lines
+
+
 class Bench(Endpoint):
     """
     The tester's side.
@@ -141,8 +164,8 @@ class Bench(Endpoint):
         self.informations: list[Any] = []
         self.rest: list[tuple[float, Status]] = []
         self.transactions: list[Transaction] = []
-        self.disagreements: list[tuple[str, list[str]]] = []
-        self.disobediences: list[tuple[str, list[str]]] = []
+        self.disagreements: list[Finding] = []
+        self.disobediences: list[Finding] = []
         self.log: list[str] = []
         self._target = target
         self._began: float | None = None
@@ -395,8 +418,8 @@ class Bench(Endpoint):
             f'{one.text}: then {" and ".join(differ(status))} in {status_text(status)}',
             one.lines + self.log[begun:][-2:]))
 
-    async def refused(self, command: int, params: tuple[float, ...]) -> str:
-        """Send what has to be denied; return what is wrong with the answer, '' if nothing."""
+    async def refused(self, command: int, params: tuple[float, ...]) -> Finding | None:
+        """Send what has to be denied; return what is wrong with the answer, None if nothing."""
         before = await self.status()
         one = await self.command(command, *params)
         after = await self.status()
@@ -405,10 +428,10 @@ class Bench(Endpoint):
             self.disobediences.append((
                 f'{one.text}: {one.answer}, and then {status_text(after)}', one.lines))
         if one.result == MavResult.DENIED:
-            return ''
+            return None
         if one.accepted:
             await self.baseline()
-        return f'{one.text}: {one.answer}'
+        return one.finding()
 
     async def baseline(self) -> None:
         """Bring the light to where checks begin: off, at low brightness, without strobe."""

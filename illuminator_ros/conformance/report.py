@@ -1,3 +1,17 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a run has found, for people and for programs."""
 
 from __future__ import annotations
@@ -9,7 +23,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from .. import __version__
-from .requirement import Requirement, REQUIREMENTS, Result, Verdict
+from .requirement import HEARTBEAT, Requirement, REQUIREMENTS, Result, Verdict
 
 # Lines of the exchange that a table shows; the files have more.
 SHOWN_LINES = 12
@@ -60,10 +74,11 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
         text.append(f'{"":8}{result.detail}')
     if result.verdict is Verdict.FAIL or verbose:
         text.append(f'{"":8}see {section(one)}')
-        left_out = len(result.exchange) - SHOWN_LINES
-        if left_out > 0:
-            text.append(f'{"":8}  ... {left_out} lines more, all with --json')
-        text += [f'{"":8}  {exchanged}' for exchanged in result.exchange[-SHOWN_LINES:]]
+        said = [said for said in result.exchange
+                if one.specification is HEARTBEAT or ' HEARTBEAT ' not in said]
+        text += [f'{"":8}  {exchanged}' for exchanged in said[:SHOWN_LINES]]
+        if len(said) > SHOWN_LINES:
+            text.append(f'{"":8}  ... {len(said) - SHOWN_LINES} lines more, in --json')
     return text
 
 

@@ -1,8 +1,22 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a requirement is, and what becomes of it."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -21,6 +35,14 @@ class Failed(Exception):
     def __init__(self, reason: str, evidence: list[str] | None = None) -> None:
         super().__init__(reason)
         self.evidence = evidence
+
+
+def fail_if(findings: Sequence[tuple[str, list[str]] | None]) -> None:
+    """Raise if there is something wrong."""
+    wrong = [one for one in findings if one is not None]
+    if wrong:
+        raise Failed('; '.join(text for text, _ in wrong),
+                     [line for _, lines in wrong for line in lines])
 
 
 class Skipped(Exception):

@@ -1,3 +1,17 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A run: finds the light, checks each requirement, and leaves the light as it was. No I/O."""
 
 from __future__ import annotations
@@ -127,8 +141,8 @@ class Suite:
         except Exception as error:
             _log.exception('internal error in the check %s', one.name)
             verdict, detail = Verdict.FAIL, f'internal error in this check: {error!r}'
-        lines = bench.log[line:] if evidence is None else evidence
-        return Result(one, verdict, detail, lines[-MAX_LINES:], bench.now - begun)
+        lines = bench.log[line:][-MAX_LINES:] if evidence is None else evidence[:MAX_LINES]
+        return Result(one, verdict, detail, lines, bench.now - begun)
 
     async def _prepare(self, one: Requirement) -> None:
         """See that a check can be made at all."""

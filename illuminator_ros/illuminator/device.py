@@ -72,6 +72,7 @@ class DeviceProperties:
     :param status_interval: s between statuses unless told otherwise; 0 sends none.
     :param time_scale: how much faster than time the light gets hot.
     :param behaviour: what it does at first; :attr:`Device.behaviour` can change.
+    :param normal: what it does without faults.
     :param seed: of what happens by chance.
     """
 
@@ -86,6 +87,7 @@ class DeviceProperties:
     name: str = ''
     modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
     behaviour: Behaviour = Behaviour()
+    normal: Behaviour = Behaviour()
     seed: int = 0
 
 
@@ -148,6 +150,30 @@ class Device:
     def silent(self, now: float) -> bool:
         """Return whether the light neither hears nor says anything."""
         return now < self._silent_until
+
+    def press(self, now: float, *, enabled: bool | None = None, **changes: Any) -> None:
+        """
+        Switch or configure the light by itself, as with a button on it.
+
+        :raises InvalidValue: if it cannot be so.
+        """
+        configuration = self.configuration.with_changes({
+            name: checked(name, value, self.properties.limits)
+            for name, value in changes.items()})
+
+        def change() -> None:
+            self.configuration = configuration
+            if enabled is not None:
+                self.enabled = enabled
+            elif self.behaviour.joint_switch:
+                self.enabled = configuration.brightness > 0
+
+        self._apply(change, now)
+
+    def heat_to(self, temperature: float, now: float) -> None:
+        """Bring the light to a temperature, degC."""
+        self._warm(now)
+        self.thermal.temperature = temperature
 
     @property
     def source(self) -> Source:

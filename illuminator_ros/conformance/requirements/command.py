@@ -1,10 +1,24 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the command protocol asks of a light, whatever the command."""
 
 from __future__ import annotations
 
 from ...mavlink.dialect import MavCmd, MavResult, Source, STATUS_ID
 from ..bench import Bench
-from ..requirement import COMMAND, Failed, MESSAGES, requirement, ROUTING, Skipped
+from ..requirement import COMMAND, fail_if, Failed, MESSAGES, requirement, ROUTING, Skipped
 
 # No MAV_CMD, and none that will be one soon.
 UNKNOWN_COMMAND = 65000
@@ -39,9 +53,8 @@ async def broadcast(bench: Bench) -> None:
     for target in (Source(bench.light.system, 0), Source(0, 0)):
         one = await bench.command(MavCmd.REQUEST_MESSAGE, STATUS_ID, target=target)
         if one.result is None:
-            wrong.append(f'{one.text} to {target}: {one.answer}')
-    if wrong:
-        raise Failed('; '.join(wrong))
+            wrong.append(one.finding(f'to {target}: {one.answer}'))
+    fail_if(wrong)
 
 
 @requirement('other-target', 'neither answers nor does what is for others', ROUTING,
@@ -60,12 +73,11 @@ async def other_target(bench: Bench) -> None:
         one = await bench.overheard(other, MavCmd.ILLUMINATOR_ON_OFF, 1)
         status = await bench.status()
         if status is not None and status.enabled:
-            wrong.append(f'switched on by what was for {other}')
+            wrong.append((f'switched on by what was for {other}', [*one.lines, bench.log[-1]]))
             await bench.baseline()
         elif one.acks:
-            wrong.append(f'answered what was for {other}: {one.answer}')
-    if wrong:
-        raise Failed('; '.join(wrong))
+            wrong.append((f'answered what was for {other}: {one.answer}', one.lines))
+    fail_if(wrong)
 
 
 @requirement('command-int', 'takes COMMAND_INT, or says MAV_RESULT_COMMAND_LONG_ONLY', COMMAND,
@@ -75,7 +87,7 @@ async def command_int(bench: Bench) -> str:
     await bench.baseline()
     one = await bench.switch(True, as_int=True)
     if not one.accepted and one.result != MavResult.COMMAND_LONG_ONLY:
-        raise Failed(f'COMMAND_INT {one.text}: {one.answer}')
+        raise Failed(f'COMMAND_INT {one.text}: {one.answer}', one.lines)
     return one.answer
 
 

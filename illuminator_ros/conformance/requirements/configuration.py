@@ -1,3 +1,17 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """MAV_CMD_DO_ILLUMINATOR_CONFIGURE."""
 
 from __future__ import annotations
@@ -5,7 +19,7 @@ from __future__ import annotations
 from ...illuminator.model import float32, Limits, Mode
 from ...mavlink.dialect import MavCmd, MavResult
 from ..bench import Bench, LOW, Transaction
-from ..requirement import Failed, ILLUMINATOR, MESSAGES, requirement, Skipped
+from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 INTERNAL = float(Mode.INTERNAL_CONTROL)
@@ -13,16 +27,12 @@ NAN, INF = float('nan'), float('inf')
 
 
 def _all_accepted(transactions: list[Transaction]) -> None:
-    wrong = [f'{one.text}: {one.answer}' for one in transactions if not one.accepted]
-    if wrong:
-        raise Failed('; '.join(wrong))
+    fail_if([one.finding() for one in transactions if not one.accepted])
 
 
 async def _all_refused(bench: Bench, values: list[tuple[float, ...]]) -> None:
     await bench.baseline()
-    wrong = [await bench.refused(CONFIGURE, value) for value in values]
-    if any(wrong):
-        raise Failed('; '.join(filter(None, wrong)))
+    fail_if([await bench.refused(CONFIGURE, value) for value in values])
 
 
 @requirement('mode-internal', 'takes internal control', ILLUMINATOR, 'MODES', changes=True)
@@ -146,5 +156,4 @@ async def not_a_number(bench: Bench) -> None:
             params = [INTERNAL, LOW, 0.0, 0.0]
             params[position] = value
             wrong.append(await bench.refused(CONFIGURE, tuple(params)))
-    if any(wrong):
-        raise Failed('; '.join(filter(None, wrong)))
+    fail_if(wrong)
