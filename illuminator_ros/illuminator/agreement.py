@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 CONFIGURE_LIMIT = 0.85
 # s between tries of overrides and restored configurations that got no answer.
 RESTORE_INTERVAL = 2.0
+# How often a light may accept one of these and show another: then it is left alone.
+MAX_CONTRADICTIONS = 3
+# s without a status after which a complete set of overrides is sent all the same.
+STATUS_PATIENCE = 3.0
 
 
 class Agreement:
@@ -52,6 +56,9 @@ class Agreement:
         self._wanted: dict[str, Any] = {}
         self._wanted_at = 0.0
         self._restoring = False
+        self._contradictions = 0
+        # Whether the last command failed: what it asked for may have been done nevertheless.
+        self._doubtful = False
         # What the light has accepted and then not shown.
         self._unfulfilled: Configuration | None = None
 
@@ -76,7 +83,7 @@ class Agreement:
 
         def finished(result: Result, now: float) -> None:
             if result.success:
-                self._wanted = {n: v for n, v in self._wanted.items() if n not in values}
+                self._want_no_more(values)
             done(result, now)
 
         self._submit(values, now, finished)
@@ -116,9 +123,6 @@ class Agreement:
             self._light.observer.setpoint_failed(self._light, unreachable)
             return
         self._setpoint = brightness
-        current = self._queue.current
-        if isinstance(current, Configure) and current.stream:
-            current.supersede(now)
         self.poll(now)
         self._light.changed()
 
@@ -130,12 +134,21 @@ class Agreement:
         """
         self._wanted.update(values)
         self._wanted_at = now
+        self._contradictions = 0
         self._light.changed()
+
+    def _want_no_more(self, names: Iterable[str]) -> None:
+        """Note that fields have been set otherwise, or not at all: they are not to be restored."""
+        for name in list(names):
+            self._wanted.pop(name, None)
+        if not self._wanted:
+            self._restoring = False
 
     def _submit(
         self, values: Mapping[str, Any], now: float, done: Done, *, stream: bool = False,
     ) -> None:
         def finished(result: Result, now: float) -> None:
+            self._doubtful = not result.success
             if result.contradicted:
                 self._unfulfilled = operation.wanted
                 self.discrepancy = result.message
@@ -183,6 +196,12 @@ class Agreement:
                           if name != 'mode' or agreed.mode}, **self._wanted}, now)
             self._restoring = True
 
+    def lost(self, reason: str) -> None:
+        """Note that the light is lost: a setpoint of now must not take effect when it is back."""
+        if self._setpoint is not None:
+            self._setpoint = None
+            self._light.observer.setpoint_failed(self._light, f'the light is lost: {reason}')
+
     def take_status(self, status: Status, now: float) -> None:
         """Confirm what is under way, or follow what somebody else has changed."""
         current = self._queue.current
@@ -201,8 +220,7 @@ class Agreement:
             wanted = self.agreed.with_changes(self._wanted)
             if not unexplained(wanted, reported, status.error_flags, step=True):
                 # It kept its configuration, or got it back from somebody else.
-                self._wanted.clear()
-                self._restoring = False
+                self._want_no_more(self._wanted)
         else:
             self._follow(status, self.agreed, reported)
 
@@ -218,22 +236,42 @@ class Agreement:
 
     def poll(self, now: float) -> None:
         """Send what is still to be sent, one command at a time."""
+        if self._setpoint is not None and self._replaceable:
+            self._replaceable.supersede(now)
         self._queue.poll(now)
         if self._queue.current is not None or not self._light.connected:
             return
         if self._setpoint is not None:
             value, self._setpoint = self._setpoint, None
             self._send_setpoint(value, now)
-        elif self._wanted and self.agreed is not None and now >= self._wanted_at:
+        elif now >= self._wanted_due:
             self._send_wanted(now)
 
+    @property
+    def _replaceable(self) -> Configure | None:
+        """The setpoint that is accepted and not confirmed yet: a newer one need not wait."""
+        current = self._queue.current
+        if isinstance(current, Configure) and current.stream and current.confirming:
+            return current
+        return None
+
+    @property
+    def _wanted_due(self) -> float:
+        """When the wanted values are to be sent."""
+        if self._wanted and self.agreed is not None:
+            return self._wanted_at
+        # A light that sends no status has nothing to add to a complete set.
+        if all(name in self._wanted for name in FIELDS):
+            return self._wanted_at + STATUS_PATIENCE
+        return math.inf
+
     def _send_setpoint(self, value: float, now: float) -> None:
-        if self.agreed is not None and self.agreed.brightness == value and not self.discrepancy:
+        if self.agreed is not None and self.agreed.brightness == value and not self._doubtful:
             return
 
         def finished(result: Result, now: float) -> None:
             if result.success:
-                self._wanted.pop('brightness', None)
+                self._want_no_more(['brightness'])
             else:
                 self._light.observer.setpoint_failed(self._light, result.message)
 
@@ -249,16 +287,16 @@ class Agreement:
             try:
                 checked(name, value, light.limits)
             except InvalidValue as error:
-                del self._wanted[name]
+                self._want_no_more([name])
                 observer.restored(light, False, str(error))
-        if not self._wanted:
-            self._restoring = False
+        if self._wanted_due == math.inf:
             return
 
         def finished(result: Result, now: float) -> None:
-            if result.success or result.permanent:
-                self._wanted.clear()
-                self._restoring = False
+            self._contradictions += result.contradicted
+            if (result.success or result.permanent
+                    or self._contradictions >= MAX_CONTRADICTIONS):
+                self._want_no_more(self._wanted)
                 observer.restored(light, result.success, result.message)
             if not result.success:
                 self.discrepancy = result.message
@@ -267,10 +305,10 @@ class Agreement:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        due = self._queue.next_deadline()
-        if self._queue.current is None and self._light.connected:
-            if self._setpoint is not None:
-                return -math.inf
-            if self._wanted and self.agreed is not None:
-                due = min(due, self._wanted_at)
-        return due
+        if not self._light.connected:
+            return self._queue.next_deadline()
+        if self._setpoint is not None and (self._queue.current is None or self._replaceable):
+            return -math.inf
+        if self._queue.current is not None:
+            return self._queue.next_deadline()
+        return self._wanted_due

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import itertools
 import math
 from typing import Any
 
@@ -36,6 +37,8 @@ from .model import Identity, Status
 
 # Lights that are kept apart; one more is passed over, so that memory is bounded.
 MAX_LIGHTS = 128
+# Lost lights that are looked for at once, so that a slow line is not filled.
+MAX_ASKED = 8
 # s for which a heartbeat from our own address counts as a clash.
 CLASH_MEMORY = 10.0
 
@@ -76,6 +79,10 @@ class Controller(Endpoint):
         """See :meth:`Endpoint.link_opened`."""
         self._link_open = True
         self._heartbeat.send(now, self.outgoing)
+        # Who is back answers at once; its own heartbeat may take a second.
+        lost = (light for light in self.lights.values() if not light.connected)
+        for light in itertools.islice(lost, MAX_ASKED):
+            light.request_status(now)
 
     def link_closed(self, now: float) -> None:
         """See :meth:`Endpoint.link_closed`."""

@@ -131,6 +131,7 @@ class Light:
             self._was_away = True
             self._status_due = math.inf
             self.observer.lost(self, reason)
+            self.agreement.lost(reason)
 
     def _restarted(self, now: float) -> None:
         self.restarts += 1

@@ -117,8 +117,11 @@ class Operation(ABC):
         return self._outcome is not None and not self.finished
 
     def start(self, now: float) -> None:
-        """Send the command."""
-        self.light.sender.start(self.command(), now, self._answered, limit=self.limit)
+        """Send the command, unless the light was lost while this has waited."""
+        if unreachable := self.light.unreachable(now):
+            self.fail(unreachable, now)
+        else:
+            self.light.sender.start(self.command(), now, self._answered, limit=self.limit)
 
     def _answered(self, outcome: Outcome, now: float) -> None:
         if not outcome.accepted:

@@ -245,12 +245,14 @@ class CommandSender:
             entry.progress = ack.progress if ack.progress <= 100 else None
             entry.due = now + PROGRESS_TIMEOUT
             entry.deadline = math.inf
-        elif ack.result == MavResult.TEMPORARILY_REJECTED and not entry.in_progress:
+        elif ack.result == MavResult.TEMPORARILY_REJECTED:
             first, last = REJECTED_BACKOFF
             entry.due = now + min(first * 2 ** min(entry.rejected, 8), last)
             entry.rejected += 1
             if entry.due >= min(entry.deadline, entry.limit):
-                self._end(entry, Ending.ANSWERED, now)
+                # A try that was never answered may be what keeps the target busy.
+                self._end(entry, Ending.ANSWERED if entry.rejected == entry.tries
+                          else Ending.OUT_OF_TIME, now)
         elif (ack.result == MavResult.COMMAND_INT_ONLY and not entry.in_progress
                 and now < entry.limit):
             entry.as_int = True
@@ -263,13 +265,14 @@ class CommandSender:
         """
         Return whether an acknowledgement is for a try that does not matter any more.
 
-        A resend that meets the first try at work is rejected for that, and a COMMAND_LONG may be
-        refused once more after the COMMAND_INT has gone out.
+        A try that meets an earlier one at work, or its own copy, is rejected for that. And a
+        COMMAND_LONG may be refused once more after the COMMAND_INT has gone out.
         """
         if result == MavResult.COMMAND_INT_ONLY:
             return entry.as_int
-        return (result == MavResult.TEMPORARILY_REJECTED and entry.in_progress
-                and entry.tries > 1)
+        if result == MavResult.TEMPORARILY_REJECTED:
+            return entry.in_progress or entry.rejected == entry.tries
+        return False
 
     def poll(self, now: float) -> None:
         """Resend or end what is due."""

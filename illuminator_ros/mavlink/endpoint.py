@@ -40,7 +40,11 @@ class Endpoint(ABC):
 
     @abstractmethod
     def link_opened(self, now: float) -> None:
-        """Note that messages can be sent, or that somebody new has come within hearing."""
+        """
+        Note that messages can be sent, or that somebody may have come within hearing.
+
+        It comes again and again while nobody is heard.
+        """
 
     def link_closed(self, now: float) -> None:  # noqa: B027 - not everybody cares
         """Note that nothing can be sent any more."""

@@ -46,6 +46,10 @@ IDLE = 1.0
 STORE_INTERVAL = 30.0
 # s that a channel stays open, or a frame over it, until it counts as one that leads somewhere.
 PROBATION = 1.0
+# s without anything good from anybody, longer than between heartbeats; and then between
+# greetings. A router that has restarted passes nothing on to us until it has heard us.
+SILENCE = 1.5
+KNOCK_INTERVAL = 0.25
 # s; after a fault of ours the loop goes on no faster, and shows no more of them, than this.
 FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
@@ -143,6 +147,7 @@ class Link:
         # whether the one before never did.
         self._proven_at = math.inf
         self._doubtful = False
+        self._knock_at = math.inf
         self._pause = 0.0
         self._fault_log_due = -math.inf
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
@@ -203,8 +208,9 @@ class Link:
         # No channel is handed over any more, and one that just was is among the calls.
         self._opener.stop()
         self._run_calls()
-        self._store_timestamp(last=True)
+        self._guarded(self._store_timestamp, True)
         self._close()
+        self._since, self._reason = self.clock(), 'stopped'
         self._release()
 
     def _release(self) -> None:
@@ -214,7 +220,7 @@ class Link:
 
     def _turn(self) -> None:
         due = min(self.endpoint.next_deadline(), self._reception.next_deadline(),
-                  self._proven_at)
+                  self._proven_at, self._knock_at)
         wait = min(max(due - self.clock(), self._pause), IDLE)
         self._pause = 0.0
         for key, events in self._selector.select(wait):
@@ -229,7 +235,7 @@ class Link:
         self._guarded(self.endpoint.poll, self.clock())
         self._flush()
         if self.clock() >= self._store_due:
-            self._store_timestamp()
+            self._guarded(self._store_timestamp)
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         """Call what is not ours: its fault must not end the link, nor anything else in it."""
@@ -249,7 +255,7 @@ class Link:
         for _ in range(len(self._calls)):
             self._guarded(self._calls.popleft(), self.clock())
 
-    def _store_timestamp(self, *, last: bool = False) -> None:
+    def _store_timestamp(self, last: bool = False) -> None:
         """Keep the time stamp for the next run ("Timestamp Handling")."""
         self._store_due = self.clock() + STORE_INTERVAL
         if self._store is not None:
@@ -283,6 +289,7 @@ class Link:
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if self._proven_at < math.inf:
             self._prove(channel, now)
+        self._knock_at = now + SILENCE
         self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
             self._guarded(self.endpoint.link_opened, now)
@@ -296,6 +303,9 @@ class Link:
             self._prove(channel, now)
         for peer, frame in self._reception.give_up(now, self._wall_clock()):
             self._accept(channel, peer, frame, now)
+        if now >= self._knock_at:
+            self._knock_at = now + KNOCK_INTERVAL
+            self._guarded(self.endpoint.link_opened, now)
 
     def _flush(self) -> None:
         """Send what the endpoint has to say; without a channel it is said to nobody."""
@@ -329,6 +339,7 @@ class Link:
             return
         self._channel = channel
         self._proven_at = now + PROBATION
+        self._knock_at = now + KNOCK_INTERVAL
         channel.register(self._selector)
         self._guarded(self.endpoint.link_opened, now)
         self._flush()
@@ -381,6 +392,6 @@ class Link:
         channel, self._channel = self._channel, None
         with contextlib.suppress(OSError):
             channel.close()
-        self._proven_at = math.inf
+        self._proven_at = self._knock_at = math.inf
         self._reception.clear()
         self._routes.clear()

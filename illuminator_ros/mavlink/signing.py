@@ -93,7 +93,11 @@ class Signing:
     _streams: dict[tuple[int, Source], int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.mode is not SigningMode.OFF and len(self.key) != KEY_SIZE:
+        if self.mode is SigningMode.OFF:
+            return
+        if not isinstance(self.key, bytes):
+            raise ValueError(f'signing needs a key of bytes, not {type(self.key).__name__}')
+        if len(self.key) != KEY_SIZE:
             raise ValueError(f'signing needs a key of {KEY_SIZE} bytes, not {len(self.key)}')
 
     @property

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import threading
 from typing import Any
 
 from rclpy.node import Node
@@ -52,6 +53,7 @@ class Inputs:
         self._absent = absent
         self._handover: Handover[Result] = Handover(node, link)
         self._setpoint: float | None = None
+        self._setting = threading.Lock()
         group = self._handover.group
         node.create_service(SetBool, '~/enable', self._enable, callback_group=group)
         node.create_service(Trigger, '~/refresh', self._refresh, callback_group=group)
@@ -112,14 +114,15 @@ class Inputs:
                 f'~/cmd/brightness: {error}', throttle_duration_sec=5.0)
             return
         assert isinstance(value, float)
-        waiting = self._setpoint is not None
-        self._setpoint = value
+        with self._setting:
+            waiting, self._setpoint = self._setpoint is not None, value
         if not waiting:
             self._link.call(self._hand_over_setpoint)
 
     def _hand_over_setpoint(self, now: float) -> None:
         """Pass on the newest setpoint, in the link's thread; those before it are gone."""
-        value, self._setpoint = self._setpoint, None
+        with self._setting:
+            value, self._setpoint = self._setpoint, None
         light = self._light()
         if light is None:
             self._node.get_logger().warning(

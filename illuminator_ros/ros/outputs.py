@@ -109,7 +109,7 @@ class Outputs(LightObserver):
             self._temperature.publish(temperature_message(temperature, stamp, self._frame_id))
         if status.limits != self._limits:
             self._limits = status.limits
-            self._narrow(status)
+            self._fit()
         self._changed()
 
     def configured(
@@ -119,6 +119,8 @@ class Outputs(LightObserver):
         if cause is Cause.LIGHT:
             self._node.get_logger().info(
                 f'light {light.source} was changed: {configuration.describe(names)}')
+        if 'strobe_period' in names:
+            self._fit(configuration.strobe_period)
         with self._mirroring:
             self._mirrored_by = threading.get_ident()
             try:
@@ -129,8 +131,8 @@ class Outputs(LightObserver):
                 self._mirrored_by = None
         if not result.successful:
             self._node.get_logger().error(f'cannot show the light: {result.reason}')
-        if light.status and Cause.FIRST_STATUS is cause:
-            self._narrow(light.status)
+        if 'strobe_period' in names:
+            self._fit()
 
     def restored(self, light: Light, success: bool, message: str) -> None:
         """See :meth:`LightObserver.restored`."""
@@ -146,16 +148,20 @@ class Outputs(LightObserver):
         self._node.get_logger().warning(
             f'~/cmd/brightness: {message}', throttle_duration_sec=5.0)
 
-    def _narrow(self, status: Status) -> None:
-        """Show in the descriptor what strobe periods the light reports to be possible."""
+    def _fit(self, period: float = 0.0) -> None:
+        """
+        Show in the descriptor what strobe periods the light reports to be possible.
+
+        :param period: what it also has to have room for, s: some lights report more.
+        """
         name = 'strobe_period'
         value = self._node.get_parameter_or(name).value
         if value is None:
             # rclpy cannot describe anew what has no value; that follows with the first one.
             return
-        longest = shortest(status.limits.max_strobe_period) if status.limits.known else 0.0
+        longest = shortest(self._limits.max_strobe_period) if self._limits.known else 0.0
         with self._mirroring:
-            self._node.set_descriptor(name, period_range(longest, value))
+            self._node.set_descriptor(name, period_range(longest, max(value, period)))
 
     def _may_set(self, parameters: list[Parameter]) -> SetParametersResult:
         """Refuse what would show something that the light has not accepted."""

@@ -25,9 +25,10 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 import contextlib
+import inspect
 from typing import Any
 
-from rcl_interfaces.msg import ParameterType, ParameterValue, SetParametersResult
+from rcl_interfaces.msg import ParameterValue, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -72,8 +73,25 @@ class ParameterServices:
             ('set_parameters', SetParameters, self._set),
             ('set_parameters_atomically', SetParametersAtomically, self._set_atomically),
         ):
-            node.create_service(service, f'~/{name}', callback,
+            node.create_service(service, f'~/{name}', self._answering(callback),
                                 qos_profile=qos_profile_parameters, callback_group=group)
+
+    def _answering(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        """Return a service callback that answers whatever goes wrong in it."""
+        async def answering(request: Any, response: Any) -> Any:
+            try:
+                answer = callback(request, response)
+                return await answer if inspect.isawaitable(answer) else answer
+            except Exception as error:
+                reason = f'internal error: {error!r}'
+                self._node.get_logger().error(reason)
+                failure = SetParametersResult(successful=False, reason=reason)
+                if isinstance(response, SetParameters.Response):
+                    response.results = [failure] * len(request.parameters)
+                elif isinstance(response, SetParametersAtomically.Response):
+                    response.result = failure
+                return response
+        return answering
 
     def _describe(self, request: Any, response: Any) -> Any:
         try:
@@ -110,55 +128,63 @@ class ParameterServices:
 
     async def _set(self, request: Any, response: Any) -> Any:
         """Set each parameter for itself, those of the light all with one command."""
-        parameters = [Parameter.from_parameter_msg(p) for p in request.parameters]
-        results = [SetParametersResult(successful=True) for _ in parameters]
+        results = [SetParametersResult() for _ in request.parameters]
         changes: dict[str, Any] = {}
-        for parameter, result in zip(parameters, results, strict=True):
-            reason = self._check(parameter)
-            if not reason and parameter.name in DEVICE_SPECS:
-                changes[parameter.name] = cast(parameter.name, parameter.value)
-            elif not reason:
-                reason = self._set_local([parameter])
-            result.successful, result.reason = not reason, reason
-        if changes:
-            reason = await self._configure(changes)
-            for parameter, result in zip(parameters, results, strict=True):
-                if parameter.name in changes and result.successful:
-                    result.successful, result.reason = not reason, reason
+        changing = []
+        for message, result in zip(request.parameters, results, strict=True):
+            result.reason = self._check(message)
+            if not result.reason and message.name in DEVICE_SPECS:
+                changes[message.name] = _value(message)
+                changing.append(result)
+            elif not result.reason:
+                result.reason = self._set_local([message])
+        reason = await self._configure(changes) if changes else ''
+        for result in changing:
+            result.reason = reason
+        for result in results:
+            result.successful = not result.reason
         response.results = results
         return response
 
     async def _set_atomically(self, request: Any, response: Any) -> Any:
         """Set all or none. What is ours is set first: it can be taken back, light cannot."""
-        parameters = [Parameter.from_parameter_msg(p) for p in request.parameters]
-        reason = next(filter(None, map(self._check, parameters)), '')
-        local = [p for p in parameters if p.name not in DEVICE_SPECS]
-        changes = {p.name: cast(p.name, p.value) for p in parameters if p.name in DEVICE_SPECS}
+        reason = next(filter(None, map(self._check, request.parameters)), '')
+        local = [p for p in request.parameters if p.name not in DEVICE_SPECS]
+        changes = [p for p in request.parameters if p.name in DEVICE_SPECS]
         before = [self._node.get_parameter(p.name) for p in local] if not reason else []
         if not reason and local:
             reason = self._set_local(local)
         if not reason and changes:
-            reason = await self._configure(changes)
+            reason = await self._configure({p.name: _value(p) for p in changes})
             if reason and before:
-                self._set_local(before)
+                self._node.set_parameters_atomically(before)
         response.result = SetParametersResult(successful=not reason, reason=reason)
         return response
 
-    def _set_local(self, parameters: list[Parameter]) -> str:
-        result = self._node.set_parameters_atomically(parameters)
+    def _set_local(self, messages: list[Any]) -> str:
+        result = self._node.set_parameters_atomically(
+            [Parameter.from_parameter_msg(message) for message in messages])
         return '' if result.successful else str(result.reason)
 
-    def _check(self, parameter: Parameter) -> str:
+    def _check(self, message: Any) -> str:
         """Return why a parameter cannot be set, '' if that is left to see."""
-        name = parameter.name
+        name = message.name
         if not self._node.has_parameter(name):
             return f'{name} is no parameter of this node'
+        try:
+            value = Parameter.from_parameter_msg(message).value
+        except ValueError:
+            return f'{name}: {message.value.type} is no parameter type'
         if name not in DEVICE_SPECS:
             return ''
-        if parameter.type_.value == ParameterType.PARAMETER_NOT_SET:
+        if value is None:
             return f'{name} cannot be deleted'
         try:
-            checked(name, parameter.value, self._limits())
+            checked(name, value, self._limits())
         except InvalidValue as error:
             return str(error)
         return ''
+
+
+def _value(message: Any) -> Any:
+    return cast(message.name, Parameter.from_parameter_msg(message).value)

@@ -17,9 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
 import os
 import threading
+import time
 from typing import Any
 
 from support.waiting import eventually, Log, PATIENCE
@@ -81,15 +81,23 @@ class LiveLink:
     """
     A link and its events.
 
+    :param on_event: called with each event, after it was noted.
     :ivar events: what the link has reported.
     """
 
-    def __init__(self, url: str | Url, endpoint: Endpoint | None = None, **options: Any) -> None:
+    def __init__(
+        self, url: str | Url, endpoint: Endpoint | None = None, *,
+        on_event: Callable[[LinkEvent], None] = lambda event: None, **options: Any,
+    ) -> None:
         self.endpoint: Any = endpoint or Talker()
         self.events: Log[LinkEvent] = Log()
         parsed = parse_url(url) if isinstance(url, str) else url
-        self.link = Link(parsed, self.endpoint, label=str(url), on_event=self.events.append,
-                         **options)
+
+        def note(event: LinkEvent) -> None:
+            self.events.append(event)
+            on_event(event)
+
+        self.link = Link(parsed, self.endpoint, label=str(url), on_event=note, **options)
         self.link.start()
 
     def wait_open(self, count: int = 1) -> LinkEvent:
@@ -114,12 +122,16 @@ class LiveLink:
         """End it, and wait for its threads."""
         self.link.stop(PATIENCE)
 
+    def has_ended(self) -> bool:
+        """Return whether the link's thread has ended."""
+        return not self.link._thread.is_alive()
+
 
 class Lights(LiveLink):
-    """Simulated lights on a link."""
+    """A simulated light on a link, which has just been switched on."""
 
-    def __init__(self, url: str, properties: DeviceProperties | None = None) -> None:
-        super().__init__(url, Devices([properties or DeviceProperties()], 0.0))
+    def __init__(self, url: str, *, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(url, Devices([DeviceProperties()], clock()), clock=clock)
 
 
 class _Watcher(LightObserver):
@@ -183,12 +195,8 @@ def wait_for_resources(threads: int, descriptors: int) -> None:
 class Jump:
     """A clock that can be set forward."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self.ahead = 0.0
 
     def __call__(self) -> float:
-        return self._clock() + self.ahead
-
-
-NEVER = math.inf
+        return time.monotonic() + self.ahead

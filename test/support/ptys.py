@@ -16,11 +16,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+import contextlib
+import itertools
 import os
 from pathlib import Path
 import select
+import threading
 
+from support.frames import frame_of
 from support.waiting import PATIENCE
+
+from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.mavlink.dialect import decode_payload, HANDLED
+from illuminator_ros.mavlink.framing import Decoder
 
 
 class PtyDevice:
@@ -67,3 +76,55 @@ class PtyDevice:
             return os.read(self._far, 65536)
         except (BlockingIOError, OSError):
             return b''
+
+    def connect_light(self, clock: Callable[[], float]) -> _Light:
+        """Let a simulated light use the far end, until it is stopped."""
+        return _Light(self._far, clock)
+
+
+class _Light:
+    """A simulated light at the far end of a serial line."""
+
+    def __init__(self, line: int, clock: Callable[[], float]) -> None:
+        self._line = line
+        self._clock = clock
+        self._endpoint = Devices([DeviceProperties()], clock())
+        self._decoder = Decoder()
+        self._stopping, self._stop = os.pipe()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End it."""
+        os.close(self._stop)
+        self._thread.join(PATIENCE)
+        os.close(self._stopping)
+
+    def _run(self) -> None:
+        sequence = itertools.count()
+        while True:
+            now = self._clock()
+            self._endpoint.poll(now)
+            while self._endpoint.outgoing:
+                source, message = self._endpoint.outgoing.popleft()
+                with contextlib.suppress(OSError):
+                    os.write(self._line, frame_of(message, next(sequence) & 0xFF, source))
+            wait = max(self._endpoint.next_deadline() - now, 0.0)
+            ready, _, _ = select.select([self._line, self._stopping], [], [], wait)
+            if self._stopping in ready:
+                return
+            if self._line in ready:
+                self._take()
+
+    def _take(self) -> None:
+        try:
+            data = os.read(self._line, 4096)
+        except OSError:
+            # Nobody has the device open; a closed pseudo-terminal is always readable.
+            select.select([self._stopping], [], [], 0.01)
+            return
+        for frame in self._decoder.feed(data):
+            if frame.message_id in HANDLED:
+                self._endpoint.receive(
+                    frame.source, decode_payload(frame.message_id, frame.payload),
+                    self._clock())

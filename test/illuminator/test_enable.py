@@ -1,0 +1,228 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Switching a light: nothing succeeds that the light did not accept and then show."""
+
+import re
+
+import pytest
+from support.back_to_back import BRIDGE, Pair
+from support.fake_light import FakeLight
+
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT, PROGRESS_LIMIT
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    MavCmd,
+    MavResult,
+    result_name,
+    Source,
+)
+
+ON_OFF = MavCmd.ILLUMINATOR_ON_OFF
+SPENT = re.compile(r'\((\d+) (?:try|tries), (?:(\d+) ms|(\d+\.\d\d) s)\)$')
+
+
+def tries_and_seconds(message):
+    """Return what a message says at its end."""
+    tries, ms, seconds = SPENT.search(message).groups()
+    return int(tries), float(seconds) if ms is None else int(ms) / 1000
+
+
+def test_it_succeeds_when_the_light_accepts_and_shows_it(pair):
+    answer = pair.ask_enable(True)
+    result = pair.wait_for(answer)
+    assert result.success
+    assert result.message.startswith('on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED (')
+    assert tries_and_seconds(result.message) == (1, pytest.approx(answer.seconds, abs=1e-3))
+    assert pair.device.enabled
+
+
+def test_a_status_that_does_not_come_by_itself_is_asked_for(fake, faked):
+    fake.stream = 0.0
+    answer = faked.ask_enable(True)
+    assert faked.wait_for(answer).success
+    assert answer.seconds < 0.02
+
+
+def test_an_acknowledgement_alone_is_no_success(fake, faked):
+    fake.applies = False
+    answer = faked.ask_enable(True)
+    result = faked.wait_for(answer)
+    assert not result.success
+    assert result.contradicted
+    assert re.match('on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off',
+                    result.message)
+    assert answer.seconds == pytest.approx(CONFIRMATION_TIMEOUT, abs=0.01)
+
+
+def test_what_the_status_shows_beside_is_said_with_its_flags(fake, faked):
+    fake.applies = False
+    fake.fields['error_status'] = 2
+    assert 'shows off, over temperature shutdown' in faked.enable(True).message
+
+
+def test_a_status_that_says_nothing_about_it_contradicts(fake, faked):
+    fake.applies = False
+    fake.fields['enable'] = 2
+    assert 'shows neither on nor off' in faked.enable(True).message
+
+
+def test_a_light_that_takes_its_time_is_asked_until_it_shows_it(fake, faked):
+    fake.stream, fake.apply_after = 0.0, 0.6
+    answer = faked.ask_enable(True)
+    assert faked.wait_for(answer).success
+    assert answer.seconds == pytest.approx(0.75, abs=0.02)
+
+
+def test_a_light_that_takes_too_long_is_a_failure(fake, faked):
+    fake.apply_after = 1.2
+    assert not faked.enable(True).success
+
+
+def test_a_light_that_never_sends_a_status_is_believed_and_this_is_said():
+    fake = FakeLight(stream=0.0)
+    fake.answers.clear()
+    pair = Pair(fake).settle()
+    result = pair.enable(True)
+    assert result.success
+    assert result.message.startswith('on, accepted, not confirmed (the light sends no '
+                                     'ILLUMINATOR_STATUS): MAV_RESULT_ACCEPTED (1 try, ')
+
+
+def test_a_light_whose_status_stays_away_is_not_believed(fake, faked):
+    fake.stream = 0.0
+    fake.answers.clear()
+    result = faked.enable(True)
+    assert not result.success
+    assert not result.contradicted
+    assert 'MAV_RESULT_ACCEPTED, but no ILLUMINATOR_STATUS came within 1.00 s (1 try' in (
+        result.message)
+
+
+@pytest.mark.parametrize('uptime', ['of the status before', 'a little lower', 'much lower'])
+def test_a_late_status_from_before_the_command_confirms_nothing(fake, faked, uptime):
+    faked.enable(True)
+    shown_on = fake.status(faked.now)
+    fake.fields['enable'] = 0
+    fake.stream, fake.applies = 0.0, False
+    faked.run(0.4)
+    faked.light.request_status(faked.now)
+    faked.run(0.1)
+    assert faked.light.status.enabled is False
+    answer = faked.ask_enable(True)
+    faked.run(0.005)
+    shown_on.uptime_ms -= {'of the status before': 0, 'a little lower': 50,
+                           'much lower': 3000}[uptime]
+    fake.send(shown_on)
+    assert not faked.wait_for(answer).success
+
+
+@pytest.mark.parametrize('result', [
+    result for result in (*MavResult, 11, 200)
+    if result not in (MavResult.ACCEPTED, MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS,
+                      MavResult.COMMAND_INT_ONLY)])
+def test_a_refusal_fails_with_its_name(fake, faked, result):
+    fake.results[ON_OFF] = result
+    answer = faked.wait_for(faked.ask_enable(True))
+    assert not answer.success
+    assert answer.message.startswith(f'refused: {result_name(result)} (')
+
+
+def test_a_temporary_rejection_is_tried_again(fake, faked):
+    fake.results[ON_OFF] = [MavResult.TEMPORARILY_REJECTED, MavResult.ACCEPTED]
+    result = faked.enable(True)
+    assert result.success
+    assert tries_and_seconds(result.message)[0] == 2
+
+
+def test_a_light_that_wants_a_command_int_gets_one(fake, faked):
+    fake.results[ON_OFF] = [MavResult.COMMAND_INT_ONLY, MavResult.ACCEPTED]
+    assert faked.enable(True).success
+    assert [type(m) for m in faked.commands(ON_OFF)] == [CommandLong, CommandInt]
+
+
+def test_no_answer_fails_with_the_number_of_tries_and_the_time(fake, faked):
+    fake.results[ON_OFF] = None
+    answer = faked.ask_enable(True)
+    result = faked.wait_for(answer)
+    assert result.message.startswith('no acknowledgement (4 tries, ')
+    assert tries_and_seconds(result.message)[1] == pytest.approx(answer.seconds, abs=0.01)
+    assert answer.seconds <= 2.0
+
+
+def test_progress_is_waited_for_but_not_for_ever(fake, faked):
+    fake.results[ON_OFF] = None
+    answer = faked.ask_enable(True)
+    while not answer.results and faked.now < answer.asked_at + 60.0:
+        fake.send(CommandAck(ON_OFF, MavResult.IN_PROGRESS, 50, 0, *BRIDGE))
+        faked.run(1.0)
+    assert not answer.result.success
+    assert 'MAV_RESULT_IN_PROGRESS at 50 %' in answer.result.message
+    assert answer.seconds == pytest.approx(PROGRESS_LIMIT)
+    assert len(faked.commands(ON_OFF)) == 1
+
+
+@pytest.mark.parametrize('ack', [
+    (Source(1, 1), BRIDGE), (Source(2, 243), BRIDGE), (Source(1, 243), Source(1, 191)),
+    (Source(1, 243), Source(255, 194)),
+], ids=['autopilot', 'other system', 'other component', 'other ground'])
+def test_the_acknowledgement_of_another_or_for_another_does_not_count(fake, faked, ack):
+    source, target = ack
+    fake.results[ON_OFF] = None
+    answer = faked.ask_enable(True)
+    fake.outgoing.append((source, CommandAck(ON_OFF, MavResult.UNSUPPORTED, 0, 0, *target)))
+    fake.outgoing.append((source, CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *target)))
+    assert 'no acknowledgement' in faked.wait_for(answer).message
+
+
+def test_it_fails_at_once_where_the_light_is_lost(fake, faked):
+    fake.silent = True
+    faked.run(10.0)
+    before = len(faked.commands())
+    answer = faked.ask_enable(True)
+    assert answer.seconds == 0.0
+    assert answer.result.message.startswith('light 1/243 is lost: no heartbeat for 10.')
+    assert len(faked.commands()) == before
+
+
+def test_it_fails_when_the_link_is_lost_on_the_way(fake, faked):
+    fake.results[ON_OFF] = None
+    answer = faked.ask_enable(True)
+    faked.run(0.1)
+    faked.close()
+    faked.run(0.01)
+    assert answer.result.message.startswith('the link was lost (1 try, ')
+
+
+def test_a_light_that_restarts_meanwhile_does_not_confirm(fake, faked):
+    fake.apply_after = 0.5
+    answer = faked.ask_enable(True)
+    faked.run(0.1)
+    fake._to_apply.clear()
+    fake.restart(faked.now)
+    assert not faked.wait_for(answer).success
+
+
+def test_one_dead_light_does_not_delay_another():
+    pair = Pair([DeviceProperties(source=Source(1, one)) for one in (243, 244)]).settle()
+    dead, alive = (pair.controller.lights[Source(1, one)] for one in (243, 244))
+    pair.device.receive = lambda source, message, now: None
+    late = pair.ask_enable(True, dead)
+    answer = pair.ask_enable(True, alive)
+    assert pair.wait_for(answer).success
+    assert answer.seconds < 0.01
+    assert not pair.wait_for(late).success

@@ -1,0 +1,208 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Requests to one light: in order, one at a time of each kind, each answered exactly once."""
+
+import pytest
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
+
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.operation import MAX_WAITING, Result
+from illuminator_ros.mavlink.dialect import MavCmd, MavResult, Source
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+
+
+def test_requests_are_carried_out_in_order(pair):
+    wishes = [True, False, True, True, False]
+    answers = [pair.ask_enable(on) for on in wishes]
+    pair.run(5.0)
+    assert [bool(m.param1) for m in pair.commands(ON_OFF)] == wishes
+    assert all(answer.result.success for answer in answers)
+    times = [answer.ended_at for answer in answers]
+    assert times == sorted(times)
+
+
+def test_each_configuration_builds_on_the_one_before(pair):
+    answers = [pair.ask_configure(brightness=40), pair.ask_configure(strobe_period=2),
+               pair.ask_configure(strobe_duty_cycle=30)]
+    pair.run(2.0)
+    assert all(answer.result.success for answer in answers)
+    last = pair.commands(CONFIGURE)[-1]
+    assert (last.param2, last.param3, last.param4) == (40, 2, 30)
+
+
+def test_a_configuration_does_not_build_on_one_that_was_refused(fake, faked):
+    fake.results[CONFIGURE] = [MavResult.DENIED, MavResult.ACCEPTED]
+    faked.ask_configure(brightness=40)
+    assert faked.wait_for(faked.ask_configure(strobe_period=2)).success
+    assert fake.fields['brightness'] == 100.0
+
+
+def test_one_command_of_a_kind_is_in_flight(fake, faked):
+    fake.results[ON_OFF] = None
+    for _ in range(5):
+        faked.ask_enable(True)
+    faked.run(0.1)
+    assert len(faked.commands(ON_OFF)) == 1
+
+
+def test_switching_and_configuring_do_not_wait_for_one_another(fake, faked):
+    fake.results[ON_OFF] = None
+    slow = faked.ask_enable(True)
+    quick = faked.ask_configure(brightness=50)
+    assert faked.wait_for(quick).success
+    assert not slow.results
+    fake.results |= {ON_OFF: MavResult.ACCEPTED, CONFIGURE: None}
+    faked.wait_for(slow)
+    slow = faked.ask_configure(brightness=60)
+    quick = faked.ask_enable(True)
+    assert faked.wait_for(quick).success
+    assert not slow.results
+
+
+def test_there_is_an_end_to_what_may_wait(fake, faked):
+    fake.results[ON_OFF] = None
+    answers = [faked.ask_enable(True) for _ in range(MAX_WAITING + 3)]
+    refused = [answer for answer in answers if answer.results]
+    assert refused == answers[MAX_WAITING:]
+    assert refused[0].result.message == '32 requests are waiting for light 1/243 already'
+
+
+def test_after_too_many_requests_the_light_is_served_as_before(fake, faked):
+    fake.results[ON_OFF] = MavResult.DENIED
+    answers = [faked.ask_enable(True) for _ in range(MAX_WAITING + 3)]
+    faked.run(1.0)
+    assert all(len(answer.results) == 1 for answer in answers)
+    fake.results.clear()
+    assert faked.enable(True).success
+
+
+def test_requests_that_wait_for_a_light_that_gets_lost_fail_with_it(fake, faked):
+    fake.results[ON_OFF] = fake.results[CONFIGURE] = None
+    answers = [faked.ask_enable(True) for _ in range(5)]
+    answers += [faked.ask_configure(brightness=value) for value in (10, 20, 30)]
+    faked.run(0.1)
+    faked.close()
+    faked.run(0.01)
+    assert all(not answer.result.success for answer in answers)
+    assert 'light 1/243 is lost' in answers[1].result.message
+
+
+def test_a_closed_link_leaves_nothing_that_is_sent_later(fake, faked):
+    fake.results[ON_OFF] = None
+    for _ in range(5):
+        faked.ask_enable(True)
+    faked.close()
+    faked.run(5.0)
+    at = faked.now
+    faked.open()
+    faked.run(5.0)
+    assert faked.commands(ON_OFF, since=at) == []
+
+
+def test_many_lights_are_served_at_the_same_time():
+    sources = [Source(1, component) for component in range(100, 130)]
+    pair = Pair([DeviceProperties(source=source) for source in sources],
+                there=Faults(latency=0.05)).settle()
+    answers = [pair.ask_enable(True, light) for light in pair.controller.lights.values()]
+    pair.run(0.25)
+    assert [answer.result.success for answer in answers] == [True] * 30
+
+
+class TestCallbacksThatAskForMore:
+    """What is called at the end of a request may begin the next."""
+
+    def toggle(self, pair, times, log):
+        def done(result: Result, now: float) -> None:
+            log.append((result.success, pair.device.enabled))
+            if len(log) < times:
+                pair.light.enable(not pair.device.enabled, now, done)
+        pair.light.enable(True, pair.now, done)
+
+    def test_switching_again_from_the_answer(self, pair):
+        log = []
+        self.toggle(pair, 6, log)
+        pair.run(2.0)
+        assert log == [(True, True), (True, False)] * 3
+
+    def test_configuring_again_from_the_answer(self, pair):
+        log = []
+
+        def done(result, now):
+            log.append(result.success)
+            if len(log) < 6:
+                pair.light.agreement.configure({'brightness': 10 * len(log)}, now, done)
+
+        pair.light.agreement.configure({'brightness': 5}, pair.now, done)
+        pair.run(2.0)
+        assert log == [True] * 6
+        assert pair.device.configuration.brightness == 50.0
+
+    def test_refreshing_again_from_the_answer(self, pair):
+        log = []
+
+        def done(result, now):
+            log.append(result.success)
+            if len(log) < 3:
+                pair.light.refresh(now, done)
+
+        pair.light.refresh(pair.now, done)
+        pair.run(2.0)
+        assert log == [True] * 3
+
+    @pytest.mark.parametrize('end', ['refused', 'lost'])
+    def test_asking_again_after_a_failure(self, fake, faked, end):
+        fake.results[ON_OFF] = [MavResult.DENIED, MavResult.DENIED, MavResult.ACCEPTED]
+        if end == 'lost':
+            fake.results[ON_OFF] = None
+        log = []
+
+        def done(result, now):
+            log.append(result.success)
+            if not result.success and len(log) < 5:
+                faked.light.enable(True, now, done)
+
+        faked.light.enable(True, faked.now, done)
+        faked.turn()
+        if end == 'lost':
+            faked.close()
+        faked.run(10.0)
+        assert log == ([False, False, True] if end == 'refused' else [False] * 5)
+
+    def test_another_request_from_the_answer_to_one_that_waited(self, fake, faked):
+        fake.results[CONFIGURE] = None
+        log = []
+        faked.ask_configure(brightness=1)
+        faked.light.agreement.configure(
+            {'brightness': 2}, faked.now,
+            lambda result, now: faked.light.agreement.configure(
+                {'brightness': 3}, now, lambda result, now: log.append(result.success)))
+        faked.run(0.9)
+        fake.results.clear()
+        faked.run(1.0)
+        assert log == [True]
+        assert fake.fields['brightness'] == 3.0
+
+    def test_an_answer_that_raises_holds_up_nothing(self, pair):
+        def done(result, now):
+            raise RuntimeError('what the caller does wrong')
+
+        pair.light.enable(True, pair.now, done)
+        answer = pair.ask_enable(False)
+        with pytest.raises(RuntimeError):
+            pair.run(5.0)
+        assert pair.wait_for(answer).success
+        assert pair.enable(True).success

@@ -1,0 +1,56 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lights that were there before the link was lost."""
+
+from __future__ import annotations
+
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
+
+from illuminator_ros.illuminator.controller import MAX_ASKED
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.mavlink.dialect import MavCmd, Source
+
+
+class Unaware(FakeLight):
+    """Does not notice that the link was opened, and goes on as before."""
+
+    def link_opened(self, now: float) -> None:
+        pass
+
+
+def test_a_light_is_back_before_its_next_heartbeat() -> None:
+    light = Unaware(stream=0)
+    pair = Pair(light).settle()
+    pair.close()
+    light.heartbeat.due = pair.now + 60
+    pair.open()
+    pair.run(0.1)
+    assert pair.light.connected
+
+
+def test_no_more_lights_are_looked_for_at_once_than_a_slow_line_bears() -> None:
+    pair = Pair([DeviceProperties(source=Source(1, 1 + i))
+                 for i in range(3 * MAX_ASKED)]).settle()
+    pair.close()
+    pair.open()
+    assert len(pair.commands(MavCmd.REQUEST_MESSAGE, since=pair.now)) == MAX_ASKED
+
+
+def test_lights_that_are_there_are_not_looked_for() -> None:
+    pair = Pair().settle()
+    pair.controller.link_opened(pair.now)
+    pair.turn()
+    assert pair.commands(since=pair.now) == []

@@ -1,0 +1,168 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whatever happens, each command ends in exactly one outcome, and no success is made up."""
+
+from __future__ import annotations
+
+import random
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
+import pytest
+from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig, Run
+from support.faulty_wire import Faults, FaultyWire
+
+from illuminator_ros.mavlink.command import Ending, MAX_WAITING
+from illuminator_ros.mavlink.dialect import Source
+
+COMPONENTS = st.sampled_from([LIGHT, Source(1, 244)])
+COMMANDS = st.sampled_from([405, 406])
+# Half of them those that do not simply end a command.
+RESULTS = st.one_of(st.integers(0, 255), st.sampled_from([0, 1, 5, 7, 8]))
+TIMES = st.floats(0, 4)
+
+
+class AnyCourseOfEvents(RuleBasedStateMachine):
+    """Commands, acknowledgements of all sorts, polls early and late, and lost links."""
+
+    @initialize(timeout=st.sampled_from([0.1, 0.5, 2.0]), retries=st.integers(0, 4))
+    def begin(self, timeout: float, retries: int) -> None:
+        self.rig = Rig(timeout=timeout, retries=retries)
+        self.limits: list[tuple[Run, float]] = []
+
+    @rule(component=COMPONENTS, command=COMMANDS,
+          limit=st.one_of(st.just(float('inf')), st.floats(0, 5)), count=st.integers(1, 3))
+    def start(self, component: Source, command: int, limit: float, count: int) -> None:
+        for _ in range(count):
+            run = self.rig.start(command, component, limit=limit)
+            self.limits.append((run, self.rig.now + limit))
+
+    @rule(source=COMPONENTS, command=COMMANDS, result=RESULTS, progress=st.integers(0, 255),
+          addressee=st.sampled_from([Source(1, 194), Source(0, 0), Source(9, 9)]))
+    def acknowledge(self, source: Source, command: int, result: int, progress: int,
+                    addressee: Source) -> None:
+        self.rig.ack(result, command, source=source, progress=progress, target=addressee)
+
+    @rule(seconds=TIMES)
+    def time_passes_with_polls(self, seconds: float) -> None:
+        self.rig.run(seconds)
+
+    @rule(seconds=TIMES)
+    def time_passes_and_the_poll_comes_late(self, seconds: float) -> None:
+        self.rig.now += seconds
+        self.rig.sender.poll(self.rig.now)
+
+    @rule(component=st.one_of(st.none(), COMPONENTS),
+          ending=st.sampled_from([Ending.LINK_LOST, Ending.CANCELLED]))
+    def link_is_lost(self, component: Source | None, ending: Ending) -> None:
+        self.rig.sender.end_all(self.rig.now, ending, component)
+        for run in self.rig.runs:
+            assert run.outcomes or component not in (None, run.command.target)
+
+    @invariant()
+    def no_command_has_two_outcomes(self) -> None:
+        assert all(len(run.outcomes) <= 1 for run in self.rig.runs)
+
+    @invariant()
+    def nothing_is_sent_at_or_after_the_limit(self) -> None:
+        for run, limit in self.limits:
+            assert all(time < limit for time, _ in run.frames)
+
+    @invariant()
+    def tries_are_the_frames_that_were_sent(self) -> None:
+        for run in self.rig.runs:
+            if run.outcomes:
+                assert run.outcome.tries == len(run.frames)
+
+    @invariant()
+    def what_waits_is_bounded(self) -> None:
+        open_ = [run for run in self.rig.runs if not run.outcomes]
+        assert len(open_) <= 4 * (MAX_WAITING + 1)
+
+    def teardown(self) -> None:
+        self.rig.run(LONG * len(self.rig.runs) + LONG)
+        assert all(len(run.outcomes) == 1 for run in self.rig.runs)
+        assert self.rig.idle
+        self.nothing_is_sent_at_or_after_the_limit()
+
+
+TestAnyCourseOfEvents = AnyCourseOfEvents.TestCase
+TestAnyCourseOfEvents.settings = settings(
+    derandomize=True, deadline=None, max_examples=100, stateful_step_count=30)
+
+
+class Executor:
+    """
+    A target at the other end of a bad line, which carries out half of its commands.
+
+    Some take a second, during which it reports progress and rejects what comes again.
+    """
+
+    def __init__(self, rig: Rig, faults: Faults, seed: int) -> None:
+        self.rig = rig
+        self.chance = random.Random(seed)
+        self.there, self.back = FaultyWire(faults, f'{seed} there'), FaultyWire(faults, seed)
+        self.results: dict[int, int] = {}
+        self.busy: dict[int, float] = {}
+        self._seen = 0
+
+    def run(self, seconds: float) -> None:
+        """Let time pass on both sides in small steps."""
+        end = self.rig.now + seconds
+        while self.rig.now < end and not all(run.outcomes for run in self.rig.runs):
+            self.rig.run(0.01)
+            for _, message in self.rig.frames[self._seen:]:
+                self.there.send(message.command.to_bytes(2, 'little'), self.rig.now)
+            self._seen = len(self.rig.frames)
+            for data in self.there.receive(self.rig.now):
+                self._take(int.from_bytes(data, 'little'))
+            for command in [c for c, until in self.busy.items() if self.rig.now >= until]:
+                del self.busy[command]
+                self.results[command] = ACCEPTED
+                self._answer(command, ACCEPTED)
+            for data in self.back.receive(self.rig.now):
+                self.rig.ack(data[2], int.from_bytes(data[:2], 'little'))
+
+    def _take(self, command: int) -> None:
+        if command in self.busy:
+            self._answer(command, 1)
+        elif command % 4 == 0 and command not in self.results:
+            self.busy[command] = self.rig.now + 1.0
+            self._answer(command, IN_PROGRESS)
+        else:
+            result = ACCEPTED if command % 2 == 0 else DENIED
+            self.results[command] = result
+            self._answer(command, result)
+
+    def _answer(self, command: int, result: int) -> None:
+        self.back.send(command.to_bytes(2, 'little') + bytes([result]), self.rig.now)
+
+
+@pytest.mark.parametrize('loss', [0.0, 0.1, 0.3, 0.5])
+@pytest.mark.parametrize('reorder', [0.0, 0.3])
+@pytest.mark.parametrize('duplicate', [0.0, 0.3])
+def test_every_outcome_over_a_bad_line_is_one_and_true(
+        loss: float, reorder: float, duplicate: float) -> None:
+    rig = Rig()
+    faults = Faults(drop=loss, reorder=reorder, duplicate=duplicate, delay=reorder)
+    executor = Executor(rig, faults, 1)
+    runs = {command: rig.start(command) for command in range(1000, 1100)}
+    executor.run(LONG)
+    for command, run in runs.items():
+        if run.outcome.ending is Ending.ANSWERED:
+            assert run.outcome.result == executor.results[command]
+    answered = sum(run.outcome.ending is Ending.ANSWERED for run in runs.values())
+    assert answered == 100 if not loss else answered >= {0.1: 90, 0.3: 60, 0.5: 30}[loss]

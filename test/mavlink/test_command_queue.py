@@ -1,0 +1,231 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Several commands at a time, and commands that are cut off."""
+
+from __future__ import annotations
+
+import pytest
+from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig
+
+from illuminator_ros.mavlink.command import Command, Ending, MAX_WAITING, Outcome
+from illuminator_ros.mavlink.dialect import Source
+
+OTHER = Source(1, 244)
+
+
+# One of a kind at a time
+
+def test_second_command_of_a_kind_waits_for_the_first() -> None:
+    # An acknowledgement names nothing but the command.
+    rig = Rig()
+    first, second = rig.start(params=(1.0,)), rig.start(params=(0.0,))
+    rig.run(1.2)
+    assert [message.confirmation for message in rig.messages] == [0, 1, 2]
+    assert {message.param1 for message in rig.messages} == {1.0}
+    rig.ack(ACCEPTED)
+    assert first.outcome.accepted
+    assert second.outcomes == []
+    assert (rig.messages[-1].param1, rig.messages[-1].confirmation) == (0.0, 0)
+    rig.ack(DENIED)
+    assert second.result == DENIED
+
+
+def test_waiting_commands_go_out_in_order() -> None:
+    rig = Rig(*[[ACCEPTED]] * 10)
+    for number in range(10):
+        rig.start(params=(float(number),))
+    rig.run(LONG)
+    assert [message.param1 for message in rig.messages] == [float(n) for n in range(10)]
+    assert all(run.outcome.accepted for run in rig.runs)
+
+
+def test_command_that_gets_no_answer_makes_way_for_the_next() -> None:
+    rig = Rig([], [], [], [], [ACCEPTED])
+    first, second = rig.start(), rig.start()
+    rig.run(LONG)
+    assert first.ending is Ending.NO_ANSWER
+    assert second.outcome.accepted
+
+
+def test_time_spent_waiting_is_none_of_the_time_taken() -> None:
+    rig = Rig([], [], [], [], [ACCEPTED])
+    rig.start()
+    second = rig.start()
+    rig.run(LONG)
+    assert second.outcome.elapsed == pytest.approx(0.02)
+
+
+def test_only_so_many_wait_and_the_next_is_told() -> None:
+    rig = Rig()
+    runs = [rig.start() for _ in range(MAX_WAITING + 2)]
+    assert [len(run.outcomes) for run in runs] == [0] * (MAX_WAITING + 1) + [1]
+    assert runs[-1].ending is Ending.REFUSED_LOCALLY
+    assert str(runs[-1].outcome) == (
+        'too many commands are waiting for this component (0 tries, 0 ms)')
+    rig.run(MAX_WAITING * LONG)
+    assert all(len(run.outcomes) == 1 for run in runs)
+
+
+def test_pending_is_what_is_under_way() -> None:
+    rig = Rig()
+    rig.start(405)
+    assert rig.sender.pending(LIGHT, 405)
+    assert not rig.sender.pending(LIGHT, 406)
+    assert not rig.sender.pending(OTHER, 405)
+    rig.ack(ACCEPTED)
+    assert not rig.sender.pending(LIGHT, 405)
+
+
+# In parallel
+
+def test_commands_of_different_kinds_do_not_wait_for_each_other() -> None:
+    rig = Rig()
+    rig.start(405)
+    rig.start(406)
+    assert [message.command for message in rig.messages] == [405, 406]
+
+
+def test_dead_light_does_not_delay_another() -> None:
+    rig = Rig()
+    rig.answers = lambda message, number: [ACCEPTED] if message.target_component == 244 else []
+    dead, alive = rig.start(target=LIGHT), [rig.start(target=OTHER) for _ in range(3)]
+    rig.run(0.1)
+    assert all(run.outcome.accepted for run in alive)
+    assert dead.outcomes == []
+    rig.run(LONG)
+    assert dead.ending is Ending.NO_ANSWER
+
+
+def test_fifty_targets_get_an_answer_each_in_any_order() -> None:
+    rig = Rig()
+    targets = [Source(system, component) for system in (1, 2) for component in range(1, 26)]
+    runs = {target: rig.start(target=target) for target in targets}
+    for place, target in enumerate(reversed(targets)):
+        rig.ack(100 + place, source=target)
+    assert [runs[target].result for target in reversed(targets)] == list(range(100, 150))
+
+
+# Cut off
+
+@pytest.mark.parametrize('ending', [Ending.LINK_LOST, Ending.CANCELLED])
+def test_losing_the_link_ends_all_that_is_under_way_or_waiting(ending: Ending) -> None:
+    rig = Rig()
+    rig.start(405)
+    rig.start(405)
+    rig.start(406)
+    rig.start(405, target=OTHER)
+    rig.ack(IN_PROGRESS, 406, progress=30)
+    sent = len(rig.frames)
+    rig.now += 0.1
+    rig.sender.end_all(rig.now, ending)
+    assert [run.ending for run in rig.runs] == [ending] * 4
+    rig.run(LONG)
+    assert len(rig.frames) == sent
+    assert rig.idle
+
+
+def test_outcome_of_a_lost_link_says_how_far_it_came() -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.ack(IN_PROGRESS, progress=30)
+    rig.now += 0.1
+    rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    assert str(run.outcome) == ('the link was lost, last answer MAV_RESULT_IN_PROGRESS at 30 % '
+                                '(1 try, 100 ms)')
+
+
+def test_ending_again_changes_nothing() -> None:
+    rig = Rig()
+    run = rig.start()
+    for ending in (Ending.CANCELLED, Ending.LINK_LOST):
+        rig.sender.end_all(rig.now, ending)
+    assert run.ending is Ending.CANCELLED
+
+
+def test_acknowledgement_after_the_link_was_lost_counts_for_nothing() -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    rig.ack(ACCEPTED)
+    assert run.ending is Ending.LINK_LOST
+
+
+def test_commands_of_one_target_are_ended_without_those_of_others() -> None:
+    rig = Rig()
+    gone, waiting, kept = rig.start(), rig.start(), rig.start(target=OTHER)
+    rig.sender.end_all(rig.now, Ending.CANCELLED, LIGHT)
+    assert (gone.ending, waiting.ending, kept.outcomes) == (
+        Ending.CANCELLED, Ending.CANCELLED, [])
+    rig.ack(ACCEPTED, source=OTHER)
+    assert kept.outcome.accepted
+
+
+def test_command_can_be_started_after_the_link_was_lost() -> None:
+    rig = Rig()
+    rig.start()
+    rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    again = rig.start()
+    rig.ack(ACCEPTED)
+    assert again.outcome.accepted
+
+
+# Called back in the middle
+
+@pytest.mark.parametrize('by', ['acknowledgement', 'silence', 'lost link'])
+def test_callback_may_start_the_same_command_again(by: str) -> None:
+    rig = Rig()
+    outcomes: list[Outcome] = []
+
+    def again(outcome: Outcome, now: float) -> None:
+        outcomes.append(outcome)
+        if len(outcomes) < 3:
+            rig.sender.start(Command(LIGHT, 405), now, again)
+
+    rig.sender.start(Command(LIGHT, 405), rig.now, again)
+    for _ in range(3):
+        if by == 'acknowledgement':
+            rig.ack(ACCEPTED)
+        elif by == 'silence':
+            rig.run(2.0)
+        else:
+            rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    assert len(outcomes) == 3
+    assert rig.idle
+
+
+def test_callback_may_end_all_the_others() -> None:
+    # QGroundControl once crashed when the vehicle was closed by the callback of a failure.
+    rig = Rig(retries=0)
+    ends: list[Ending] = []
+
+    def close(outcome: Outcome, now: float) -> None:
+        ends.append(outcome.ending)
+        rig.sender.end_all(now, Ending.CANCELLED)
+
+    for target in (LIGHT, OTHER):
+        for _ in range(3):
+            rig.sender.start(Command(target, 405), rig.now, close)
+    rig.run(LONG)
+    assert sorted(ends, key=str) == [Ending.CANCELLED] * 5 + [Ending.NO_ANSWER]
+    assert rig.idle
+
+
+def test_forgetting_a_target_forgets_its_round_trips() -> None:
+    rig = Rig()
+    rig.start()
+    rig.ack(ACCEPTED)
+    assert rig.sender.round_trip(LIGHT).quantile(0.5) is not None
+    rig.sender.forget(LIGHT)
+    assert rig.sender.round_trip(LIGHT).quantile(0.5) is None

@@ -1,0 +1,165 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A command sender with a clock that jumps and a target that does what a test says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+import heapq
+import math
+from typing import Any
+
+from illuminator_ros.mavlink.command import Command, CommandSender, Ending, Outcome
+from illuminator_ros.mavlink.dialect import CommandAck, CommandInt, MavResult, Source
+
+OURS = Source(1, 194)
+LIGHT = Source(1, 243)
+# s from a frame to its acknowledgement.
+DELAY = 0.02
+# s after which whatever was started has ended.
+LONG = 60.0
+
+
+@dataclass
+class Run:
+    """
+    A command that was started: its frames, and its outcomes, of which there should be one.
+
+    Its frames are known by param7, which has the number of the run.
+    """
+
+    command: Command
+    frames: list[tuple[float, Any]] = field(default_factory=list)
+    outcomes: list[Outcome] = field(default_factory=list)
+    ended_at: float = math.nan
+
+    def __call__(self, outcome: Outcome, now: float) -> None:
+        self.outcomes.append(outcome)
+        self.ended_at = now
+
+    @property
+    def outcome(self) -> Outcome:
+        """The outcome; an error unless there is exactly one."""
+        (outcome,) = self.outcomes
+        return outcome
+
+    @property
+    def ending(self) -> Ending:
+        """How it ended."""
+        return self.outcome.ending
+
+    @property
+    def result(self) -> int | None:
+        """The MAV_RESULT that it ended with."""
+        return self.outcome.result
+
+
+class Rig:
+    """
+    A sender, and what it sends.
+
+    :ivar now: s.
+    :ivar frames: everything sent, with the time.
+    :ivar answers: called with a message and how many went before it to the same target with the
+        same command; returns the results to acknowledge it with, one after the other.
+    """
+
+    def __init__(self, *answers: Sequence[int], timeout: float = 0.5, retries: int = 3) -> None:
+        self.now = 1000.0
+        self.frames: list[tuple[float, Any]] = []
+        self.sender = CommandSender(self._send, OURS, timeout, retries)
+        self.answers: Callable[[Any, int], Sequence[int]] = (
+            lambda message, number: answers[number] if number < len(answers) else ())
+        self.runs: list[Run] = []
+        self._acks: list[tuple[float, int, Source, Any]] = []
+
+    # What the sender's owner does
+
+    def start(self, command: int = 405, target: Source = LIGHT, *,
+              params: tuple[float, ...] | None = None, limit: float = math.inf) -> Run:
+        """Start a command; the limit is s from now. With params its frames are not told apart."""
+        number = len(self.runs) + 1.0
+        run = Run(Command(
+            target, command, (0.0,) * 6 + (number,) if params is None else params))
+        self.runs.append(run)
+        self.sender.start(run.command, self.now, run, limit=self.now + limit)
+        return run
+
+    def ended(self, command: int = 405, **arguments: Any) -> Run:
+        """Start a command and wait until it must have ended."""
+        run = self.start(command, **arguments)
+        self.run(LONG)
+        return run
+
+    def run(self, seconds: float) -> None:
+        """Let time pass, acknowledging and polling at the moments when that is due."""
+        end = self.now + seconds
+        while (due := min(self.sender.next_deadline(), self._next_ack())) <= end:
+            self.now = max(self.now, due)
+            if self._next_ack() <= self.now:
+                _, _, source, ack = heapq.heappop(self._acks)
+                self.sender.acknowledge(source, ack, self.now)
+            else:
+                self.sender.poll(self.now)
+        self.now = end
+
+    # What its target does
+
+    def ack(self, result: int, command: int = 405, *, source: Source = LIGHT, progress: int = 0,
+            target: Source = OURS, result_param2: int = 0) -> None:
+        """Acknowledge a command at once."""
+        self.sender.acknowledge(
+            source, CommandAck(command, result, progress, result_param2, *target), self.now)
+
+    def _send(self, message: Any) -> None:
+        key = Source(message.target_system, message.target_component), message.command
+        number = sum(1 for _, sent in self.frames if key == (
+            Source(sent.target_system, sent.target_component), sent.command))
+        self.frames.append((self.now, message))
+        number_of_run = int(message.z if isinstance(message, CommandInt) else message.param7)
+        if 0 < number_of_run <= len(self.runs):
+            self.runs[number_of_run - 1].frames.append((self.now, message))
+        for place, result in enumerate(self.answers(message, number)):
+            heapq.heappush(self._acks, (
+                self.now + DELAY * (place + 1), len(self.frames) * 256 + place, key[0],
+                CommandAck(message.command, result, 0, 0, *OURS)))
+
+    def _next_ack(self) -> float:
+        return self._acks[0][0] if self._acks else math.inf
+
+    # What came of it
+
+    @property
+    def times(self) -> list[float]:
+        """When frames were sent, s since the first."""
+        return [round(time - self.frames[0][0], 6) for time, _ in self.frames]
+
+    @property
+    def messages(self) -> list[Any]:
+        """What was sent."""
+        return [message for _, message in self.frames]
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing is under way or waiting."""
+        return self.sender.next_deadline() == math.inf
+
+
+ACCEPTED = MavResult.ACCEPTED
+REJECTED = MavResult.TEMPORARILY_REJECTED
+DENIED = MavResult.DENIED
+FAILED = MavResult.FAILED
+IN_PROGRESS = MavResult.IN_PROGRESS

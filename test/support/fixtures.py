@@ -1,0 +1,102 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Fixtures for tests with ROS; a folder's conftest.py imports those that it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from typing import Any
+
+import pytest
+from support.light import free_port, ServedLight
+from support.processes import Program
+from support.ros import own_domain, Parameters, Ros, running_bridge
+
+
+@pytest.fixture(scope='session', autouse=True)
+def ros_home(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keep logs and time stamps of the programs under test out of the user's home."""
+    os.environ['ROS_HOME'] = str(tmp_path_factory.mktemp('ros_home'))
+
+
+@pytest.fixture(scope='module')
+def domain() -> Iterator[int]:
+    """Claim a ROS domain for one module."""
+    with own_domain() as domain:
+        yield domain
+
+
+@pytest.fixture(scope='module')
+def ros(domain: int) -> Iterator[Ros]:
+    """Return a ROS client in the module's domain."""
+    client = Ros(domain)
+    yield client
+    client.close()
+
+
+@pytest.fixture
+def own_ros() -> Iterator[Ros]:
+    """Return a ROS client in a domain of the test's own, for a bridge of its own."""
+    with own_domain() as domain:
+        client = Ros(domain)
+        yield client
+        client.close()
+
+
+@pytest.fixture
+def port() -> int:
+    """Return a free UDP port."""
+    return free_port()
+
+
+@pytest.fixture(scope='module')
+def settings() -> dict[str, Any]:
+    """Return the parameters of the module's bridge; a module may have its own."""
+    return {}
+
+
+@pytest.fixture(scope='module')
+def shared_bridge(
+    domain: int, settings: dict[str, Any],
+) -> Iterator[tuple[Program, ServedLight]]:
+    """Run a bridge, and a light that is connected to it."""
+    port = free_port()
+    with running_bridge(domain, port, **settings) as bridge, ServedLight(port) as light:
+        bridge.wait_for('connected')
+        yield bridge, light
+
+
+@pytest.fixture
+def bridge(shared_bridge: tuple[Program, ServedLight]) -> Program:
+    """Return the module's bridge."""
+    return shared_bridge[0]
+
+
+@pytest.fixture
+def light(shared_bridge: tuple[Program, ServedLight]) -> Iterator[ServedLight]:
+    """Return the module's light, which does as it is told unless a test has it do otherwise."""
+    light = shared_bridge[1]
+    light.forget()
+    yield light
+    light.behave()
+
+
+@pytest.fixture(scope='module')
+def parameters(ros: Ros, shared_bridge: tuple[Program, ServedLight]) -> Parameters:
+    """Return the parameters of the module's bridge, which the light has reported."""
+    parameters = Parameters(ros)
+    parameters.wait(mode='internal_control')
+    return parameters

@@ -1,0 +1,214 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A fake light on loopback UDP, served by a thread of the test's process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import queue
+import socket
+import threading
+import time
+from types import TracebackType
+from typing import Any
+
+from support.fake_light import FakeLight
+
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    MavCmd,
+    MavResult,
+    Source,
+    STATUS_ID,
+)
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.url import parse_url
+
+LIGHT = Source(1, 243)
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+
+
+def free_port() -> int:
+    """Return a UDP port that nobody uses just now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
+
+
+class _Recorder(FakeLight):
+    """
+    A fake light that keeps what it got, and can answer late.
+
+    :ivar delays: s from each command to its being taken, by MAV_CMD.
+    :ivar steps: what it rounds brightness to, 0 for nothing.
+    :ivar most_at_once: how many commands, resends not counted, it ever had to take at a time.
+    """
+
+    def __init__(self, source: Source, **how: Any) -> None:
+        super().__init__(source, **how)
+        self.pushes = True
+        self.received: list[Any] = []
+        self.changed = threading.Condition()
+        self.delays: dict[int, float] = {}
+        self.steps = 0.0
+        self.most_at_once = 0
+        self._late: list[tuple[float, Source, Any]] = []
+
+    def receive(self, source: Source, message: Any, now: float) -> None:
+        if not isinstance(message, CommandLong | CommandInt):
+            return
+        with self.changed:
+            self.received.append(message)
+            self.changed.notify_all()
+        if delay := self.delays.get(message.command, 0.0):
+            self._late.append((now + delay, source, message))
+            first_tries = [late for _, _, late in self._late if not late.confirmation]
+            self.most_at_once = max(self.most_at_once, len(first_tries))
+        else:
+            super().receive(source, message, now)
+
+    def status(self, now: float) -> Any:
+        if self.steps:
+            self.fields['brightness'] = (
+                round(self.fields['brightness'] / self.steps) * self.steps)
+        return super().status(now)
+
+    def poll(self, now: float) -> None:
+        while self._late and self._late[0][0] <= now:
+            _, source, message = self._late.pop(0)
+            super().receive(source, message, now)
+        super().poll(now)
+
+    def next_deadline(self) -> float:
+        return min(self._late[0][0] if self._late else math.inf, super().next_deadline())
+
+
+class ServedLight:
+    """
+    A light that does what a test says, over real UDP.
+
+    The attributes of ``fake`` (see :class:`~.fake_light.FakeLight`) may be set at any time.
+    """
+
+    def __init__(self, port: int, source: Source = LIGHT, **how: Any) -> None:
+        self.port = port
+        self.fake = _Recorder(source, **{'stream': 0.1, **how})
+        self._link: Link | None = None
+
+    def __enter__(self) -> ServedLight:
+        self.serve()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.vanish()
+
+    def serve(self) -> None:
+        """Come within hearing."""
+        if self._link is None:
+            url = f'udpout://127.0.0.1:{self.port}'
+            self._link = Link(parse_url(url), self.fake, label=url)
+            self._link.start()
+
+    def vanish(self) -> None:
+        """Go, as a light whose cable is pulled."""
+        if self._link is not None:
+            self._link.stop()
+            self._link = None
+
+    def behave(self) -> None:
+        """Do from now on what a good light does."""
+        self.fake.results.clear()
+        self.fake.delays.clear()
+        self.fake.applies = True
+        self.fake.silent = False
+        self.fake.pushes = True
+        self.fake.answers.add(STATUS_ID)
+        self.fake.stream = 0.1
+
+    def do(self, action: Callable[[float], Any]) -> Any:
+        """Have ``action(now)`` called in the light's thread and return what it returns."""
+        assert self._link is not None
+        answer: queue.Queue[Any] = queue.Queue()
+        self._link.call(lambda now: answer.put(action(now)))
+        return answer.get(timeout=5.0)
+
+    def report(self, **fields: Any) -> None:
+        """Send one status, some fields of which have changed without anybody asking."""
+        def act(now: float) -> None:
+            self.fake.fields |= fields
+            self.fake.send(self.fake.status(now))
+        self.do(act)
+
+    def restart(self, **fields: Any) -> None:
+        """Lose power and come back with the default settings, or others."""
+        self.do(lambda now: self.fake.restart(now, **fields))
+
+    def send(self, message: Any, source: Source | None = None) -> None:
+        """Send any message, if wanted as somebody else."""
+        self.do(lambda now: self.fake.outgoing.append((source or self.fake.source, message)))
+
+    def acknowledge(
+        self, command: int, result: int, *, progress: int = 0, source: Source = LIGHT,
+    ) -> None:
+        """Send an acknowledgement of its own accord."""
+        self.send(CommandAck(command, result, progress, 0, 0, 0), source)
+
+    def lose_frames(self, count: int) -> None:
+        """Have the next frame look as if ``count`` before it had been lost."""
+        def act(now: float) -> None:
+            assert self._link is not None
+            sequences = self._link._sequences
+            sequences[self.fake.source] = (sequences.get(self.fake.source, 0) + count) & 0xFF
+        self.do(act)
+
+    def forget(self) -> None:
+        """Forget the commands received so far."""
+        self.fake.received.clear()
+
+    def commands(self, command: int) -> list[Any]:
+        """Return those of the received commands that are of one kind."""
+        return [message for message in list(self.fake.received) if message.command == command]
+
+    def wait_for(self, command: int, count: int = 1, timeout: float = 5.0) -> list[Any]:
+        """Wait until a command has come ``count`` times, and return those that have."""
+        with self.fake.changed:
+            assert self.fake.changed.wait_for(
+                lambda: len(self.commands(command)) >= count, timeout), (
+                f'{MavCmd(command).name} came {len(self.commands(command))} times, not {count}')
+        return self.commands(command)
+
+
+def params(message: Any) -> tuple[float, float, float, float]:
+    """Return the four parameters of a command that the illuminator protocol uses."""
+    return message.param1, message.param2, message.param3, message.param4
+
+
+def eventually(condition: Callable[[], Any], timeout: float = 5.0) -> Any:
+    """Wait for what announces itself by no event, and return it."""
+    until = time.monotonic() + timeout
+    while not (value := condition()):
+        assert time.monotonic() < until, f'not within {timeout} s'
+        time.sleep(0.005)
+    return value
+
+
+__all__ = ['CONFIGURE', 'eventually', 'free_port', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
+           'ServedLight', 'Source']

@@ -1,0 +1,136 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Programs under test: started, read, ended and waited for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import contextlib
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+# s; DESIGN.md, 3.4.
+STOP_LIMIT = 1.0
+
+
+class Program:
+    """A process whose output (standard output and error together) can be waited for."""
+
+    def __init__(self, *command: str, env: Mapping[str, str] | None = None,
+                 cwd: Path | None = None) -> None:
+        self._process = subprocess.Popen(
+            command, text=True, env=environment(env), cwd=cwd or ROOT, errors='replace',
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        self.lines: list[str] = []
+        self._grown = threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._process.pid
+
+    @property
+    def log(self) -> str:
+        """All that was printed so far."""
+        return ''.join(self.lines)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            with self._grown:
+                self.lines.append(line)
+                self._grown.notify_all()
+
+    def wait_for(self, text: str, timeout: float = 10.0, count: int = 1) -> None:
+        """Wait until ``count`` lines with this text have been printed."""
+        with self._grown:
+            found = self._grown.wait_for(lambda: self.count(text) >= count, timeout)
+        assert found, f'{text!r} was not printed {count} times:\n{self.log}'
+
+    def count(self, text: str) -> int:
+        """Return how many lines have this text."""
+        return sum(text in line for line in self.lines)
+
+    def send(self, number: int) -> None:
+        """Send a signal."""
+        self._process.send_signal(number)
+
+    def wait(self, timeout: float = 10.0) -> int:
+        """Wait for the end and return the exit status."""
+        status = self._process.wait(timeout)
+        self._reader.join(timeout)
+        return status
+
+    def end(self, number: int = signal.SIGINT) -> tuple[int, float]:
+        """Send a signal; return the exit status and the s that it took to the exit."""
+        sent = time.monotonic()
+        self.send(number)
+        status = self._process.wait(10.0)
+        taken = time.monotonic() - sent
+        self._reader.join(10.0)
+        return status, taken
+
+    def kill(self) -> None:
+        """End it if it still runs, whatever it does."""
+        if self._process.poll() is None:
+            self._process.kill()
+        self.wait()
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+
+def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return the environment of programs under test: this working tree, no network."""
+    return {
+        **os.environ, 'PYTHONPATH': os.pathsep.join(
+            filter(None, (str(ROOT), os.environ.get('PYTHONPATH')))),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **(more or {})}
+
+
+def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
+    """Start a module of ours."""
+    return Program(sys.executable, '-m', module, *arguments, env=env)
+
+
+def run(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Any:
+    """Run a module of ours to its end; return what :func:`subprocess.run` does."""
+    return subprocess.run(
+        [sys.executable, '-m', module, *arguments], env=environment(env), cwd=ROOT, text=True,
+        stdin=subprocess.DEVNULL, capture_output=True, timeout=30)
+
+
+@contextlib.contextmanager
+def ended(program: Program) -> Iterator[Program]:
+    """End a program with SIGINT and hold it to what it promises about that."""
+    try:
+        yield program
+        if program.running:
+            status, taken = program.end()
+            assert (status, 'Traceback' in program.log) == (0, False), program.log
+            assert taken < STOP_LIMIT, f'it took {taken:.2f} s to end'
+    finally:
+        program.kill()

@@ -1,0 +1,62 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Signed frames for tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from support.frames import frame_of, LIGHT, only
+from support.messages import STATUS
+
+from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.framing import Frame
+from illuminator_ros.mavlink.signing import (
+    EPOCH,
+    MAX_TICKS,
+    signature,
+    Signing,
+    SigningMode,
+    ticks,
+)
+
+KEY = bytes(range(32))
+WRONG_KEY = bytes(range(1, 33))
+# Unix time, s, of a day long after the epoch of signing.
+NOW = EPOCH + 400_000_000.0
+LAST_STAMP = MAX_TICKS
+
+
+def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Source = LIGHT,
+           message: Any = STATUS, sequence: int = 0) -> Frame:
+    """Return a frame signed with any key and time stamp."""
+    data = (frame_of(message, sequence, source, signed=True)
+            + bytes([link_id]) + stamp.to_bytes(6, 'little'))
+    return only(data + signature(key, data))
+
+
+def unsigned(source: Source = LIGHT) -> Frame:
+    """Return a frame without signature."""
+    return only(frame_of(source=source))
+
+
+def checker(mode: SigningMode = SigningMode.REQUIRE, **arguments: Any) -> Signing:
+    """Return what checks frames with the key."""
+    return Signing(mode, KEY, **arguments)
+
+
+def stamp_at(unix_time: float) -> int:
+    """Return the time stamp of a Unix time, s."""
+    return ticks(unix_time)

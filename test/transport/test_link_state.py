@@ -1,0 +1,144 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A link's state, as other threads read it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+
+import pytest
+from support.frames import LIGHT
+from support.heartbeats import heartbeat_frame
+from support.live_link import Jump, LiveLink
+from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
+
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.link import LinkState
+
+Run = Callable[[LiveLink], LiveLink]
+
+
+def test_a_link_that_cannot_be_opened_says_why(run: Run) -> None:
+    with bound_socket() as taken:
+        port = taken.getsockname()[1]
+        link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
+        link.wait_lost()
+        state = link.link.state()
+    assert (state.is_open, state.name, state.openings) == (
+        False, f'udpin://127.0.0.1:{port}', 0)
+    assert state.reason == f'cannot listen on 127.0.0.1:{port}: Address already in use'
+
+
+def test_an_open_link_says_what_it_is(run: Run) -> None:
+    port = free_port()
+    link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
+    link.wait_open()
+    state = link.link.state()
+    assert (state.is_open, state.name, state.reason, state.openings) == (
+        True, f'udp 127.0.0.1:{port}', '', 1)
+
+
+def test_it_says_since_when(run: Run) -> None:
+    clock = Jump()
+    link = run(LiveLink('memory://state', clock=clock))
+    before = clock()
+    link.wait_open()
+    clock.ahead += 100
+    assert link.link.state().since <= before + 50
+
+
+def test_frames_and_bytes_are_counted_both_ways(
+    run: Run, channel: Callable[[str], OpenChannel],
+) -> None:
+    other = channel('memory://state')
+    link = run(LiveLink('memory://state'))
+    sent = other.receive()[0][1]
+    other.broadcast(heartbeat_frame() + b'xyz')
+    link.endpoint.wait_for(LIGHT)
+    traffic = link.link.state().traffic
+    assert (traffic.frames_received, traffic.bytes_received) == (1, len(heartbeat_frame()) + 3)
+    assert traffic.frames_sent >= 1
+    assert traffic.bytes_sent == traffic.frames_sent * len(sent)
+
+
+def fill(link: LiveLink) -> None:
+    """Have a link send so much that not all of it finds room."""
+    def send(now: float) -> None:
+        for _ in range(10_000):
+            link.endpoint.heartbeat.send(now, link.endpoint.outgoing)
+
+    while not link.ask(lambda now: link.link._channel.dropped):
+        link.ask(send)
+
+
+def test_what_does_not_go_out_is_counted(
+    run: Run, channel: Callable[[str], OpenChannel],
+) -> None:
+    channel('memory://state')
+    link = run(LiveLink('memory://state'))
+    link.wait_open()
+    fill(link)
+    assert link.link.state().traffic.frames_dropped > 0
+
+
+def test_drops_are_counted_over_all_openings(run: Run) -> None:
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        counts = []
+        for _ in range(2):
+            with server.accept()[0] as connection:
+                connection.sendall(heartbeat_frame())
+                link.endpoint.heard.wait_for(lambda heard: True, count=len(counts) + 1)
+                fill(link)
+                counts.append(link.link.state().traffic.frames_dropped)
+            link.wait_lost(len(counts))
+        assert 0 < counts[0] < counts[1]
+
+
+def test_reading_it_while_everything_changes_is_no_error(
+    run: Run, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(opener, 'FIRST_PAUSE', 0.001)
+    monkeypatch.setattr(opener, 'LAST_PAUSE', 0.001)
+    states: list[LinkState] = []
+    errors: list[Exception] = []
+    ended = threading.Event()
+    server = listening_socket()
+    link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+
+    def read() -> None:
+        while not ended.is_set():
+            try:
+                states.append(link.link.state())
+                ended.wait(0.0002)
+            except Exception as error:
+                errors.append(error)
+
+    readers = [threading.Thread(target=read) for _ in range(2)]
+    for reader in readers:
+        reader.start()
+    with server:
+        for count in range(10):
+            with server.accept()[0] as connection:
+                for number in range(20):
+                    connection.sendall(heartbeat_frame(Source(1 + count, 1 + number)))
+                link.endpoint.wait_for(Source(1 + count, 20))
+    ended.set()
+    for reader in readers:
+        reader.join()
+    assert errors == []
+    assert all(state.is_open is (state.reason == '') for state in states)
