@@ -144,6 +144,7 @@ class Bench(Endpoint):
     :ivar rest: the statuses that came before anything was asked for.
     :ivar transactions: all commands, in order.
     :ivar disagreements: accepted changes that the status did not show.
+    :ivar tidying: whether the light is being brought back to where it was.
     :ivar disobediences: refused changes after which the status was another.
     """
 
@@ -167,6 +168,7 @@ class Bench(Endpoint):
         self.disagreements: list[Finding] = []
         self.disobediences: list[Finding] = []
         self.log: list[str] = []
+        self.tidying = False
         self._target = target
         self._began: float | None = None
         self._last_heard = -math.inf
@@ -241,7 +243,9 @@ class Bench(Endpoint):
         return min(beat, self._wait.deadline if self._wait else self.now)
 
     def interrupt(self, now: float) -> None:
-        """End the run; the coroutine may still tidy up."""
+        """End the run; what it tidies up then is not interrupted."""
+        if self.tidying:
+            return
         self._at(now)
         self._advance()
         if self._main is not None:

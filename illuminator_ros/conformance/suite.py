@@ -69,7 +69,6 @@ class Suite:
         self.restored = 'nothing was changed'
         self.left_changed = False
         self.interrupted = False
-        self.done = False
         self._only = only
         self._find_timeout = find_timeout
         self._on_result = on_result
@@ -101,14 +100,9 @@ class Suite:
             for one in chosen[len(self.results):]:
                 self._enter(Result(one, Verdict.SKIPPED, 'interrupted'))
         finally:
-            try:
-                if self._changed:
-                    await self._restore()
-            except Interrupted:
-                self.left_changed = True
-                self.restored = 'interrupted before the light was as it had been'
-            finally:
-                self.done = True
+            self.bench.tidying = True
+            if self._changed:
+                await self._restore()
 
     def _enter(self, result: Result) -> None:
         self.results.append(result)

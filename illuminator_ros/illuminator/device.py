@@ -115,6 +115,10 @@ class Device:
         self._outlet = Outlet(
             properties.source, self.outgoing, random.Random(f'{properties.seed} {self.source}'))
         self._schedule = Schedule()
+        self.power_on(now)
+
+    def power_on(self, now: float) -> None:
+        """Begin: the faults that last for a time last from now on."""
         self._silent_until = now + (self.behaviour.silence or -math.inf)
         self.restart(now)
 
@@ -122,6 +126,7 @@ class Device:
         """Begin anew, as after a power cycle; only the heat stays."""
         self.enabled = False
         self.configuration = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
+        self._last_brightness = self.configuration.brightness
         self.interval = self.properties.status_interval
         self._in_progress: set[int] = set()
         self._booted_at = now
@@ -293,7 +298,8 @@ class Device:
             self.enabled = on
             # "0%: Off": where the two are one, being on needs some brightness.
             if on and self.behaviour.joint_switch and not self.configuration.brightness:
-                self.configuration = replace(self.configuration, brightness=100.0)
+                self.configuration = replace(
+                    self.configuration, brightness=self._last_brightness)
         return MavResult.ACCEPTED if valid else MavResult.DENIED, change, []
 
     def _configure(
@@ -307,6 +313,8 @@ class Device:
 
         def change() -> None:
             self.configuration = configuration
+            if brightness > 0:
+                self._last_brightness = brightness
             if behaviour.joint_switch:
                 self.enabled = brightness > 0
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import functools
 import logging
+import queue
 import signal
 import sys
 import threading
@@ -47,32 +48,42 @@ class _Simulation:
         described: list[DeviceProperties],
     ) -> None:
         signs, store = signing(options, f'simulator {described[0].source}')
-        self._ended = threading.Event()
-        self._lock = threading.Lock()
+        # What is to be written, with the line that it answers; None ends it all.
+        self._texts: queue.SimpleQueue[tuple[str, str | None] | None] = queue.SimpleQueue()
         self._glances: list[Glance] = []
         live = sys.stdout.isatty() and not options.plain
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
         self._endpoint = Devices(described, 0.0)
-        self._link = Link(url, self._endpoint, label=label, on_event=self._show,
+        self._link = Link(url, self._endpoint, label=label, on_event=self._note,
                           signing=signs, store=store)
         for device in self._endpoint.devices:
-            device.restart(self._link.clock())
+            device.power_on(self._link.clock())
 
     def run(self, termination: Termination) -> None:
         """Run until a signal or ``quit``."""
         names = [str(device.source) for device in self._endpoint.devices]
-        self._say(f'{len(names)} light{"s"[:len(names) > 1]}: ' + ', '.join(names[:8])
-                  + (' ...' if len(names) > 8 else ''))
-        termination.calls(self._ended.set)
+        self._view.say(f'{len(names)} light{"s"[:len(names) > 1]}: ' + ', '.join(names[:8])
+                       + (' ...' if len(names) > 8 else ''))
+        termination.calls(self._end)
         self._link.start()
         # A background job that reads from its terminal is stopped, if it does not ignore this.
         signal.signal(signal.SIGTTIN, signal.SIG_IGN)
         threading.Thread(target=self._listen, name='console', daemon=True).start()
-        while not self._ended.wait(VIEW_INTERVAL):
+        while True:
             self._link.call(self._look)
-            with self._lock:
-                self._view.show(self._glances)
+            try:
+                text = self._texts.get(timeout=VIEW_INTERVAL)
+            except queue.Empty:
+                pass
+            else:
+                if text is None:
+                    break
+                self._view.say(text[0], typed=text[1])
+            self._view.show(self._glances)
         self._link.stop()
+
+    def _end(self) -> None:
+        self._texts.put(None)
 
     def _look(self, now: float) -> None:
         self._glances = [glance(device, now) for device in self._endpoint.devices]
@@ -86,26 +97,20 @@ class _Simulation:
                 return
             if not line:
                 return
-            if line.strip() == 'quit':
-                self._ended.set()
-                return
-            self._link.call(functools.partial(self._execute, line))
+            self._link.call(functools.partial(self._execute, line.rstrip('\n')))
 
     def _execute(self, line: str, now: float) -> None:
-        answer = execute(line, self._endpoint.devices, now)
-        # Somebody who does not read what is written must not hold up the lights.
-        threading.Thread(target=self._say, args=(answer,), daemon=True).start()
-
-    def _show(self, event: LinkEvent) -> None:
-        if event.is_open:
-            self._say(f'link open: {event.name}')
+        if line.strip() == 'quit':
+            self._end()
         else:
-            self._say(f'link not open: {event.name}: {event.reason}; trying again')
+            self._texts.put((execute(line, self._endpoint.devices, now), line))
 
-    def _say(self, text: str) -> None:
-        with self._lock:
-            if text or isinstance(self._view, LiveView):
-                self._view.say(text)
+    def _note(self, event: LinkEvent) -> None:
+        if event.is_open:
+            text = f'link open: {event.name}'
+        else:
+            text = f'link not open: {event.name}: {event.reason}; trying again'
+        self._texts.put((text, None))
 
 
 def run(args: list[str] | None, termination: Termination) -> int:

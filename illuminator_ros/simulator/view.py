@@ -91,9 +91,10 @@ class PlainView:
                 self._shown[one.name] = one
                 self.say(str(one))
 
-    def say(self, text: str) -> None:
-        """Write something else."""
-        print(text, file=self._stream, flush=True)
+    def say(self, text: str, *, typed: str | None = None) -> None:
+        """Write something else, unless it is nothing."""
+        if text:
+            print(text, file=self._stream, flush=True)
 
 
 class LiveView:
@@ -120,21 +121,30 @@ class LiveView:
         lines = [line[:size.columns - 1] for line in lines]
         if len(lines) != self._height:
             self._lines = lines
-            self._draw()
+            self.say('')
         elif lines != self._lines:
             self._lines = lines
             # Save the cursor, go up, write each line over the old one, and come back.
             text = ''.join(f'{line}\x1b[K\r\n' for line in lines)
             self._write(f'\x1b7\x1b[{len(lines)}A\r{text}\x1b8')
 
-    def say(self, text: str) -> None:
-        """Write something else, and the lights below it again."""
-        self._write(f'\r\x1b[K{text}\n')
+    def say(self, text: str, *, typed: str | None = None) -> None:
+        """
+        Write something else, and the lights below it again.
+
+        :param typed: the line that it answers; the cursor then stands below that.
+        """
+        answered = '' if typed is None else f'{self.PROMPT}{typed}\r\n'
+        text = text.replace('\n', '\r\n')
+        up = self._height + (typed is not None)
+        self._write((f'\x1b[{up}A' if up else '') + f'\r\x1b[J{answered}'
+                    + (f'{text}\r\n' if text else ''))
         self._draw()
 
     def _draw(self) -> None:
         self._height = len(self._lines)
-        self._write(''.join(f'{line}\x1b[K\r\n' for line in self._lines) + self.PROMPT)
+        if self._lines:
+            self._write(''.join(f'{line}\x1b[K\r\n' for line in self._lines) + self.PROMPT)
 
     def _write(self, text: str) -> None:
         self._stream.write(text)

@@ -20,7 +20,7 @@ from ...illuminator.model import ErrorFlag, flag_names, Status
 from ..bench import Bench
 from ..requirement import Failed, ILLUMINATOR, requirement, Skipped
 
-# K that a light has to get warmer, or cooler, for a flag to have a reason.
+# K that a light has to get warmer for a flag to have a reason.
 STEP = 0.5
 THERMAL = (ErrorFlag.THERMAL_THROTTLING, ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
 
@@ -59,29 +59,26 @@ async def _sample(bench: Bench) -> list[Status]:
 
 
 def _judge(seen: list[Status], seconds: float) -> str:
-    temperatures = [one.temperature or 0.0 for one in seen]
-    if not any(temperatures):
+    """
+    Compare flags and temperatures, but not one sample with the next.
+
+    Between two samples a small light may get hot and cool down again. What holds for all samples
+    is that a flag is set at no temperature at which the light began without it.
+    """
+    start, hottest = seen[0].temperature or 0.0, max(one.temperature or 0.0 for one in seen)
+    if not any(one.temperature for one in seen):
         raise Skipped('it reports no temperature')
-    changes = []
+    ranges = []
     for flag in THERMAL:
-        # The temperature at which the flag last changed, or was first seen as it is.
-        since = temperatures[0]
-        for before, after, temperature in zip(seen, seen[1:], temperatures[1:], strict=False):
-            if not (before.error_flags ^ after.error_flags) & flag:
-                continue
-            name = flag_names(flag)[0]
-            if after.error_flags & flag:
-                if temperature < since + STEP:
-                    raise Failed(f'{name} began at {temperature:.1f} degC; at {since:.1f} degC '
-                                 'there was none')
-                changes.append(f'{name} from {temperature:.1f} degC')
-            else:
-                if temperature > since - STEP:
-                    raise Failed(f'{name} ended at {temperature:.1f} degC, having begun at '
-                                 f'{since:.1f} degC')
-                changes.append(f'to {temperature:.1f} degC')
-            since = temperature
-    if not changes:
-        raise Skipped(f'{seconds:g} s at 100 % brought it from {temperatures[0]:.1f} to '
-                      f'{max(temperatures):.1f} degC and no flag; try a longer --heat')
-    return ', '.join(changes)
+        flagged = [one.temperature or 0.0 for one in seen if one.error_flags & flag]
+        if not flagged or seen[0].error_flags & flag:
+            continue
+        name = flag_names(flag)[0]
+        if min(flagged) < start + STEP:
+            raise Failed(f'{name} at {min(flagged):.1f} degC; at {start:.1f} degC there was none '
+                         'before')
+        ranges.append(f'{name} from {min(flagged):.1f} to {max(flagged):.1f} degC')
+    if not ranges:
+        raise Skipped(f'{seconds:g} s at 100 % brought it from {start:.1f} to {hottest:.1f} degC '
+                      'and no flag; try a longer --heat')
+    return ', '.join(ranges)
