@@ -23,7 +23,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 from .. import __version__
-from .requirement import HEARTBEAT, Requirement, REQUIREMENTS, Result, Verdict
+from .requirement import HEARTBEAT, Requirement, Result, Verdict
+from .requirements import REQUIREMENTS
 
 # Lines of the exchange that a table shows; the files have more.
 SHOWN_LINES = 12

@@ -22,7 +22,6 @@ import math
 
 from ..illuminator.model import Configuration, Mode, shortest, Status
 from ..mavlink.dialect import MavCmd, STATUS_ID
-from . import requirements  # noqa: F401 - enters them
 from .bench import (
     Bench,
     differences,
@@ -33,7 +32,8 @@ from .bench import (
     median,
     periods,
 )
-from .requirement import Failed, Requirement, REQUIREMENTS, Result, Skipped, Verdict
+from .requirement import Failed, Requirement, Result, Skipped, Verdict
+from .requirements import REQUIREMENTS
 
 # s
 FIND_TIMEOUT = 10.0

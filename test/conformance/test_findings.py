@@ -6,7 +6,7 @@ import math
 import pytest
 from support.conformance_run import Run
 
-from illuminator_ros.conformance.requirement import REQUIREMENTS
+from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS

@@ -6,7 +6,8 @@ import math
 import pytest
 from support.conformance_run import Run
 
-from illuminator_ros.conformance.requirement import REQUIREMENTS, Verdict
+from illuminator_ros.conformance.requirement import Verdict
+from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode

@@ -18,6 +18,7 @@
 from . import heartbeat, status, information, command, switch, configuration, interval
 from . import thermal, totals
 # isort: on
+from ..requirement import REQUIREMENTS
 
-__all__ = ['command', 'configuration', 'heartbeat', 'information', 'interval', 'status',
-           'switch', 'thermal', 'totals']
+__all__ = ['command', 'configuration', 'heartbeat', 'information', 'interval', 'REQUIREMENTS',
+           'status', 'switch', 'thermal', 'totals']
