@@ -38,6 +38,8 @@ MAX_STROBE_PERIOD = 3600.0
 PERCENT_STEP = 0.5
 PERIOD_STEP = 0.01
 FLOAT32_STEP = 1e-6
+# s; less is a 0 that was computed.
+SHORTEST_PERIOD = 1e-6
 
 
 class Mode(IntEnum):
@@ -161,7 +163,7 @@ class Configuration:
             'brightness': math.isclose(self.brightness, other.brightness,
                                        rel_tol=FLOAT32_STEP, abs_tol=percent),
             'strobe_period': math.isclose(self.strobe_period, other.strobe_period,
-                                          rel_tol=period, abs_tol=1e-6),
+                                          rel_tol=period, abs_tol=SHORTEST_PERIOD),
             'strobe_duty_cycle': math.isclose(self.strobe_duty_cycle, other.strobe_duty_cycle,
                                               rel_tol=FLOAT32_STEP, abs_tol=percent),
         }
@@ -278,9 +280,9 @@ class Status:
         if (self.brightness is None or self.strobe_period is None
                 or self.strobe_duty_cycle is None):
             return None
+        period = shortest(self.strobe_period) if self.strobe_period >= SHORTEST_PERIOD else 0.0
         return Configuration(
-            self.mode, shortest(self.brightness), shortest(self.strobe_period),
-            shortest(self.strobe_duty_cycle))
+            self.mode, shortest(self.brightness), period, shortest(self.strobe_duty_cycle))
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,10 +50,9 @@ Finding = tuple[bytes, str]
 
 def _status(name: str, hardware_id: str, findings: list[Finding], fine: str,
             values: dict[str, Any]) -> DiagnosticStatus:
-    level = max((finding[0] for finding in findings), default=OK)
     worst_first = sorted(findings, key=lambda finding: finding[0], reverse=True)
     return DiagnosticStatus(
-        level=level, name=name, hardware_id=hardware_id,
+        level=level(findings), name=name, hardware_id=hardware_id,
         message='; '.join(text for _, text in worst_first) or fine,
         values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()
                 if value is not None])
@@ -65,24 +64,38 @@ def _text(value: Any) -> str:
     return f'{value:.6g}' if isinstance(value, float) else str(value)
 
 
-def link_status(
-    node_name: str, url: str, state: LinkState, controller: Controller, light: Light | None,
-    *, now: float, started: float,
-) -> DiagnosticStatus:
-    """Return the status of the link, as seen by the node of one light (None: of none yet)."""
+def level(findings: list[Finding]) -> bytes:
+    """Return the worst level among findings."""
+    return max((finding[0] for finding in findings), default=OK)
+
+
+def link_findings(
+    state: LinkState, controller: Controller, light: Light | None, *, now: float, started: float,
+) -> list[Finding]:
+    """Return what is wrong with the link, as seen by the node of one light (None: of none yet)."""
     findings: list[Finding] = []
     if not state.is_open:
         findings.append((ERROR, f'not open: {state.reason}'))
     if controller.clashes(now):
         findings.append((ERROR, f'another sender uses our address {controller.identity}'))
     if light is None:
-        level = WARN if now - started < DISCOVERY_GRACE else ERROR
-        findings.append((level, f'no illuminator heard for {format_seconds(now - started)}'))
+        severity = WARN if now - started < DISCOVERY_GRACE else ERROR
+        findings.append((severity, f'no illuminator heard for {format_seconds(now - started)}'))
     if controller.passed_over:
         findings.append((WARN, f'more than {len(controller.lights)} lights, some passed over'))
     counter = state.traffic.sources.get(light.source) if light else None
     if counter and counter.recent_loss(now) > LOSS_WARNING:
         findings.append((WARN, f'{counter.recent_loss(now):.0f} % of the frames lost'))
+    return findings
+
+
+def link_status(
+    node_name: str, url: str, state: LinkState, controller: Controller, light: Light | None,
+    *, now: float, started: float,
+) -> DiagnosticStatus:
+    """Return the status of the link, as seen by the node of one light (None: of none yet)."""
+    findings = link_findings(state, controller, light, now=now, started=started)
+    counter = state.traffic.sources.get(light.source) if light else None
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
     trip = controller.sender.round_trip(light.source) if light else None
     seconds = [trip.quantile(0.5), trip.quantile(0.95)] if trip else [None, None]

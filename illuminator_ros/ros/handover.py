@@ -32,6 +32,35 @@ T = TypeVar('T')
 # s for which the executor itself stands still for an answer. Going to sleep and being woken
 # costs it more than a light on a fast link needs to answer.
 PATIENCE = 0.002
+# s for which the link's thread then stands back, so that the answer is on its way before what
+# else a status brings with it: two threads of Python do not run at once.
+COURTESY = 0.001
+
+
+class _Meeting:
+    """Of the executor, which may wait for an answer on the spot, and the link's thread."""
+
+    def __init__(self) -> None:
+        self._arrived = threading.Lock()
+        self._resumed = threading.Lock()
+        # Taken by the one that comes first: the answer, or the executor's turning away.
+        self._decided = threading.Lock()
+        self._arrived.acquire()
+        self._resumed.acquire()
+
+    def wait(self, seconds: float) -> None:
+        """Wait for the answer, or turn away from it, in the executor's thread."""
+        if not self._arrived.acquire(timeout=seconds):
+            self._decided.acquire(blocking=False)
+        self._resumed.release()
+
+    def arrive(self) -> bool:
+        """Bring the answer, in the link's thread; return whether it was waited for."""
+        self._arrived.release()
+        if not self._decided.acquire(blocking=False):
+            return False
+        self._resumed.acquire(timeout=COURTESY)
+        return True
 
 
 class Handover(Generic[T]):
@@ -58,30 +87,26 @@ class Handover(Generic[T]):
         The request must answer exactly once, then or later; if it fails, so does this.
         """
         future: Any = Future()
-        arrived = threading.Lock()
-        arrived.acquire()
-        awaited = threading.Lock()
+        meeting = _Meeting()
 
-        def wake() -> None:
-            arrived.release()
-            if not awaited.acquire(blocking=False):
+        def arrive() -> None:
+            if not meeting.arrive():
                 self._guard.trigger()
 
         def answer(value: T) -> None:
             future.set_result(value)
-            wake()
+            arrive()
 
         def run(now: float) -> None:
             try:
                 request(now, answer)
             except Exception as error:
                 future.set_exception(error)
-                wake()
+                arrive()
 
         asked = time.monotonic()
         self._link.call(run)
-        if not (self._patient and arrived.acquire(timeout=PATIENCE)):
-            awaited.acquire(blocking=False)
+        meeting.wait(PATIENCE if self._patient else 0.0)
         result: T = await future
         self._patient = time.monotonic() - asked < PATIENCE
         return result

@@ -20,14 +20,19 @@ import threading
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light
 from ..mavlink.link import Link
-from .diagnostics import hardware_id, lamp_findings, lamp_status, link_status
+from .diagnostics import (
+    hardware_id,
+    lamp_findings,
+    lamp_status,
+    level,
+    link_findings,
+    link_status,
+)
 from .inputs import Inputs
 from .outputs import Outputs, STREAM_QOS
 from .parameters import declare_device_parameters, misspelt
@@ -49,7 +54,7 @@ class IlluminatorNode(Node):
                          **kwargs)
         self.light: Light | None = None
         self._hardware_id = ''
-        self._levels: tuple[Any, ...] = ()
+        self._levels: list[bytes] = []
         self._publishing = threading.Lock()
 
     def serve(
@@ -69,15 +74,11 @@ class IlluminatorNode(Node):
         self._overrides = declare_device_parameters(self)
         for warning in misspelt(self):
             self.get_logger().warning(warning)
-        self.outputs = Outputs(self, frame_id, self._check_levels)
+        self.outputs = Outputs(self, frame_id, self._check_lamp)
         self.inputs = Inputs(self, link, lambda: self.light, self._absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
-        # On a steady clock: with use_sim_time and no /clock a ROS timer never fires. A timer
-        # that fires often also lets the executor notice SIGTERM, which it otherwise may miss.
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        group = ReentrantCallbackGroup()
-        self.create_timer(period, self.publish_diagnostics, group, self._steady)
-        self.create_timer(0.25, lambda: None, group, self._steady)
+        self._period = period
+        self._diagnostics_due = self._started
 
     def bind(self, light: Light, now: float) -> None:
         """Serve a light from now on, and tell what is known of it; in the link's thread."""
@@ -92,6 +93,34 @@ class IlluminatorNode(Node):
         if not state.is_open:
             return f'no light connected: {state.name} is not open: {state.reason}'
         return f'no light connected: none heard yet on {state.name}'
+
+    def poll(self, tolerance: float) -> None:
+        """
+        Publish diagnostics if it is time to, or if a level has changed.
+
+        :param tolerance: how much too early it may be, s.
+        """
+        now = self._link.clock()
+        if now >= self._diagnostics_due - tolerance:
+            self._diagnostics_due = max(self._diagnostics_due, now - tolerance) + self._period
+            self.publish_diagnostics()
+        elif self._worst(now) != self._levels:
+            self.publish_diagnostics()
+
+    def _worst(self, now: float) -> list[bytes]:
+        """Return the levels that would be published now."""
+        levels = [level(link_findings(
+            self._link.state(), self._controller, self.light, now=now, started=self._started))]
+        if self.light is not None and self.light.identification.settled(now):
+            levels.append(level(lamp_findings(self.light, now)))
+        return levels
+
+    def _check_lamp(self) -> None:
+        """Publish at once where the lamp's level has changed; asked after each status."""
+        light = self.light
+        if light is not None and self._levels[1:] not in (
+                [], [level(lamp_findings(light, self._link.clock()))]):
+            self.publish_diagnostics()
 
     def publish_diagnostics(self) -> None:
         """Publish both statuses, or only the link's while it is open who the light is."""
@@ -108,20 +137,5 @@ class IlluminatorNode(Node):
                 self._hardware_id = self._hardware_id or hardware_id(light)
                 array.status.append(
                     lamp_status(self.get_name(), self._hardware_id, light, now))
+            self._levels = [status.level for status in array.status]
             self._diagnostics.publish(array)
-
-    def _check_levels(self) -> None:
-        """Publish at once where a level has changed."""
-        light = self.light
-        if light is None:
-            return
-        level = max((finding[0] for finding in lamp_findings(light, self._link.clock())),
-                    default=b'\0')
-        levels = (light.connected, level)
-        if levels != self._levels:
-            self._levels = levels
-            self.publish_diagnostics()
-
-    def link_changed(self) -> None:
-        """Publish diagnostics, since the link was opened or lost."""
-        self.publish_diagnostics()

@@ -87,6 +87,9 @@ class ParameterSpec:
             value = float(value)
         if wanted is list and isinstance(value, list | tuple):
             value = list(value)
+        if value is False and 'off' in self.choices:
+            # For YAML, on the command line too, a bare off is a boolean.
+            value = 'off'
         if type(value) is not wanted:
             raise ParameterError(f'{self.name}: {value!r} is no {_TYPE_NAMES[wanted]}')
         if self.choices and value not in self.choices:
@@ -187,7 +190,7 @@ def declare_link_parameters(node: Node) -> LinkParameters:
 
 
 def _parse_names(entries: list[str]) -> dict[Source, str]:
-    names = {}
+    names: dict[Source, str] = {}
     for entry in filter(None, entries):
         ids, equals, name = entry.partition('=')
         system, slash, component = ids.partition('/')
@@ -196,7 +199,10 @@ def _parse_names(entries: list[str]) -> dict[Source, str]:
             raise ParameterError(f'names: {entry!r} is not of the form 1/244=belly')
         if not (name.replace('_', 'a').isalnum() and name.isascii() and not name[0].isdigit()):
             raise ParameterError(f'names: {name!r} in {entry!r} is no node name')
-        names[Source(int(system), int(component))] = name
+        source = Source(int(system), int(component))
+        if source in names or name in names.values():
+            raise ParameterError(f'names: {entry!r} repeats an address or a name')
+        names[source] = name
     return names
 
 

@@ -21,6 +21,8 @@ import threading
 import time
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -35,6 +37,9 @@ from .parameters import declare_link_parameters, LinkParameters, ParameterError
 # s; SIGINT and SIGTERM end the process within 1 s, of which ROS takes 0.2 s.
 OFF_LIMIT = 0.5
 STOP_LIMIT = 0.15
+# s between looks at whether diagnostics are due or have got worse. One timer does for all nodes:
+# each of their own would have rclpy wake up for it and look through all of them.
+TICK = 0.25
 
 
 class BridgeProcess:
@@ -66,6 +71,14 @@ class BridgeProcess:
         self._ended = threading.Event()
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
+        self._tick = min(TICK, parameters.diagnostics_period)
+        # On a steady clock: with use_sim_time and no /clock a ROS timer never fires.
+        node.create_timer(self._tick, self._poll, ReentrantCallbackGroup(),
+                          Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _poll(self) -> None:
+        for node in list(self.nodes):
+            node.poll(self._tick / 2)
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
@@ -129,7 +142,7 @@ class BridgeProcess:
         else:
             logger.warning(f'link not open: {event.name}: {event.reason}; trying again')
         for node in list(self.nodes):
-            node.link_changed()
+            node.publish_diagnostics()
 
     def _stop(self) -> None:
         """Switch the lights off if that is wanted, and close the link; takes 0.65 s at most."""

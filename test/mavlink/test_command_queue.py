@@ -67,6 +67,15 @@ def test_time_spent_waiting_is_none_of_the_time_taken() -> None:
     assert second.outcome.elapsed == pytest.approx(0.02)
 
 
+def test_limit_of_a_command_that_waits_is_kept_to_the_moment() -> None:
+    rig = Rig()
+    rig.start()
+    second = rig.start(limit=0.2)
+    rig.run(0.4)
+    assert second.ending is Ending.OUT_OF_TIME
+    assert second.ended_at - rig.frames[0][0] == pytest.approx(0.2)
+
+
 def test_only_so_many_wait_and_the_next_is_told() -> None:
     rig = Rig()
     runs = [rig.start() for _ in range(MAX_WAITING + 2)]

@@ -235,6 +235,14 @@ def test_numbers_are_those_of_pymavlink_where_it_has_them(enum: Any, prefix: str
         assert getattr(common, f'{prefix}_{entry.name}', entry) == entry
 
 
+def test_commands_and_ids_are_those_of_the_illuminator_protocol() -> None:
+    assert {command.name: int(command) for command in MavCmd} == {
+        'ILLUMINATOR_ON_OFF': 405, 'DO_ILLUMINATOR_CONFIGURE': 406,
+        'SET_MESSAGE_INTERVAL': 511, 'REQUEST_MESSAGE': 512}
+    assert (MavType.ILLUMINATOR, MavType.ONBOARD_CONTROLLER) == (44, 18)
+    assert dialect.MAV_COMP_ID_ILLUMINATOR == common.MAV_COMP_ID_ILLUMINATOR == 243
+
+
 def test_every_result_has_a_name_of_its_own() -> None:
     names = [result_name(result) for result in range(256)]
     assert len(set(names)) == 256

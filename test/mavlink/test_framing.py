@@ -174,6 +174,13 @@ def test_counters_tell_frames_and_faults_apart() -> None:
     assert counters.skipped_bytes == len(b'noise') + len(bad) + 13
 
 
+def test_unknown_ids_of_mavlink_1_are_counted_too() -> None:
+    decoder = Decoder()
+    assert 255 not in LAYOUTS
+    decoder.feed(raw_v1(255, b'\1', crc_extra=0) + frame_of())
+    assert (decoder.counters.unknown_ids, decoder.counters.frames) == (1, 1)
+
+
 def test_counters_do_not_depend_on_the_pieces() -> None:
     foreign = raw_v2(FOREIGN_ID, b'\1\2\3', crc_extra=0)
     data = b'\xfd\xfe noise' + frame_of() + spoilt(frame_of()) + foreign + frame_of()

@@ -147,6 +147,12 @@ def test_all_of_2000_frames_are_found_with_up_to_40_random_bytes_between_them(se
 
 # What is held back
 
+def test_longest_frame_there_is_has_280_bytes() -> None:
+    longest = raw_v2(0, b'\1' * 255, incompat=FLAG_SIGNED) + bytes(13)
+    assert len(longest) == MAX_FRAME == 280
+    assert len(in_pieces(longest, [7])) == 1
+
+
 @given(st.lists(st.one_of(noise, frames), max_size=20),
        st.lists(st.integers(1, 300), min_size=1, max_size=5))
 @PROPERTY
@@ -191,6 +197,15 @@ def test_frame_that_has_only_begun_since_is_not_given_up() -> None:
     decoder.feed(frame_of(sequence=1) + frame[:20])
     assert [found.sequence for found in decoder.give_up(noise_taken)] == [1]
     assert [found.sequence for found in decoder.feed(frame[20:])] == [2]
+
+
+def test_frame_that_begins_where_the_noise_ends_is_not_given_up() -> None:
+    decoder, frame = Decoder(), frame_of()
+    decoder.feed(bytes((0xFD, 255, 0, 0, 0, 1, 1, 0, 0, 0)))
+    noise_taken = decoder.taken
+    decoder.feed(frame[:20])
+    assert decoder.give_up(noise_taken) == []
+    assert len(decoder.feed(frame[20:])) == 1
 
 
 @given(st.lists(st.one_of(noise, frames), max_size=10))

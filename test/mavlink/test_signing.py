@@ -272,9 +272,17 @@ def test_streams_that_have_fallen_silent_make_room() -> None:
     assert signing.accepts(signed(stamp_at(NOW + 61)), NOW + 61)
 
 
-def test_forgotten_stream_lets_no_replay_in_even_if_the_clock_steps_back() -> None:
+def test_stream_is_not_forgotten_as_long_as_it_would_be_believed_as_a_new_one() -> None:
     signing = checker()
     fill(signing, NOW)
-    assert signing.accepts(signed(stamp_at(NOW + 61)), NOW + 61)
+    assert not signing.accepts(signed(stamp_at(NOW + 60)), NOW + 60)
+
+
+@pytest.mark.parametrize('newcomer', [1, 61])
+def test_forgotten_stream_lets_no_replay_in_even_if_the_clock_steps_back(
+        newcomer: float) -> None:
+    signing = checker()
+    fill(signing, NOW)
+    assert signing.accepts(signed(stamp_at(NOW + newcomer)), NOW + 61)
     for now in (NOW + 61, NOW, NOW - 3600):
         assert not signing.accepts(signed(STAMP, source=Source(100, 0)), now)

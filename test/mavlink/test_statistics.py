@@ -164,6 +164,16 @@ def test_frame_that_comes_late_after_all_makes_no_negative_loss() -> None:
     assert counter.recent_loss(1.0) == 0.0
 
 
+def test_loss_is_shown_for_a_while() -> None:
+    counter = SequenceCounter()
+    losses = []
+    for second in range(int(LATELY) + 1):
+        counter.add(second if second < 2 else second + 10)
+        losses.append(counter.recent_loss(float(second)))
+    assert losses[2:] == sorted(losses[2:], reverse=True)
+    assert losses[-1] == pytest.approx(100 * 10 / 20)
+
+
 def test_old_losses_are_forgotten() -> None:
     counter = SequenceCounter()
     counter.recent_loss(0.0)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import os
+from pathlib import Path
 import random
 import socket
 import threading
@@ -60,8 +61,9 @@ def own_domain() -> Iterator[int]:
                 continue
             break
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        # Over shared memory, discovery now and then takes 3 s where processes come and go.
-        os.environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
+        # The first name is that of Fast DDS 2, which Jazzy has, the second that of Fast DDS 3.
+        for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
+            os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
 
 

@@ -25,7 +25,6 @@ from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.framing import Frame
 from illuminator_ros.mavlink.signing import (
     EPOCH,
-    MAX_TICKS,
     signature,
     Signing,
     SigningMode,
@@ -36,7 +35,8 @@ KEY = bytes(range(32))
 WRONG_KEY = bytes(range(1, 33))
 # Unix time, s, of a day long after the epoch of signing.
 NOW = EPOCH + 400_000_000.0
-LAST_STAMP = MAX_TICKS
+# Of 48 bits.
+LAST_STAMP = 2 ** 48 - 1
 
 
 def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Source = LIGHT,

@@ -1,0 +1,257 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Hostile input through a whole link: no exception, bounded state, and service as before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import itertools
+import math
+import struct
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+from support.frames import frame_of, raw_v2
+from support.heartbeats import heartbeat_frame
+from support.siege import BRIDGE, BridgeSiege, GENUINE, LightSiege, Siege, SIEGES
+
+from illuminator_ros.illuminator.controller import MAX_LIGHTS
+from illuminator_ros.illuminator.operation import MAX_WAITING, Result
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    ComponentInformationBasic,
+    Heartbeat,
+    IlluminatorStatus,
+    LAYOUTS,
+    Source,
+)
+from illuminator_ros.mavlink.reception import MAX_DECODERS
+from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
+from illuminator_ros.mavlink.statistics import MAX_SOURCES
+from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+
+PEER = ('127.0.0.1', 40_000)
+
+# Every value of every field
+
+FLOAT = st.floats(width=32) | st.sampled_from([math.nan, math.inf, -math.inf, 1e-45, 3.4e38, -0.0])
+BYTE = st.integers(0, 0xFF)
+LONG = st.integers(0, 0xFFFFFFFF)
+COMMAND = st.sampled_from([405, 406, 511, 512]) | st.integers(0, 0xFFFF)
+SOURCE = st.sampled_from([GENUINE, BRIDGE, Source(1, 1)]) | st.builds(Source, BYTE, BYTE)
+TARGET = [BYTE | st.just(1), BYTE | st.sampled_from([0, 194, 243])]
+INT32 = st.integers(-0x80000000, 0x7FFFFFFF)
+
+
+def char(size: int) -> st.SearchStrategy[bytes]:
+    """Return whatever may stand in a char field, terminated or not."""
+    return st.binary(max_size=size) | st.text(max_size=size).map(
+        lambda text: text.encode('utf-8', 'replace')[:size])
+
+
+MESSAGE = st.one_of(
+    st.builds(Heartbeat, st.just(44) | BYTE, BYTE, BYTE, LONG, BYTE, BYTE),
+    st.builds(IlluminatorStatus, LONG, BYTE, BYTE, LONG, BYTE, *[FLOAT] * 6),
+    st.builds(ComponentInformationBasic, LONG, st.integers(0, (1 << 64) - 1), LONG, char(32),
+              char(32), char(24), char(24), char(32)),
+    st.builds(CommandAck, COMMAND, st.integers(0, 10) | BYTE, BYTE, INT32, *TARGET),
+    st.builds(CommandLong, *TARGET, COMMAND, BYTE, *[FLOAT] * 7),
+    st.builds(CommandInt, *TARGET, BYTE, COMMAND, BYTE, BYTE, *[FLOAT] * 4, INT32, INT32, FLOAT))
+FRAME = st.builds(frame_of, MESSAGE, BYTE, SOURCE)
+PIECE = FRAME | st.builds(
+    lambda message_id, payload, source, flags: raw_v2(
+        message_id, payload, source=source, incompat=flags),
+    st.sampled_from(sorted(LAYOUTS)), st.binary(max_size=255), SOURCE,
+    st.sampled_from([0, 1, 2, 255])) | st.binary(max_size=300)
+
+
+@pytest.mark.parametrize('kind', sorted(SIEGES))
+@given(pieces=st.lists(PIECE, min_size=1, max_size=20))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_whatever_comes_nothing_breaks(kind: str, pieces: list[bytes]) -> None:
+    siege = SIEGES[kind]('hypothesis', SigningMode.OFF)
+    for piece in pieces:
+        siege.link.receive((piece, PEER))
+        siege.link.run(0.05)
+    siege.check_bounds()
+    siege.check_service()
+    siege.close()
+
+
+@pytest.mark.parametrize(('kind', 'mode'), list(itertools.product(sorted(SIEGES), SigningMode)))
+def test_an_attack_breaks_nothing(kind: str, mode: SigningMode) -> None:
+    siege = SIEGES[kind](('test', kind, mode.value), mode)
+    while siege.inputs < 2000:
+        siege.attack()
+    siege.check_bounds()
+    siege.check_service()
+    siege.close()
+
+
+# Floods
+
+@pytest.fixture
+def bridge() -> Iterator[BridgeSiege]:
+    """Return the drone's side with its genuine light."""
+    siege = BridgeSiege('flood', SigningMode.OFF)
+    yield siege
+    siege.close()
+
+
+def flood(siege: Siege, frames: Iterator[bytes] | list[bytes], *, peers: int = 1) -> None:
+    """Send frames, at one moment, from so many peers in turn."""
+    for number, frame in enumerate(frames):
+        siege.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
+
+
+def many_sources(count: int) -> list[Source]:
+    """Return addresses, none of them honest."""
+    return [Source(2 + number // 250, 1 + number % 250) for number in range(count)]
+
+
+def test_a_flood_of_lights_is_bounded(bridge: BridgeSiege) -> None:
+    flood(bridge, [heartbeat_frame(source) for source in many_sources(3 * MAX_LIGHTS)])
+    assert len(bridge.controller.lights) == MAX_LIGHTS
+    assert bridge.controller.passed_over
+    bridge.check_bounds()
+    bridge.check_service()
+
+
+def test_a_flood_of_components_is_bounded(bridge: BridgeSiege) -> None:
+    flood(bridge, [heartbeat_frame(source, mav_type=2) for source in many_sources(3000)])
+    assert len(bridge.link._traffic.sources) == MAX_SOURCES
+    assert len(bridge.link._routes) == MAX_ROUTES
+    assert list(bridge.controller.lights) == [GENUINE]
+    bridge.check_service()
+
+
+def test_a_flood_of_peers_is_bounded(bridge: BridgeSiege) -> None:
+    flood(bridge, [heartbeat_frame(Source(2, 1))] * 3000, peers=3000)
+    assert len(bridge.link.udp._peers) == MAX_PEERS
+    assert len(bridge.link._reception) == MAX_DECODERS
+    assert len(bridge.link._routes._ways[Source(2, 1)]) == MAX_WAYS
+    bridge.check_service()
+
+
+def test_a_flood_of_peers_that_claim_to_be_the_light_takes_it_from_nobody(
+    bridge: BridgeSiege,
+) -> None:
+    flood(bridge, [heartbeat_frame(GENUINE)] * 3000, peers=3000)
+    bridge.check_service()
+
+
+def test_a_flood_of_unknown_messages_leaves_nothing_behind(bridge: BridgeSiege) -> None:
+    unknown = (number for number in range(1 << 20, 1 << 24) if number not in LAYOUTS)
+    before = len(bridge.link._traffic.sources)
+    flood(bridge, [raw_v2(message_id, b'x', crc_extra=0, source=Source(9, 9))
+                   for message_id in itertools.islice(unknown, 5000)])
+    assert len(bridge.link._traffic.sources) == before
+    assert bridge.link._reception.counters.unknown_ids >= 5000
+    bridge.check_service()
+
+
+def test_a_flood_of_signed_streams_is_bounded() -> None:
+    siege = BridgeSiege('streams', SigningMode.REQUIRE)
+    attacker = siege.attacker
+    flood(siege, (attacker._signed(Heartbeat.id, bytes(9), 0, source, siege.link.now)
+                  for source in many_sources(20 * MAX_STREAMS)))
+    assert len(siege.link._signing._streams) == MAX_STREAMS
+    siege.check_service()
+    siege.close()
+
+
+def test_a_flood_of_restarts_is_bounded(bridge: BridgeSiege) -> None:
+    statuses = [status(uptime_ms=number % 2 * 1_000_000) for number in range(2000)]
+    flood(bridge, [frame_of(one, 0, GENUINE) for one in statuses])
+    bridge.check_bounds()
+    bridge.check_service()
+
+
+def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
+    bridge: BridgeSiege,
+) -> None:
+    light = bridge.controller.lights[GENUINE]
+    answers: list[list[Result]] = [[] for _ in range(10 * MAX_WAITING)]
+
+    def ask(now: float) -> None:
+        for results in answers:
+            light.enable(True, now, lambda result, now, to=results: to.append(result))
+
+    bridge.link.ask(ask)
+    bridge.check_bounds()
+    bridge.check_service()
+    assert [len(results) for results in answers] == [1] * len(answers)
+    assert [results[0].success for results in answers].count(True) == MAX_WAITING
+
+
+# Values
+
+def status(uptime_ms: int = 100_000, **fields: Any) -> Any:
+    """Return an ILLUMINATOR_STATUS, some fields other than usual."""
+    usual = {'enable': 1, 'mode_bitmask': 3, 'error_status': 0, 'mode': 1, 'brightness': 50.0,
+             'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'temp_c': 25.0,
+             'min_strobe_period': 0.05, 'max_strobe_period': 10.0}
+    return IlluminatorStatus(uptime_ms=uptime_ms, **{**usual, **fields})
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 3.4e38, -3.4e38])
+@pytest.mark.parametrize(('field', 'name'), [
+    ('brightness', 'brightness'), ('strobe_period', 'strobe_period'),
+    ('strobe_duty_cycle', 'strobe_duty_cycle'), ('temp_c', 'temperature')])
+def test_no_number_beyond_belief_reaches_an_observer_as_a_value(
+    bridge: BridgeSiege, field: str, name: str, value: float,
+) -> None:
+    light = bridge.controller.lights[GENUINE]
+    flood(bridge, [frame_of(status(light.status.uptime_ms + 10, **{field: value}), 0, GENUINE)])
+    assert getattr(light.status, name) is None
+    assert field in light.status.invalid[0]
+
+
+@pytest.mark.parametrize('low', [math.nan, -1.0, math.inf, 5.0])
+def test_limits_beyond_belief_refuse_nothing(bridge: BridgeSiege, low: float) -> None:
+    light = bridge.controller.lights[GENUINE]
+    flood(bridge, [frame_of(status(light.status.uptime_ms + 10, min_strobe_period=low,
+                                   max_strobe_period=math.nan), 0, GENUINE)])
+    assert light.agreement.check({'strobe_period': 7.0}) == {'strobe_period': 7.0}
+
+
+def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSiege) -> None:
+    # It compares equal to 0, but sent back to the light it would be denied for ever.
+    light = bridge.controller.lights[GENUINE]
+    flood(bridge, [frame_of(status(light.status.uptime_ms + 10, strobe_period=1e-45), 0, GENUINE)])
+    assert light.agreement.agreed.strobe_period == 0.0
+    bridge.check_service()
+
+
+@pytest.mark.parametrize('param', [math.nan, math.inf, -math.inf, -1.0, 0.5, 3.4e38])
+@pytest.mark.parametrize('command', [405, 406, 511, 512])
+def test_a_light_refuses_params_that_mean_nothing(command: int, param: float) -> None:
+    siege = LightSiege('params', SigningMode.OFF)
+    siege._acks.clear()
+    siege._command(command, *[param] * 7)
+    assert [ack.result for ack in siege._acks] == [2]
+    siege.check_service()
+    siege.close()
+
+
+def test_floats_survive_the_wire_as_they_are() -> None:
+    # Or the tests above would be none.
+    frame = frame_of(status(brightness=math.nan))
+    assert math.isnan(struct.unpack('<f', frame[18:22])[0])

@@ -1,0 +1,192 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What ``/diagnostics`` is made of: names, ids, keys, values, period (DESIGN.md, 3.5)."""
+
+import re
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from support.light import ServedLight
+from support.ros import Recorder, Ros, running_bridge, STREAM
+
+INFORMATION = 396
+# What is text by nature; all other values are one number or true or false.
+TEXTS = {'url', 'address', 'mode', 'agreed', 'vendor', 'model', 'software_version',
+         'hardware_version', 'serial_number'}
+LINK_KEYS = {
+    'url', 'open', 'since_s', 'openings', 'peers', 'lights', 'frames_received', 'frames_sent',
+    'frames_dropped', 'bytes_received', 'bytes_sent', 'bytes_received_per_s',
+    'bytes_sent_per_s', 'crc_errors', 'frames_lost', 'frames_duplicate', 'frames_reordered',
+    'loss_percent', 'round_trip_p50_ms', 'round_trip_p95_ms', 'commands_sent',
+    'commands_resent', 'commands_unanswered', 'signatures_good', 'signatures_bad',
+    'signatures_replayed', 'unsigned_frames',
+}
+LAMP_KEYS = {
+    'address', 'connected', 'heard_s_ago', 'restarts', 'enabled', 'mode', 'brightness_percent',
+    'strobe_period_s', 'strobe_duty_cycle_percent', 'temperature_c', 'error_flags', 'uptime_s',
+    'status_s_ago', 'agreed', 'vendor', 'model', 'software_version', 'hardware_version',
+    'serial_number',
+}
+
+
+@pytest.fixture(scope='module')
+def recorder(ros: Ros, shared_bridge: Any) -> Recorder:
+    """Return the arrays of the module's bridge, with link and lamp."""
+    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+    recorder.wait(lambda array: len(array.status) == 2)
+    return recorder
+
+
+def newest(recorder: Recorder, part: str) -> Any:
+    recorder.clear()
+    array = recorder.wait()
+    [status] = [status for status in array.status if status.name == f'illuminator: {part}']
+    return status
+
+
+def values(status: Any) -> dict[str, str]:
+    return {entry.key: entry.value for entry in status.values}
+
+
+class TestArray:
+    def test_it_has_the_link_and_the_lamp(self, recorder: Recorder) -> None:
+        names = [status.name for status in recorder.wait().status]
+
+        assert names == ['illuminator: link', 'illuminator: lamp']
+
+    def test_it_comes_once_a_second(self, light: ServedLight, recorder: Recorder) -> None:
+        recorder.clear()
+
+        arrays = [recorder.wait(count=n) for n in (1, 2, 3)]
+
+        stamps = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9 for array in arrays]
+        assert [later - earlier for earlier, later in zip(stamps, stamps[1:], strict=False)
+                ] == pytest.approx([1.0, 1.0], abs=0.2)
+
+    def test_its_period_is_a_parameter(self, own_ros: Ros, port: int) -> None:
+        with running_bridge(own_ros.domain, port, diagnostics_period=0.1):
+            recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+            recorder.wait(count=2)
+            first, last = recorder.messages[0], recorder.wait(count=11)
+
+        stamps = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9
+                  for array in (first, last)]
+        assert stamps[1] - stamps[0] == pytest.approx(1.0, abs=0.3)
+
+
+class TestHardwareId:
+    def test_the_link_s_is_its_url(self, recorder: Recorder) -> None:
+        [link, _] = recorder.wait().status
+
+        assert re.fullmatch(r'udpin://127\.0\.0\.1:\d+', link.hardware_id)
+
+    def test_the_lamp_s_is_its_serial_number(self, recorder: Recorder) -> None:
+        [_, lamp] = recorder.wait().status
+
+        assert lamp.hardware_id == 'T-1'
+
+    @pytest.mark.parametrize('without', ['serial number', 'message'])
+    def test_a_light_without_serial_number_has_its_address_for_it(
+        self, own_ros: Ros, port: int, without: str,
+    ) -> None:
+        light = ServedLight(port)
+        if without == 'message':
+            light.fake.answers.discard(INFORMATION)
+        light.fake.identity = type(light.fake.identity)('maker', 'torch', '', '', '')
+        with running_bridge(own_ros.domain, port), light:
+            recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+
+            array = recorder.wait(lambda array: len(array.status) == 2)
+
+            assert array.status[1].hardware_id == 'mavlink:1/243'
+
+    def test_it_never_changes_though_the_light_tells_another_later(
+        self, own_ros: Ros, port: int,
+    ) -> None:
+        light = ServedLight(port)
+        light.fake.answers.discard(INFORMATION)
+        with running_bridge(own_ros.domain, port), light:
+            recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+            recorder.wait(lambda array: len(array.status) == 2)
+
+            light.send(light.fake.information())
+
+            array = recorder.wait(lambda array: 'serial_number' in values(array.status[-1]))
+            assert array.status[1].hardware_id == 'mavlink:1/243'
+
+
+class TestValues:
+    @pytest.mark.parametrize(('part', 'keys'), [('link', LINK_KEYS), ('lamp', LAMP_KEYS)])
+    def test_the_keys(self, recorder: Recorder, part: str, keys: set[str]) -> None:
+        assert set(values(newest(recorder, part))) == keys
+
+    @pytest.mark.parametrize('part', ['link', 'lamp'])
+    def test_what_is_no_text_is_one_number_or_a_truth_value(
+        self, recorder: Recorder, part: str,
+    ) -> None:
+        for key, value in values(newest(recorder, part)).items():
+            if key not in TEXTS and value not in ('true', 'false'):
+                assert float(value) == float(value), f'{key}: {value}'
+
+    def test_the_lamp_s_are_those_of_the_newest_status(
+        self, light: ServedLight, recorder: Recorder,
+    ) -> None:
+        light.report(enable=1, mode=2, brightness=35.5, strobe_period=0.5,
+                     strobe_duty_cycle=20.0, temp_c=41.25, error_status=0)
+
+        lamp = values(newest(recorder, 'lamp'))
+
+        assert {key: lamp[key] for key in (
+            'enabled', 'mode', 'brightness_percent', 'strobe_period_s',
+            'strobe_duty_cycle_percent', 'temperature_c', 'error_flags', 'connected',
+            'address', 'vendor', 'model', 'serial_number')} == {
+                'enabled': 'true', 'mode': 'external_sync', 'brightness_percent': '35.5',
+                'strobe_period_s': '0.5', 'strobe_duty_cycle_percent': '20',
+                'temperature_c': '41.25', 'error_flags': '0', 'connected': 'true',
+                'address': '1/243', 'vendor': 'maker', 'model': 'torch', 'serial_number': 'T-1'}
+
+    def test_what_was_agreed_stands_beside_what_is_reported(
+        self, light: ServedLight, recorder: Recorder,
+    ) -> None:
+        light.report(mode=1, brightness=90.0, strobe_period=0.0, strobe_duty_cycle=0.0)
+        light.report(brightness=45.0, error_status=1)
+
+        lamp = values(newest(recorder, 'lamp'))
+
+        light.report(brightness=90.0, error_status=0)
+        assert lamp['brightness_percent'] == '45'
+        assert lamp['agreed'] == ('mode internal_control, brightness 90 %, strobe_period 0 s, '
+                                  'strobe_duty_cycle 0 %')
+
+    def test_what_cannot_be_true_has_no_value(
+        self, light: ServedLight, recorder: Recorder,
+    ) -> None:
+        light.report(brightness=float('nan'))
+        light.fake.stream = 0.0
+
+        assert 'brightness_percent' not in values(newest(recorder, 'lamp'))
+        light.report(brightness=90.0)
+
+    def test_the_link_counts(self, light: ServedLight, recorder: Recorder) -> None:
+        before = values(newest(recorder, 'link'))
+        for _ in range(3):
+            light.report()
+
+        after = values(newest(recorder, 'link'))
+
+        assert int(after['frames_received']) >= int(before['frames_received']) + 3
+        assert int(after['bytes_received']) > int(before['bytes_received'])
+        assert (after['open'], after['peers'], after['lights']) == ('true', '1', '1')

@@ -1,0 +1,335 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The drone's side and the light's side of a link under attack, and what must hold meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import math
+import random
+from typing import Any
+
+from support.attacker import Attacker
+from support.simulated_link import SimulatedLink
+
+from illuminator_ros.illuminator.controller import Controller, MAX_LIGHTS
+from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
+from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.model import Configuration, Identity, Status
+from illuminator_ros.illuminator.observer import Cause, LightObserver
+from illuminator_ros.illuminator.operation import Done, Result
+from illuminator_ros.illuminator.operation import MAX_WAITING as MAX_WAITING_OPERATIONS
+from illuminator_ros.mavlink.command import MAX_WAITING
+from illuminator_ros.mavlink.dialect import (
+    CommandLong,
+    decode_payload,
+    encode_payload,
+    HANDLED,
+    LAYOUTS,
+    MavResult,
+    Source,
+)
+from illuminator_ros.mavlink.framing import Decoder, encode_frame
+from illuminator_ros.mavlink.reception import MAX_DECODERS
+from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
+from illuminator_ros.mavlink.statistics import MAX_SOURCES
+from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+
+KEY = bytes(range(32))
+BRIDGE = Source(1, 194)
+GENUINE = Source(1, 243)
+GENUINE_PEER = ('127.0.0.1', 20_000)
+# s after which every request has been answered.
+ANSWERED_WITHIN = 120.0
+
+
+class Party:
+    """Somebody honest at the far end of the link: signs, and counts its sequence numbers."""
+
+    def __init__(self, source: Source, mode: SigningMode) -> None:
+        self.source = source
+        self._signing = Signing(mode, KEY if mode is not SigningMode.OFF else b'', link_id=7)
+        self._sequence = 0
+        self._decoder = Decoder()
+
+    def frame(self, message: Any, now: float) -> bytes:
+        """Return a message as it goes on the wire."""
+        self._sequence = (self._sequence + 1) & 0xFF
+        data = encode_frame(
+            message.id, encode_payload(message), sequence=self._sequence, source=self.source,
+            crc_extra=LAYOUTS[message.id].crc_extra, signed=self._signing.signs)
+        return self._signing.sign(data, 1.7e9 + now) if self._signing.signs else data
+
+    def messages(self, data: bytes) -> list[Any]:
+        """Return the messages in a datagram."""
+        return [decode_payload(frame.message_id, frame.payload)
+                for frame in self._decoder.feed(data) if frame.message_id in HANDLED]
+
+
+class Sceptic(LightObserver):
+    """Does not take a value that nobody should believe."""
+
+    def status(self, light: Light, status: Status) -> None:
+        for value, low, high in (
+                (status.brightness, 0.0, 100.0), (status.strobe_period, 0.0, 3600.0),
+                (status.strobe_duty_cycle, 0.0, 100.0), (status.temperature, -273.2, 1000.0)):
+            assert value is None or low <= value <= high, status
+        assert status.enabled in (None, False, True), status
+        if status.limits.known:
+            assert 0 <= status.limits.min_strobe_period <= status.limits.max_strobe_period <= 3600
+        temperature = light.temperature
+        assert temperature is None or math.isfinite(temperature), status
+
+    def configured(
+        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
+    ) -> None:
+        assert 0 <= configuration.brightness <= 100, configuration
+        assert 0 <= configuration.strobe_period <= 3600, configuration
+        assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
+
+    def identified(self, light: Light, identity: Identity) -> None:
+        for text in (identity.vendor, identity.model, identity.serial_number):
+            assert text.isprintable() and len(text) <= 32, identity
+
+
+class Siege:
+    """
+    A link and its attacker.
+
+    :ivar inputs: datagrams so far.
+    :ivar frames: of them, frames that were taken for good.
+    """
+
+    def __init__(self, seed: object, mode: SigningMode) -> None:
+        self.mode = mode
+        self.inputs = 0
+        self.last: list[tuple[bytes, Any]] = []
+        self._random = random.Random(repr(('siege', seed)))
+        self.link = SimulatedLink(
+            self.make_endpoint(), self.take, signing=Signing(
+                mode, KEY if mode is not SigningMode.OFF else b''))
+        self.attacker = Attacker(seed, KEY, [GENUINE, BRIDGE, Source(1, 244), Source(1, 1)])
+        self.get_ready()
+
+    def make_endpoint(self) -> Any:
+        """Return what is attacked."""
+        raise NotImplementedError
+
+    def take(self, data: bytes, peer: Any) -> None:
+        """Take what the link sends."""
+        raise NotImplementedError
+
+    def get_ready(self) -> None:
+        """Do what comes before the attack."""
+
+    def busy(self) -> None:
+        """Do something honest in the middle of it."""
+        raise NotImplementedError
+
+    def check_bounds(self) -> None:
+        """Check that no table has grown beyond its bound."""
+        link = self.link
+        waiting = link.endpoint.outgoing
+        for what, size, bound in (
+                ('peers', len(link.udp._peers), MAX_PEERS),
+                ('decoders', len(link._reception), MAX_DECODERS),
+                ('sources', len(link._traffic.sources), MAX_SOURCES),
+                ('routes', len(link._routes), MAX_ROUTES),
+                ('crowded routes', len(link._routes._crowded), MAX_ROUTES),
+                ('ways', max(map(len, link._routes._ways.values()), default=0), MAX_WAYS),
+                ('streams', len(link._signing._streams), MAX_STREAMS),
+                ('outgoing', len(waiting), 0),
+                ('sequences', len(link._sequences), 8)):
+            assert size <= bound, f'{size} {what}, more than {bound}'
+
+    def attack(self) -> None:
+        """Send the next datagrams, and now and then do something honest."""
+        self.last = self.attacker.datagrams(self.link.now)
+        self.link.receive(*self.last)
+        self.inputs += len(self.last)
+        if self._random.random() < 0.2:
+            self.link.run(self._random.choice((0.001, 0.01, 0.1)))
+        if self._random.random() < 0.02:
+            self.busy()
+            self.check_bounds()
+
+    def check_service(self) -> None:
+        """Check that all is as before once the attack is over."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End it."""
+        self.link.stop()
+
+
+class BridgeSiege(Siege):
+    """The drone's side, with a genuine light that it is to serve all the time."""
+
+    def make_endpoint(self) -> Any:
+        self.results: list[list[Result]] = []
+        return Controller(BRIDGE, Settings(status_interval=1.0), on_light=self._found)
+
+    def _found(self, light: Light) -> None:
+        light.observer = Sceptic()
+
+    @property
+    def controller(self) -> Controller:
+        """What is attacked."""
+        controller: Controller = self.link.endpoint
+        return controller
+
+    def get_ready(self) -> None:
+        self._light = Device(DeviceProperties(source=GENUINE), self.link.now)
+        self._party = Party(GENUINE, self.mode)
+        self._genuine(3.0)
+        self._check_command()
+
+    def take(self, data: bytes, peer: Any) -> None:
+        if peer == GENUINE_PEER:
+            for message in self._party.messages(data):
+                self._light.receive(BRIDGE, message, self.link.now)
+                self._flush()
+
+    def _flush(self) -> None:
+        while self._light.outgoing:
+            frame = self._party.frame(self._light.outgoing.popleft()[1], self.link.now)
+            self.link.socket.inbox.append((frame, GENUINE_PEER))
+
+    def _genuine(self, seconds: float) -> None:
+        """Let time pass with the genuine light alone."""
+        until = self.link.now + seconds
+        while self.link.now < until:
+            self._light.poll(self.link.now)
+            self._flush()
+            self.link.receive()
+            self.link.run(min(self._light.next_deadline(), until) - self.link.now + 0.001)
+
+    def busy(self) -> None:
+        self._light.poll(self.link.now)
+        self._flush()
+        self.link.receive()
+        light = self._random.choice(list(self.controller.lights.values()))
+        brightness = self._random.uniform(0, 100)
+        results: list[Result] = []
+
+        def done(result: Result, now: float) -> None:
+            results.append(result)
+
+        asked = self._random.randrange(4)
+        if asked < 3:
+            self.results.append(results)
+        self.link.ask((
+            lambda now: light.enable(brightness > 50, now, done),
+            lambda now: light.agreement.configure({'brightness': brightness}, now, done),
+            lambda now: light.refresh(now, done),
+            lambda now: light.agreement.set_brightness(brightness, now))[asked])
+
+    def check_bounds(self) -> None:
+        super().check_bounds()
+        controller, sender = self.controller, self.controller.sender
+        lights = controller.lights.values()
+        for what, size, bound in (
+                ('lights', len(lights), MAX_LIGHTS),
+                ('commands', len(sender._active), 4 * MAX_LIGHTS),
+                ('waiting commands', _longest(sender._waiting.values()), MAX_WAITING),
+                ('queues of commands', len(sender._waiting), 4 * MAX_LIGHTS),
+                ('round trips', len(sender._round_trips), MAX_LIGHTS),
+                ('deadlines', len(controller._agenda._heap), 16 * MAX_LIGHTS),
+                ('operations', _longest(light._switching._operations for light in lights),
+                 MAX_WAITING_OPERATIONS),
+                ('changes', _longest(light.agreement._queue._operations for light in lights),
+                 MAX_WAITING_OPERATIONS)):
+            assert size <= bound, f'{size} {what}, more than {bound}'
+
+    def check_service(self) -> None:
+        self._genuine(ANSWERED_WITHIN)
+        assert all(len(results) == 1 for results in self.results), (
+            f'{sum(not results for results in self.results)} requests without an answer, '
+            f'{sum(len(results) > 1 for results in self.results)} with more than one')
+        self._check_command()
+
+    def _check_command(self) -> None:
+        """Check that the genuine light can be commanded, and is told apart from its copies."""
+        light = self.controller.lights[GENUINE]
+        assert light.connected
+        for on, brightness in ((True, 40.0), (False, 70.0)):
+            results: list[Result] = []
+
+            def done(result: Result, now: float, to: list[Result] = results) -> None:
+                to.append(result)
+
+            def ask(now: float, on: bool = on, brightness: float = brightness,
+                    done: Done = done) -> None:
+                light.enable(on, now, done)
+                light.agreement.configure({'brightness': brightness}, now, done)
+
+            self.link.ask(ask)
+            self._genuine(2.0)
+            assert [result.success for result in results] == [True, True], results
+            assert (self._light.enabled, self._light.configuration.brightness) == (
+                on, brightness)
+
+
+class LightSiege(Siege):
+    """Simulated lights, with a genuine drone that they are to obey all the time."""
+
+    def make_endpoint(self) -> Any:
+        return Devices([DeviceProperties(source=Source(1, 243 + i)) for i in range(3)], 1000.0)
+
+    def get_ready(self) -> None:
+        self._party = Party(BRIDGE, self.mode)
+        self._acks: list[Any] = []
+        self.busy()
+
+    def take(self, data: bytes, peer: Any) -> None:
+        if peer == GENUINE_PEER:
+            self._acks += [message for message in self._party.messages(data)
+                           if hasattr(message, 'result')]
+            del self._acks[:-100]
+
+    def busy(self) -> None:
+        self._command(405, self._random.randrange(2))
+
+    def _command(self, command: int, *params: float) -> None:
+        message = CommandLong(*GENUINE, command, 0, *[*params, 0, 0, 0, 0, 0, 0, 0][:7])
+        self.link.receive((self._party.frame(message, self.link.now), GENUINE_PEER))
+
+    def check_bounds(self) -> None:
+        super().check_bounds()
+        device: Device = self.link.endpoint.devices[0]
+        for device in self.link.endpoint.devices:
+            assert math.isfinite(device.thermal.temperature)
+            configuration = device.configuration
+            assert 0 <= configuration.brightness <= 100, configuration
+            assert 0 <= configuration.strobe_period <= 10, configuration
+            assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
+
+    def check_service(self) -> None:
+        # Peers and time stamps of the attack expire.
+        self.link.run(70.0)
+        for on in (1, 0):
+            self._acks.clear()
+            self._command(405, on)
+            assert [ack.result for ack in self._acks] == [MavResult.ACCEPTED]
+            assert self.link.endpoint.devices[0].enabled is bool(on)
+
+
+def _longest(queues: Iterable[Any]) -> int:
+    return max(map(len, queues), default=0)
+
+
+SIEGES: dict[str, Callable[[object, SigningMode], Siege]] = {
+    'bridge': BridgeSiege, 'light': LightSiege}

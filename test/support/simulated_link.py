@@ -1,0 +1,128 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A whole link without thread, network and waiting: datagrams in, datagrams out, a clock."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+import selectors
+from typing import Any
+
+from illuminator_ros.mavlink.endpoint import Endpoint
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.signing import Signing
+from illuminator_ros.mavlink.transport.udp import UdpChannel
+from illuminator_ros.mavlink.url import Address, UdpUrl
+
+Datagram = tuple[bytes, Any]
+URL = UdpUrl(Address('127.0.0.1', 0))
+# Turns of the link without anything coming in or time passing: more, and its thread would spin.
+MAX_IDLE_TURNS = 200
+
+
+class _Socket:
+    """What a UDP socket is to a channel."""
+
+    def __init__(self, take: Callable[[bytes, Any], None]) -> None:
+        self.inbox: deque[Datagram] = deque()
+        self._take = take
+
+    def recvfrom(self, size: int) -> Datagram:
+        if not self.inbox:
+            raise BlockingIOError
+        return self.inbox.popleft()
+
+    def sendto(self, data: bytes, peer: Any) -> None:
+        self._take(data, peer)
+
+    def close(self) -> None:
+        pass
+
+
+class _Selector(selectors.BaseSelector):
+    """Finds what is in the inbox, and lets time pass where there is nothing."""
+
+    def __init__(self, link: SimulatedLink) -> None:
+        self._link = link
+        self._keys: dict[Any, selectors.SelectorKey] = {}
+
+    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
+        self._keys[fileobj] = selectors.SelectorKey(fileobj, -1, events, data)
+        return self._keys[fileobj]
+
+    def unregister(self, fileobj: Any) -> selectors.SelectorKey:
+        return self._keys.pop(fileobj)
+
+    def get_map(self) -> Any:
+        return self._keys
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        link = self._link
+        if link.socket.inbox:
+            return [(self._keys[link.socket], selectors.EVENT_READ)]
+        assert timeout is not None
+        link.now = min(link.now + timeout, link.until)
+        return []
+
+
+class SimulatedLink(Link):
+    """
+    A link over UDP whose turns are taken one by one; a fault in it is raised, not logged.
+
+    :param take: called with what it sends, and to whom.
+    :ivar now: s.
+    """
+
+    def __init__(
+        self, endpoint: Endpoint, take: Callable[[bytes, Any], None], *,
+        signing: Signing | None = None, now: float = 1000.0,
+    ) -> None:
+        self.now = self.until = now
+        super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
+                         wall_clock=lambda: 1.7e9 + self.now, signing=signing)
+        self._selector.close()
+        self._selector = _Selector(self)
+        self.socket = _Socket(take)
+        self.udp = UdpChannel(URL)
+        self.udp._socket.close()
+        self.udp._socket = self.socket  # type: ignore[assignment]
+        self._opened(self.udp, now)
+
+    def _show_fault(self) -> None:
+        raise  # noqa: PLE0704 - it is called while an exception is handled
+
+    def receive(self, *datagrams: Datagram) -> None:
+        """Take datagrams, at one moment."""
+        self.socket.inbox.extend(datagrams)
+        self.until = self.now
+        while self.socket.inbox:
+            self._turn()
+
+    def ask(self, function: Callable[[float], Any]) -> None:
+        """Have a function called as other threads do."""
+        self.call(function)
+        self.until = self.now
+        self._turn()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.until = self.now + seconds
+        idle = 0
+        while self.now < self.until:
+            before = self.now
+            self._turn()
+            idle = idle + 1 if self.now == before and not self.socket.inbox else 0
+            assert idle < MAX_IDLE_TURNS, f'the thread would spin at {self.now}'
