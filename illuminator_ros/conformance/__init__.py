@@ -21,6 +21,8 @@ I/O. ``run`` is the command line.
 
 from __future__ import annotations
 
+import signal
+
 
 def main(args: list[str] | None = None) -> int:
     """
@@ -28,5 +30,7 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name.
     """
+    # Until something has been changed there is nothing to bring back, nor to say.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     from .run import run
     return run(args)

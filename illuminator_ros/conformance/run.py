@@ -19,12 +19,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 import contextlib
+import functools
 import logging
 import os
 from pathlib import Path
+import queue
 import signal
 import sys
-import threading
 from types import FrameType
 from typing import Any
 
@@ -41,6 +42,8 @@ from .requirement import REQUIREMENTS
 from .suite import FIND_TIMEOUT, Suite
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+_Texts = queue.SimpleQueue['str | None']
 
 QUESTION = (
     'Some checks make the light strobe, and shine at 100 % for {heat:g} s. Strobing can trigger\n'
@@ -134,9 +137,9 @@ def _print(*texts: str) -> None:
         print(*texts, sep='\n', flush=True)
 
 
-def _show(event: LinkEvent) -> None:
+def _show(texts: _Texts, event: LinkEvent) -> None:
     if not event.is_open:
-        _print(f'link not open: {event.name}: {event.reason}; trying again')
+        texts.put(f'link not open: {event.name}: {event.reason}; trying again')
 
 
 def _write(path: str | None, text: str) -> bool:
@@ -178,28 +181,36 @@ def run(args: list[str] | None = None) -> int:
     consent = _consent(options)
     bench = Bench(identity, target=options.target, consent=consent, heat=options.heat,
                   checksum_errors=lambda: link.state().decoding.crc_errors)
-    link = Link(url, bench, label=options.url, on_event=_show, signing=signs, store=store)
+    # Whoever does not read what is written must not hold up the link, which has times to keep.
+    texts: _Texts = queue.SimpleQueue()
+    link = Link(url, bench, label=options.url, on_event=functools.partial(_show, texts),
+                signing=signs, store=store)
     suite = Suite(bench, only=options.only, find_timeout=options.wait,
-                  on_result=lambda result: _print(*lines(result, verbose=options.verbose)))
-    return _conduct(options, link, bench, suite)
+                  on_result=lambda result: texts.put(
+                      '\n'.join(lines(result, verbose=options.verbose))))
+    return _conduct(options, link, bench, suite, texts)
 
 
-def _conduct(options: argparse.Namespace, link: Link, bench: Bench, suite: Suite) -> int:
-    ended = threading.Event()
-
+def _conduct(
+    options: argparse.Namespace, link: Link, bench: Bench, suite: Suite, texts: _Texts,
+) -> int:
     def look(now: float) -> None:
         if not bench.running:
-            ended.set()
+            texts.put(None)
 
-    def interrupt() -> None:
-        link.call(bench.interrupt)
-
-    _Signals(interrupt)
+    _Signals(lambda: link.call(bench.interrupt))
     begun = link.clock()
     link.start()
     _print(f'checking the light on {options.url} ...')
-    while not ended.wait(0.1):
+    while True:
         link.call(look)
+        try:
+            text = texts.get(timeout=0.1)
+        except queue.Empty:
+            continue
+        if text is None:
+            break
+        _print(text)
     link.stop()
     report = Report(options.url, _light(bench), tuple(suite.results), suite.restored,
                     link.clock() - begun, suite.passed)
