@@ -57,7 +57,7 @@ class Agreement:
         self._wanted_at = 0.0
         self._restoring = False
         self._contradictions = 0
-        # Whether the last command failed: what it asked for may have been done nevertheless.
+        # Whether it is open what the last command did: it failed, or was not waited for.
         self._doubtful = False
         # What the light has accepted and then not shown.
         self._unfulfilled: Configuration | None = None
@@ -122,6 +122,12 @@ class Agreement:
         if unreachable := self._light.unreachable(now):
             self._light.observer.setpoint_failed(self._light, unreachable)
             return
+        current = self._queue.current
+        if (isinstance(current, Configure) and current.stream and not current.finished
+                and current.wanted.brightness == brightness):
+            # Under way already; what has come in between is overtaken.
+            self._setpoint = None
+            return
         self._setpoint = brightness
         self.poll(now)
         self._light.changed()
@@ -148,7 +154,7 @@ class Agreement:
         self, values: Mapping[str, Any], now: float, done: Done, *, stream: bool = False,
     ) -> None:
         def finished(result: Result, now: float) -> None:
-            self._doubtful = not result.success
+            self._doubtful = not result.success or result.superseded
             if result.contradicted:
                 self._unfulfilled = operation.wanted
                 self.discrepancy = result.message
@@ -202,11 +208,15 @@ class Agreement:
             self._setpoint = None
             self._light.observer.setpoint_failed(self._light, f'the light is lost: {reason}')
 
-    def take_status(self, status: Status, now: float) -> None:
-        """Confirm what is under way, or follow what somebody else has changed."""
+    def take_status(self, status: Status, sent_by: float, now: float) -> None:
+        """
+        Confirm what is under way, or follow what somebody else has changed.
+
+        :param sent_by: the latest time at which the status can have been sent.
+        """
         current = self._queue.current
         if current is not None:
-            current.status(status, now)
+            current.status(status, sent_by, now)
             return
         reported = status.configuration()
         if reported is None:

@@ -28,7 +28,7 @@ from .model import ErrorFlag, Identity, Limits, Status
 from .observer import LightObserver
 from .operation import Done, Enable, OperationQueue, Result
 from .refresh import Refresh
-from .uptime import compare_uptime, Uptime
+from .uptime import compare_uptime, SendingTimes, Uptime
 
 # s without a status after which the light is asked for one, and between the askings.
 STATUS_TIMEOUT = 2.5
@@ -82,6 +82,7 @@ class Light:
         self._status_due = math.inf
         # Whether it was lost since the newest status.
         self._was_away = False
+        self._sending_times = SendingTimes()
         self._refreshes: list[Refresh] = []
 
     # What comes in
@@ -111,9 +112,10 @@ class Light:
         self.measures_temperature |= bool(status.temperature)
         if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and was_away):
             self._restarted(now)
+        sent_by = self._sending_times.sent_by(status.uptime_ms, now)
         if self._switching.current:
-            self._switching.current.status(status, now)
-        self.agreement.take_status(status, now)
+            self._switching.current.status(status, sent_by, now)
+        self.agreement.take_status(status, sent_by, now)
         self._tell_refreshes(lambda refresh: refresh.status(now))
         # Last, since it takes longest: whoever waits for the status has been answered by then.
         self.observer.status(self, status)
@@ -135,6 +137,7 @@ class Light:
 
     def _restarted(self, now: float) -> None:
         self.restarts += 1
+        self._sending_times = SendingTimes()
         self.observer.restarted(self)
         self._set_up(now)
         self.agreement.restarted(now)

@@ -25,7 +25,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any, TYPE_CHECKING
 
@@ -55,12 +55,14 @@ class Result:
     :param message: what happened, for people.
     :param permanent: whether the same request will fail again.
     :param contradicted: whether the light accepted it and then showed something else.
+    :param superseded: whether the light accepted it, and a newer one was sent then.
     """
 
     success: bool
     message: str
     permanent: bool = False
     contradicted: bool = False
+    superseded: bool = False
 
 
 Done = Callable[[Result, float], None]
@@ -84,8 +86,10 @@ class Operation(ABC):
         self.finished = False
         self._done = done
         self._submitted = now
+        self._started = math.inf
         self._outcome: Outcome | None = None
         self._contradiction: Status | None = None
+        self._outdated = False
         self._accepted_at = math.inf
         self._confirm_until = math.inf
         self._ask_at = math.inf
@@ -121,6 +125,7 @@ class Operation(ABC):
         if unreachable := self.light.unreachable(now):
             self.fail(unreachable, now)
         else:
+            self._started = now
             self.light.sender.start(self.command(), now, self._answered, limit=self.limit)
 
     def _answered(self, outcome: Outcome, now: float) -> None:
@@ -140,11 +145,19 @@ class Operation(ABC):
         self._ask_at = now + ASK_INTERVAL
         self.light.request_status(now)
 
-    def status(self, status: Status, now: float) -> None:
-        """Take a status that is newer than all before."""
+    def status(self, status: Status, sent_by: float, now: float) -> None:
+        """
+        Take a status that is newer than all before.
+
+        :param sent_by: the latest time at which it can have been sent. One that was on its way
+            already when the command was sent says nothing of it: by a late acknowledgement of
+            an earlier command, it would even confirm what has never been done.
+        """
         if not self.confirming:
             return
-        if self.shown_by(status):
+        if sent_by < self._started:
+            self._outdated = True
+        elif self.shown_by(status):
             self.accepted(status)
             self._finish(self._success('confirmed by ILLUMINATOR_STATUS', now), now)
         else:
@@ -154,7 +167,8 @@ class Operation(ABC):
         """End an accepted change without its confirmation: a newer one replaces it."""
         if self.confirming:
             self.accepted(None)
-            self._finish(self._success('accepted, superseded', now), now)
+            self._finish(replace(
+                self._success('accepted, superseded', now), superseded=True), now)
 
     def poll(self, now: float) -> None:
         """Ask again, or end."""
@@ -177,7 +191,8 @@ class Operation(ABC):
             self._failure(f'but ILLUMINATOR_STATUS shows {found}', now, contradicted=True)
         elif self.light.sends_status:
             waited = format_seconds(now - self._accepted_at)
-            self._failure(f'but no ILLUMINATOR_STATUS came within {waited}', now)
+            later = 'later ' if self._outdated else ''
+            self._failure(f'but no {later}ILLUMINATOR_STATUS came within {waited}', now)
         else:
             self.accepted(None)
             self._finish(self._success(

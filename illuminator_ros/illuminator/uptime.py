@@ -12,11 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a light's uptime tells: time goes on, it has restarted, or the frame is an old one."""
+"""
+What a light's uptime tells: time goes on, it has restarted, or the frame is an old one.
+
+And how old: see :class:`SendingTimes`.
+"""
 
 from __future__ import annotations
 
 from enum import Enum
+import math
 
 WRAP_MS = 1 << 32
 # s; a frame later than this is not late, it is from another life of the light.
@@ -24,6 +29,8 @@ MAX_LATE = 5.0
 # Slack for clocks and links: s, and a share of the time passed.
 SLACK = 2.0
 DRIFT = 0.05
+# How wrong the clock of a light may be, as a share: an oscillator without a crystal.
+CLOCK_ERROR = 0.02
 
 
 class Uptime(Enum):
@@ -58,3 +65,31 @@ def compare_uptime(last_ms: int, new_ms: int, elapsed: float) -> Uptime:
         return Uptime.RUNNING
     late_ms = (last_ms - new_ms) % WRAP_MS
     return Uptime.LATE if late_ms <= 1000.0 * MAX_LATE else Uptime.RESTARTED
+
+
+class SendingTimes:
+    """
+    Tells when statuses were sent, at the latest, from their uptimes.
+
+    A frame that was on its way for long has an uptime that lags behind those of quicker frames.
+    Where nothing is known, or the light has no clock, a status counts as sent when it came.
+    """
+
+    def __init__(self) -> None:
+        # The least delayed status of late, and when it came: by then it had been sent.
+        self._uptime_ms = 0
+        self._came_at = -math.inf
+        # What uptimes differ by multiples of: some lights count in seconds. 0 is no clock.
+        self._step_ms = 0
+
+    def sent_by(self, uptime_ms: int, now: float) -> float:
+        """Return the latest time at which a status that has just come can have been sent, s."""
+        if self._came_at > -math.inf:
+            ahead_ms = (uptime_ms - self._uptime_ms + WRAP_MS // 2) % WRAP_MS - WRAP_MS // 2
+            self._step_ms = math.gcd(self._step_ms, ahead_ms)
+            slack = self._step_ms / 1000 + CLOCK_ERROR * (now - self._came_at)
+            sent_by = self._came_at + ahead_ms / 1000 + slack
+            if self._step_ms and sent_by < now:
+                return sent_by
+        self._uptime_ms, self._came_at = uptime_ms, now
+        return now

@@ -244,7 +244,6 @@ class CommandSender:
             entry.in_progress = True
             entry.progress = ack.progress if ack.progress <= 100 else None
             entry.due = now + PROGRESS_TIMEOUT
-            entry.deadline = math.inf
         elif ack.result == MavResult.TEMPORARILY_REJECTED:
             first, last = REJECTED_BACKOFF
             entry.due = now + min(first * 2 ** min(entry.rejected, 8), last)

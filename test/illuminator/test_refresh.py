@@ -15,7 +15,7 @@
 """Asking a light again for its status and its identity."""
 
 import pytest
-from support.back_to_back import Answer
+from support.records import Answer
 
 from illuminator_ros.illuminator.refresh import REFRESH_LIMIT
 from illuminator_ros.mavlink.dialect import INFORMATION_ID, MavCmd, MavResult, STATUS_ID

@@ -112,6 +112,28 @@ def test_a_setpoint_is_sent_again_where_the_light_shows_another(fake, faked):
     assert fake.fields['brightness'] == 40.0
 
 
+def test_a_setpoint_that_is_under_way_already_is_not_sent_again(fake, faked):
+    fake.apply_after = 0.2
+    publish(faked, 40.0, 50.0, 40.0)
+    faked.run(2.0)
+    assert [m.param2 for m in faked.commands(CONFIGURE)] == [40.0]
+    assert faked.light.agreement.agreed.brightness == 40.0
+
+
+def test_what_was_overtaken_before_it_was_confirmed_does_not_count_as_agreed(fake, faked):
+    # 30 is accepted, not done, and overtaken by 40, which is refused: is it 30 now?
+    fake.applies = False
+    publish(faked, 30.0)
+    faked.run(0.1)
+    fake.applies = True
+    fake.results[CONFIGURE] = [MavResult.DENIED, MavResult.ACCEPTED]
+    publish(faked, 40.0)
+    faked.run(0.1)
+    publish(faked, 30.0)
+    faked.run(0.5)
+    assert fake.fields['brightness'] == 30.0
+
+
 def test_the_last_setpoint_is_verified(fake, faked):
     fake.applies = False
     publish(faked, 30.0, 40.0)

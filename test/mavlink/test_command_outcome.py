@@ -64,9 +64,10 @@ def test_result_param2_is_kept() -> None:
 def test_counters_tell_first_tries_resends_and_silence() -> None:
     rig = Rig(retries=2)
     rig.ended()
-    rig.start(target=Source(1, 99))
-    rig.ack(ACCEPTED, source=Source(1, 99))
+    for component in (98, 99):
+        rig.start(target=Source(1, component))
+        rig.ack(ACCEPTED, source=Source(1, component))
     rig.ack(ACCEPTED, source=Source(1, 99))
     counters = rig.sender.counters
     assert (counters.sent, counters.resent, counters.unanswered, counters.unexpected_acks) == (
-        4, 2, 1, 1)
+        5, 2, 1, 1)

@@ -17,17 +17,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 import math
 from typing import Any
 
 from support.faulty_wire import Faults, FaultyWire
+from support.records import Answer, Recorder
 
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.model import Configuration, Identity, Status
-from illuminator_ros.illuminator.observer import Cause, LightObserver
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.dialect import (
     CommandInt,
@@ -48,69 +46,6 @@ ONE_LIGHT = (DeviceProperties(),)
 START = 1000.0
 # Turns at one moment: more of them mean that a link's thread would spin.
 MAX_TURNS = 100
-
-
-@dataclass
-class Recorder(LightObserver):
-    """Keeps what a light's observer is told; ``events`` has it all, in order."""
-
-    clock: Callable[[], float]
-    events: list[str] = field(default_factory=list)
-    statuses: list[Status] = field(default_factory=list)
-    identities: list[Identity] = field(default_factory=list)
-    changes: list[tuple[Cause, dict[str, Any]]] = field(default_factory=list)
-    restorations: list[tuple[bool, str]] = field(default_factory=list)
-    failed_setpoints: list[str] = field(default_factory=list)
-
-    def connected(self, light: Light) -> None:
-        self.events.append('connected')
-
-    def lost(self, light: Light, reason: str) -> None:
-        self.events.append(f'lost: {reason}')
-
-    def restarted(self, light: Light) -> None:
-        self.events.append('restarted')
-
-    def identified(self, light: Light, identity: Identity) -> None:
-        self.identities.append(identity)
-
-    def status(self, light: Light, status: Status) -> None:
-        self.statuses.append(status)
-
-    def configured(
-        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
-    ) -> None:
-        self.changes.append((cause, {name: getattr(configuration, name) for name in names}))
-
-    def restored(self, light: Light, success: bool, message: str) -> None:
-        self.restorations.append((success, message))
-
-    def setpoint_failed(self, light: Light, message: str) -> None:
-        self.failed_setpoints.append(message)
-
-
-@dataclass
-class Answer:
-    """What a request gets: all its results, of which there should be one."""
-
-    asked_at: float
-    results: list[Result] = field(default_factory=list)
-    ended_at: float = math.inf
-
-    def __call__(self, result: Result, now: float) -> None:
-        self.results.append(result)
-        self.ended_at = now
-
-    @property
-    def result(self) -> Result:
-        """The result; an error unless there is exactly one."""
-        (result,) = self.results
-        return result
-
-    @property
-    def seconds(self) -> float:
-        """How long it took."""
-        return self.ended_at - self.asked_at
 
 
 class _End:
@@ -227,8 +162,9 @@ class Pair:
         for end in (self.far, self.near):
             end.endpoint.poll(self.now)
             end.flush(self.now)
+        wakes_at = self.controller.next_deadline()
         for light in self.controller.lights.values():
-            assert self.controller.next_deadline() <= light.next_deadline(), 'a link would sleep'
+            assert wakes_at <= light.next_deadline(), 'a link would sleep'
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -248,6 +184,11 @@ class Pair:
         return self
 
     # The line
+
+    def mend(self) -> None:
+        """Let the line do no harm any more."""
+        for end in (self.near, self.far):
+            end.wire.faults = Faults()
 
     def open(self) -> None:
         """Open the line."""

@@ -1,0 +1,181 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Thousands of commands over lines that lose, repeat, reorder, delay and corrupt frames."""
+
+from __future__ import annotations
+
+from collections import Counter
+import random
+
+import pytest
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
+from support.loss_table import LOSS_TABLE
+from support.records import Answer
+from support.witness import CONFIGURE, Judge, ON_OFF, Request, TAKEN
+
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.light import Light
+from illuminator_ros.illuminator.observer import Cause
+from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.illuminator.thermal import ThermalProperties
+from illuminator_ros.mavlink.dialect import MavCmd, Source
+
+KINDS = ('drop', 'duplicate', 'reorder', 'delay', 'corrupt')
+SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)
+COMMANDS = 400
+# s; more than the longest delay of the line.
+QUIET = 3.0
+# s; two setpoints one after the other, each of which may take its 0.85 s.
+LONGEST_SET = 1.75
+# Lights that stay as bright as they are told: what heat does is another test's subject.
+LIGHTS = [DeviceProperties(source=Source(1, one), thermal=ThermalProperties(rise=0.0))
+          for one in (243, 244, 245, 246)]
+
+# What the line does: by name, towards the lights and back.
+LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    **{kind: ((kind,), (kind,)) for kind in KINDS},
+    'all of these': (KINDS, KINDS),
+    'drop, to the lights': (('drop',), ()),
+    'drop, from the lights': ((), ('drop',)),
+    'delay, to the lights': (('delay',), ()),
+    'delay, from the lights': ((), ('delay',)),
+}
+CELLS = [('drop', 0.0), *((line, share) for line in LINES for share in SHARES)]
+
+
+class User:
+    """
+    One user of one light: asks for something, waits for the answer, and asks again.
+
+    :ivar due: when it does the next thing.
+    """
+
+    def __init__(self, pair: Pair, light: Light, kind: MavCmd, draw: random.Random) -> None:
+        self.pair, self.light, self.kind, self.draw = pair, light, kind, draw
+        self.due = pair.now + draw.uniform(0, 1)
+        self.requests: list[Request] = []
+        self._waiting: list[Request] = []
+
+    def act(self) -> None:
+        """Ask, several things at once now and then, when all before is answered."""
+        if any(not request.answer.results for request in self._waiting):
+            self.due = self.pair.now + 0.05
+            return
+        self._waiting = [self._ask() for _ in range(self.draw.choice((1, 1, 1, 2, 3)))]
+        self.requests += self._waiting
+        self.due = self.pair.now + self.draw.choice((0.001, 0.1, 0.3))
+
+    def _ask(self) -> Request:
+        if self.kind == ON_OFF:
+            on = self.draw.random() < 0.5
+            return Request(self.light, ON_OFF, {'enabled': on},
+                           self.pair.ask_enable(on, self.light))
+        values = {'brightness': float(self.draw.randrange(101)),
+                  'strobe_period': self.draw.choice((0.0, 0.5, 1.0, 2.0)),
+                  'strobe_duty_cycle': float(self.draw.randrange(101))}
+        wish = {name: values[name] for name in self.draw.sample(sorted(values), 2)}
+        return Request(self.light, CONFIGURE, wish, self.pair.ask_configure(self.light, **wish))
+
+
+class Joystick(User):
+    """Publishes bursts of setpoints; the last one of each is the one that must have an outcome."""
+
+    def __init__(self, pair: Pair, light: Light, draw: random.Random) -> None:
+        super().__init__(pair, light, CONFIGURE, draw)
+        self._recorder = pair.recorders[light.source]
+        self._value = 0
+        self._left = 0
+        self._interval = 0.0
+
+    def act(self) -> None:
+        """Publish the next setpoint, or see what has become of the last."""
+        if self._left == 1:
+            self._conclude()
+        if self._left <= 1:
+            self._left = self.draw.randint(2, 12)
+            self._interval = self.draw.choice((0.005, 0.02, 0.1))
+        self._left -= 1
+        # Never the one before, and rarely one that is agreed already: that is not sent.
+        self._value = (self._value + self.draw.randint(1, 100)) % 101
+        self._asked_at, self._changes = self.pair.now, len(self._recorder.changes)
+        agreed = self.light.agreement.agreed
+        self._agreed_before = agreed is not None and agreed.brightness == self._value
+        self.light.agreement.set_brightness(float(self._value), self.pair.now)
+        self.pair.turn()
+        self.due = self.pair.now + (self._interval if self._left > 1 else LONGEST_SET)
+
+    def _conclude(self) -> None:
+        recorder, wish = self._recorder, {'brightness': float(self._value)}
+        answer = Answer(self._asked_at)
+        for at, change in list(zip(recorder.changed_at, recorder.changes, strict=True)
+                               )[self._changes:]:
+            if change == (Cause.REQUEST, wish) and not answer.results:
+                answer(Result(True, TAKEN), at)
+        failures = zip(recorder.failed_at, recorder.failed_setpoints, strict=True)
+        since = [failure for failure in failures if failure[0] >= self._asked_at]
+        if not answer.results and since:
+            at, message = since[-1]
+            answer(Result(False, message), at)
+        if not answer.results and self._agreed_before:
+            answer(Result(True, TAKEN), self.pair.now)
+        self.requests.append(Request(self.light, CONFIGURE, wish, answer))
+
+
+def play(line: str, share: float) -> tuple[Pair, list[Request], Judge]:
+    """Use lights over a line until there are enough requests, all answered."""
+    there, back = (Faults(**dict.fromkeys(kinds, share)) for kinds in LINES[line])
+    pair = Pair(LIGHTS, there=there, back=back, seed=f'{line} {share}')
+    judge = Judge(pair)
+    lights = pair.controller.lights
+    pair.run_until(lambda: len(lights) == len(LIGHTS)
+                   and all(light.agreement.agreed for light in lights.values()))
+    draw = random.Random(f'{line} {share}')
+    users = [User(pair, light, ON_OFF, draw) for light in lights.values()]
+    first, second, third, fourth = lights.values()
+    users += [User(pair, first, CONFIGURE, draw), User(pair, second, CONFIGURE, draw),
+              Joystick(pair, third, draw), Joystick(pair, fourth, draw)]
+    while sum(len(user.requests) for user in users) < COMMANDS:
+        for user in users:
+            if user.due <= pair.now:
+                user.act()
+        pair.step(min(user.due for user in users))
+    requests = [request for user in users for request in user.requests]
+    pair.run_until(lambda: all(request.answer.results for request in requests))
+    return pair, requests, judge
+
+
+@pytest.mark.parametrize(('line', 'share'), CELLS)
+def test_every_command_has_one_outcome_and_it_is_true(line, share, request):
+    pair, requests, judge = play(line, share)
+    judgements = [judge.judge(one) for one in requests]
+    untrue = [wrong for _, wrong in judgements if wrong]
+    table = request.config.stash[LOSS_TABLE]
+    table.cells[line, share] = Counter(kind for kind, _ in judgements)
+    table.untrue += len(untrue)
+    assert not untrue
+    assert share or all(kind == 'confirmed' for kind, _ in judgements)
+    pair.mend()
+    pair.run(QUIET)
+    for device in pair.other.devices:
+        light = pair.controller.lights[device.source]
+        assert light.agreement.agreed == device.configuration
+        assert light.status.enabled == device.enabled
+        assert 'restarted' not in pair.recorders[device.source].events
+
+
+def test_the_same_seed_does_the_same():
+    first, second = ([one.message for one in play('all of these', 0.3)[1]] for _ in range(2))
+    assert first == second

@@ -1,0 +1,221 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What simulated lights really did, and whether what the controller says of it is true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+import re
+from typing import Any
+
+from support.back_to_back import Pair, START
+from support.records import Answer
+
+from illuminator_ros.illuminator.device import Device, Devices
+from illuminator_ros.illuminator.light import Light
+from illuminator_ros.illuminator.model import Mode
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    CommandLong,
+    Heartbeat,
+    IlluminatorStatus,
+    MavCmd,
+    MavResult,
+    Source,
+)
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+TRIES = re.compile(r'\((\d+) (?:try|tries), ')
+# s by which a sending time that is told from an uptime may be wrong here.
+UPTIME_ERROR = 0.05
+
+Fields = Mapping[str, Any]
+
+
+@dataclass
+class State:
+    """What a light was from one time to another, s."""
+
+    since: float
+    until: float
+    fields: Fields
+
+    def matches(self, wish: Fields) -> bool:
+        """Return whether the light was as wished."""
+        return all(self.fields[name] == value for name, value in wish.items())
+
+
+class Witness:
+    """Keeps the states that one simulated light has been in."""
+
+    def __init__(self, device: Device, now: float) -> None:
+        self.device = device
+        self._receive = device.receive
+        device.receive = self._watched  # type: ignore[method-assign]
+        self._states = [State(now, now, self._fields())]
+
+    def _fields(self) -> Fields:
+        configuration = self.device.configuration
+        return {'enabled': self.device.enabled, 'mode': configuration.mode,
+                'brightness': configuration.brightness,
+                'strobe_period': configuration.strobe_period,
+                'strobe_duty_cycle': configuration.strobe_duty_cycle}
+
+    def _watched(self, source: Source, message: Any, now: float) -> None:
+        self._receive(source, message, now)
+        fields = self._fields()
+        if fields != self._states[-1].fields:
+            self._states[-1].until = now
+            self._states.append(State(now, now, fields))
+
+    def states(self, since: float, until: float) -> list[State]:
+        """Return the states between two times (s)."""
+        self._states[-1].until = max(until, self._states[-1].until)
+        return [state for state in self._states if state.until >= since and state.since <= until]
+
+
+@dataclass
+class Request:
+    """
+    A request to a light.
+
+    :param wish: what the light is to become, by the names of :class:`Witness`.
+    """
+
+    light: Light
+    kind: MavCmd
+    wish: Fields
+    answer: Answer
+
+    @property
+    def message(self) -> str:
+        """What the answer says."""
+        return self.answer.result.message
+
+
+class Judge:
+    """Compares answers with what went over the line and what the lights did."""
+
+    def __init__(self, pair: Pair) -> None:
+        assert isinstance(pair.other, Devices)
+        self._pair = pair
+        self._witnesses = {device.source: Witness(device, pair.now)
+                           for device in pair.other.devices}
+
+    def judge(self, request: Request) -> tuple[str, str]:
+        """Return how a request has ended, and what is not true in that, '' if all is."""
+        results = request.answer.results
+        if len(results) != 1:
+            return 'broken', f'{len(results)} outcomes: {request}'
+        sign = next((sign for sign in _CHECKS if sign in request.message), None)
+        if sign is None:
+            return 'broken', f'an unknown outcome: {request.message!r}'
+        kind, success, check = _CHECKS[sign]
+        wrong = check(self, request)
+        if success is not results[0].success:
+            wrong = f'success is {results[0].success}'
+        return kind, wrong and f'{wrong}: {request.light.source} {request.answer}'
+
+    def _tries(self, request: Request) -> list[tuple[float, Any]]:
+        """Return when the command was sent, and the messages; as often as the answer says."""
+        answer, tries = request.answer, []
+        for at, sent in self._pair.near.sent:
+            if not (isinstance(sent, CommandLong) and sent.command == request.kind
+                    and (sent.target_system, sent.target_component) == request.light.source):
+                continue
+            # What is sent at the very end is the next command.
+            if at > answer.ended_at or tries and at == answer.ended_at:
+                break
+            tries = [*tries, (at, sent)] if sent.confirmation else [(at, sent)]
+        match = TRIES.search(request.message)
+        assert match is not None and len(tries) == int(match[1]), request
+        return tries
+
+    def _states(self, request: Request) -> tuple[Fields, list[State]]:
+        """Return all that was sent, and the states of the light since."""
+        (since, sent), *_ = self._tries(request)
+        wish = request.wish
+        if request.kind == CONFIGURE:
+            wish = {**wish, 'mode': Mode(int(sent.param1)), 'brightness': sent.param2,
+                    'strobe_period': sent.param3, 'strobe_duty_cycle': sent.param4}
+        assert all(wish[name] == value for name, value in request.wish.items()), request
+        return wish, self._witnesses[request.light.source].states(since, request.answer.ended_at)
+
+    def _received(self, request: Request, kind: type, since: float) -> list[tuple[float, Any]]:
+        return [(at, message) for at, source, message in self._pair.near.received
+                if source == request.light.source and isinstance(message, kind)
+                and since < at <= request.answer.ended_at]
+
+    def _acks(self, request: Request) -> list[tuple[float, Any]]:
+        since = self._tries(request)[0][0]
+        return [(at, ack) for at, ack in self._received(request, CommandAck, since)
+                if ack.command == request.kind and ack.result == MavResult.ACCEPTED]
+
+    def _taken(self, request: Request) -> str:
+        states = self._witnesses[request.light.source].states(
+            request.answer.asked_at, request.answer.ended_at)
+        return '' if any(state.matches(request.wish) for state in states) else 'never done'
+
+    def _confirmed(self, request: Request) -> str:
+        if not self._acks(request):
+            return 'not accepted'
+        wish, states = self._states(request)
+        return '' if any(state.matches(wish) for state in states) else 'never done'
+
+    def _not_acknowledged(self, request: Request) -> str:
+        return 'acknowledged' if self._acks(request) else ''
+
+    def _not_shown(self, request: Request) -> str:
+        if not self._acks(request):
+            return 'not accepted'
+        wish, states = self._states(request)
+        return 'as wished all the time' if all(s.matches(wish) for s in states) else ''
+
+    def _no_status(self, request: Request) -> str:
+        acks = self._acks(request)
+        if not acks:
+            return 'not accepted'
+        sent_at, newest = self._tries(request)[0][0], 0
+        boot = START - self._witnesses[request.light.source].device.uptime_ms(START) / 1000
+        for at, status in self._received(request, IlluminatorStatus, 0.0):
+            if status.uptime_ms >= newest:
+                newest = status.uptime_ms
+                if at > acks[0][0] and boot + newest / 1000 > sent_at + UPTIME_ERROR:
+                    return 'a later status came'
+        return ''
+
+    def _not_sent(self, request: Request) -> str:
+        # Whatever was sent meanwhile was another command.
+        return 'sent' if TRIES.search(request.message) else ''
+
+    def _lost(self, request: Request) -> str:
+        since = request.answer.ended_at - request.light.settings.heartbeat_timeout + 1e-6
+        heard = (self._received(request, Heartbeat, since)
+                 or self._received(request, IlluminatorStatus, since))
+        return 'heard' if heard else ''
+
+
+# What an answer has in it: the kind of outcome, whether that is a success, whether it is true.
+TAKEN = 'taken as agreed'
+_CHECKS: dict[str, tuple[str, bool, Callable[[Judge, Request], str]]] = {
+    'confirmed by ILLUMINATOR_STATUS': ('confirmed', True, Judge._confirmed),
+    TAKEN: ('confirmed', True, Judge._taken),
+    'no acknowledgement': ('no acknowledgement', False, Judge._not_acknowledged),
+    'but ILLUMINATOR_STATUS shows': ('not shown', False, Judge._not_shown),
+    'ILLUMINATOR_STATUS came within': ('no status', False, Judge._no_status),
+    'not sent: earlier requests took too long': ('not sent', False, Judge._not_sent),
+    'is lost: no heartbeat for': ('light lost', False, Judge._lost),
+}
