@@ -29,7 +29,7 @@ import threading
 import time
 from typing import Any
 
-from .dialect import decode_payload, encode_payload, HANDLED, LAYOUTS, Source
+from .dialect import decode_payload, encode_payload, HANDLED, Source
 from .echoes import Echoes
 from .endpoint import Endpoint
 from .framing import DecoderCounters, encode_frame, Frame
@@ -331,7 +331,7 @@ class Link:
         self._echoes.sent(source, sequence, message.id, payload, self.clock())
         frame = encode_frame(
             message.id, payload, sequence=sequence, source=source,
-            crc_extra=LAYOUTS[message.id].crc_extra, signed=self._signing.signs)
+            crc_extra=message.crc_extra, signed=self._signing.signs)
         if self._signing.signs:
             frame = self._signing.sign(frame, self._wall_clock())
         peers = self._routes.towards(message, channel.peers(self.clock()), self.clock())

@@ -12,28 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executable ``simulator``: MAVLink illuminators without hardware, and without ROS."""
-
-from __future__ import annotations
+"""``python3 -m illuminator_ros.simulator``."""
 
 import sys
 
-from .entry import enter
-from .termination import Termination
-
-
-def main(args: list[str] | None = None) -> int:
-    """
-    Run the simulator until SIGINT or SIGTERM; see :mod:`~.simulation`.
-
-    :param args: the command line without the program's name.
-    """
-    def run(termination: Termination) -> int:
-        from . import simulation
-        return simulation.run(args, termination)
-
-    return enter('simulator', run)
-
+from . import main
 
 if __name__ == '__main__':
     sys.exit(main())
