@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 import sys
 
+from .entry import enter
 from .termination import Termination
 
 
@@ -68,12 +69,19 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name.
     """
-    termination = Termination()
     arguments = sys.argv[1:] if args is None else args
-    try:
-        own = _without_ros_args(arguments)
-    except Exception as error:
-        return _wrong(f'wrong ROS arguments: {error}')
+    return enter('bridge', lambda termination: _run(arguments, termination))
+
+
+def _run(arguments: list[str], termination: Termination) -> int:
+    own = arguments
+    if '--ros-args' in arguments:
+        # Slow to import, as all else that is imported in a function here.
+        from rclpy.utilities import remove_ros_args
+        try:
+            own = remove_ros_args(['bridge', *arguments])[1:]
+        except Exception as error:
+            return _wrong(f'wrong ROS arguments: {error}')
     if '-h' in own or '--help' in own:
         print(usage(), end='')
         return 0
@@ -85,14 +93,6 @@ def main(args: list[str] | None = None) -> int:
         return _wrong(f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
                       'bridge --help')
     return _serve(arguments, termination)
-
-
-def _without_ros_args(arguments: list[str]) -> list[str]:
-    if '--ros-args' not in arguments:
-        return arguments
-    # Slow to import, as all else that is imported in a function here.
-    from rclpy.utilities import remove_ros_args
-    return list(remove_ros_args(['bridge', *arguments])[1:])
 
 
 def _wrong(what: str) -> int:

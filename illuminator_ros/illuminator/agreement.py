@@ -143,6 +143,13 @@ class Agreement:
         self._contradictions = 0
         self._light.changed()
 
+    def cancel(self, now: float) -> None:
+        """End all changes, and want nothing any more."""
+        self._wanted.clear()
+        self._restoring = False
+        self._setpoint = None
+        self._queue.cancel(now)
+
     def _want_no_more(self, names: Iterable[str]) -> None:
         """Note that fields have been set otherwise, or not at all: they are not to be restored."""
         for name in list(names):

@@ -439,7 +439,10 @@ class Device:
         if now >= self._thermal_at + THERMAL_INTERVAL:
             self._warm(now)
         if now >= self._status_due:
-            self._status_due = max(self._status_due + self.interval, now)
+            self._status_due += self.interval
+            if self._status_due <= now:
+                # Held up for longer than an interval: what was missed is not made up for.
+                self._status_due = now + self.interval
             self._send(self.status(now), now)
         self._outlet.poll(now)
 

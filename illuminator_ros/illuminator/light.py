@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from ..mavlink.command import Command, CommandSender, format_seconds, Outcome
+from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
 from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 from .agreement import Agreement
 from .identification import Identification
@@ -190,6 +190,13 @@ class Light:
         else:
             self._switching.submit(Enable(self, on, done, now=now), now)
             self.changed()
+
+    def cancel(self, now: float) -> None:
+        """End all requests, so that the next one is sent at once: a node's last to its light."""
+        self._switching.cancel(now)
+        self.agreement.cancel(now)
+        self.sender.end_all(now, Ending.CANCELLED, self.source)
+        self.changed()
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""

@@ -342,6 +342,12 @@ class OperationQueue:
             operation.start(now)
             self.poll(now)
 
+    def cancel(self, now: float) -> None:
+        """End all changes, whether under way or waiting."""
+        for operation in list(self._operations):
+            operation.fail('cancelled', now)
+        self._operations.clear()
+
     def poll(self, now: float) -> None:
         """Do what is due, and start what has waited."""
         for waiting in list(self._operations)[1:]:

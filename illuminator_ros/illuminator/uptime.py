@@ -31,6 +31,9 @@ SLACK = 2.0
 DRIFT = 0.05
 # How wrong the clock of a light may be, as a share: an oscillator without a crystal.
 CLOCK_ERROR = 0.02
+# s for which a status is compared with. A clock that is still more wrong makes statuses look
+# old, but by no more than a part of this, so what they confirm is confirmed a little later.
+MEMORY = 5.0
 
 
 class Uptime(Enum):
@@ -89,7 +92,7 @@ class SendingTimes:
             self._step_ms = math.gcd(self._step_ms, ahead_ms)
             slack = self._step_ms / 1000 + CLOCK_ERROR * (now - self._came_at)
             sent_by = self._came_at + ahead_ms / 1000 + slack
-            if self._step_ms and sent_by < now:
+            if self._step_ms and sent_by < now < self._came_at + MEMORY:
                 return sent_by
         self._uptime_ms, self._came_at = uptime_ms, now
         return now

@@ -152,6 +152,7 @@ class BridgeProcess:
 
             def off(now: float) -> None:
                 for light in lights:
+                    light.cancel(now)
                     light.enable(False, now, lambda result, now: answers.release())
 
             self.link.call(off)

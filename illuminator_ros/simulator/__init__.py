@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from ..entry import enter
 from ..termination import Termination
 
 
@@ -25,7 +26,8 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name.
     """
-    termination = Termination()
-    # Slow to import: a signal meanwhile must end the process as one later does.
-    from .run import run
-    return run(args, termination)
+    def start(termination: Termination) -> int:
+        from .run import run
+        return run(args, termination)
+
+    return enter('simulator', start)

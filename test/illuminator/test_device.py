@@ -97,6 +97,19 @@ def test_statuses_come_at_the_interval_of_the_properties(interval, expected):
     assert len(statuses(Bench(status_interval=interval).run(4.45))) == expected
 
 
+def test_what_was_missed_while_it_was_held_up_is_not_made_up_for(bench):
+    bench.device.poll(60.2)
+    bench.device.poll(60.3)
+    assert len(statuses(bench.sent())) == 1
+
+
+def test_a_stream_keeps_its_pace_however_late_it_is_looked_at():
+    device = Device(DeviceProperties(status_interval=0.1), 0.0)
+    for turn in range(101):
+        device.poll(turn * 0.1 + 0.03)
+    assert len([m for _, m in device.outgoing if isinstance(m, IlluminatorStatus)]) == 101
+
+
 def test_the_uptime_counts_from_the_start_and_wraps(bench):
     assert bench.device.uptime_ms(1.234) == 1234
     assert bench.device.uptime_ms(2 ** 32 / 1000 + 1.5) == 1500

@@ -114,3 +114,11 @@ def test_a_light_that_counts_in_seconds_is_confirmed_as_fast_as_any():
         assert pair.wait_for(answer).success
         assert answer.seconds < 0.01
         pair.run(0.17)
+
+
+@pytest.mark.parametrize('rate', [0.8, 0.9, 0.95, 1.1])
+def test_wrong_clock_makes_a_status_look_less_than_a_second_old(rate: float) -> None:
+    times = SendingTimes()
+    ages = [now - times.sent_by(int(rate * now * 1000), now)
+            for now in (second + 0.0137 * (second % 7) for second in range(1, 600))]
+    assert max(ages) < 1.0

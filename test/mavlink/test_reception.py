@@ -70,6 +70,14 @@ def test_a_chain_of_false_starts_is_given_up_as_a_whole(reception: Reception) ->
     assert len(reception.give_up(STALL, UNIX)) == 1
 
 
+def test_a_frame_that_has_only_begun_since_is_waited_for(reception: Reception) -> None:
+    frame = heartbeat_frame()
+    reception.take('a', FALSE_STARTS[0], 0.0, UNIX)
+    reception.take('a', frame[:9], 0.4, UNIX)
+    assert reception.give_up(STALL, UNIX) == []
+    assert sources(reception.take('a', frame[9:], STALL + 0.1, UNIX)) == [LIGHT]
+
+
 def test_nothing_is_awaited_once_it_was_given_up(reception: Reception) -> None:
     reception.take('a', FALSE_STARTS[0], 0.0, UNIX)
     reception.give_up(STALL, UNIX)

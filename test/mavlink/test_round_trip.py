@@ -100,6 +100,17 @@ def test_sender_resends_sooner_once_the_target_has_answered_fast() -> None:
     assert run.outcome.elapsed == pytest.approx(2.68)
 
 
+def test_try_that_was_rejected_makes_the_next_wait_no_longer() -> None:
+    rig = Rig(timeout=1.0)
+    for _ in range(ENOUGH):
+        answered(rig, 0.06)
+    run = rig.start()
+    rig.ack(REJECTED)
+    rig.run(0.1)
+    assert len(run.frames) == 2
+    assert rig.sender.next_deadline() == pytest.approx(run.frames[1][0] + 0.24)
+
+
 def test_sender_never_waits_longer_than_the_given_timeout() -> None:
     rig = Rig(timeout=0.5)
     for _ in range(ENOUGH):

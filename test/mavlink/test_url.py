@@ -134,6 +134,9 @@ OURS: dict[str, Url] = {
     'tcp://[::1]': connect('::1', 5760),
     '[::1]:14550': listen('::1', 14550),
     'udpin://:55': listen('', 55),
+    'udpin://:1': listen('', 1),
+    '/dev/x:1': SerialUrl('/dev/x', 1),
+    '/dev/x:20000000': SerialUrl('/dev/x', 20_000_000),
     '/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0:57600': SerialUrl(
         '/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0', 57600),
     'memory://bench': MemoryUrl('bench'),
@@ -169,6 +172,7 @@ WRONG: dict[str, tuple[str, str]] = {
     'serial:///dev/ttyS0:-1': ("'-1'", 'no baud rate'),
     'serial:///dev/ttyS0:0': ("'0'", 'no baud rate'),
     'serial:///dev/ttyS0:57600xyz': ("'57600xyz'", 'no baud rate'),
+    'serial:///dev/ttyS0:20000001': ("'20000001'", 'no baud rate'),
     'serial:///dev/ttyS0:999999999': ("'999999999'", 'no baud rate'),
     'serial_flowcontrol:///dev/ttyS0:4000000nope': ("'4000000nope'", 'no baud rate'),
     'raw://': ("'raw'", 'unknown scheme'),

@@ -1,0 +1,53 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What all executables begin with: signals are taken, and what is not installed is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import sys
+
+from .termination import Termination
+
+# What to do about a package that is not there.
+_REMEDIES = {
+    'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
+    'pymavlink': 'pip install pymavlink',
+    'fastcrc': 'pip install fastcrc',
+}
+
+
+def enter(name: str, run: Callable[[Termination], int]) -> int:
+    """
+    Run a program and return its exit status.
+
+    :param name: of the program.
+    :param run: is to import what it needs itself, so that a signal meanwhile ends the process
+        as one later does.
+    """
+    termination = Termination()
+    return explained(name, lambda: run(termination))
+
+
+def explained(name: str, run: Callable[[], int]) -> int:
+    """Run a program and return its exit status; name what it needs where that is missing."""
+    try:
+        return run()
+    except ModuleNotFoundError as error:
+        package = (error.name or '').partition('.')[0]
+        if package not in _REMEDIES:
+            raise
+        print(f'{name}: {package} is not installed: {_REMEDIES[package]}', file=sys.stderr)
+        return 1

@@ -1,0 +1,140 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Users, restarts, lost links and strangers at random: nothing gets stuck, leaks or lies."""
+
+from dataclasses import replace
+import random
+
+import pytest
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
+from support.records import Answer
+
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.model import Mode
+from illuminator_ros.illuminator.thermal import ThermalProperties
+from illuminator_ros.mavlink.dialect import Source
+
+SECONDS = 90.0
+# s after which all must be answered and known, once the line is good again: a restored
+# configuration is tried again after 2 s, and so on.
+RECOVERY = 12.0
+# s; the tries of a command, its confirmation, and those that were before it in the queue.
+LONGEST = 32.0
+LIGHTS = [DeviceProperties(source=Source(1, one), thermal=ThermalProperties(rise=0.0))
+          for one in (243, 244)]
+
+
+class Chaos:
+    """Does something at random."""
+
+    def __init__(self, seed: int) -> None:
+        self.draw = random.Random(seed)
+        faults = Faults(**{kind: self.draw.choice((0.0, 0.1, 0.3)) for kind in (
+            'drop', 'duplicate', 'reorder', 'delay', 'corrupt')})
+        settings = Settings(status_interval=self.draw.choice((0.0, 0.2)),
+                            restore_configuration=self.draw.random() < 0.7)
+        self.pair = Pair(LIGHTS, there=faults, settings=settings, seed=seed,
+                         uptime=self.draw.choice((0.0, 1000.0)))
+        self.devices = self.pair.other.devices
+        self.sets: list[Answer] = []
+        self.others: list[Answer] = []
+        self.is_open = True
+
+    def act(self) -> None:
+        """Do one thing."""
+        users = [self.enable, self.configure, self.publish, self.refresh] * 4
+        self.draw.choice([*users, self.cut, self.open, self.restart, self.strange, self.hush])()
+        self.pair.turn()
+
+    def light(self):
+        return self.draw.choice(list(self.pair.controller.lights.values()) or [None])
+
+    def answer(self, answers: list[Answer]) -> Answer:
+        """Return the place for another answer."""
+        answer = Answer(self.pair.now)
+        answers.append(answer)
+        return answer
+
+    def enable(self) -> None:
+        if light := self.light():
+            light.enable(self.draw.random() < 0.5, self.pair.now, self.answer(self.others))
+
+    def configure(self) -> None:
+        if light := self.light():
+            wish = {'brightness': self.draw.randrange(101),
+                    'strobe_period': self.draw.choice((0, 1))}
+            light.agreement.configure(wish, self.pair.now, self.answer(self.sets))
+
+    def publish(self) -> None:
+        if light := self.light():
+            for _ in range(self.draw.randint(1, 5)):
+                light.agreement.set_brightness(float(self.draw.randrange(101)), self.pair.now)
+
+    def refresh(self) -> None:
+        if light := self.light():
+            light.refresh(self.pair.now, self.answer(self.others))
+
+    def cut(self) -> None:
+        self.pair.close()
+        self.is_open = False
+
+    def open(self) -> None:
+        if not self.is_open:
+            self.pair.open()
+            self.is_open = True
+
+    def restart(self) -> None:
+        self.draw.choice(self.devices).restart(self.pair.now)
+
+    def strange(self) -> None:
+        """Let a stranger change a light."""
+        device = self.draw.choice(self.devices)
+        device.enabled = self.draw.random() < 0.5
+        device.configuration = replace(
+            device.configuration, mode=self.draw.choice(list(Mode)[1:]),
+            brightness=float(self.draw.randrange(101)))
+
+    def hush(self) -> None:
+        """Let nothing through for longer than a heartbeat may take."""
+        faults = self.pair.far.wire.faults
+        self.pair.far.wire.faults = replace(faults, drop=1.0)
+        self.pair.run(self.draw.uniform(1.0, 6.0))
+        self.pair.far.wire.faults = faults
+
+
+@pytest.mark.parametrize('seed', range(30))
+def test_whatever_happens(seed):
+    chaos = Chaos(seed)
+    pair = chaos.pair
+    end = pair.now + SECONDS
+    while pair.now < end:
+        chaos.act()
+        pair.run(chaos.draw.choice((0.0, 0.01, 0.1, 0.5, 2.0)))
+    pair.mend()
+    chaos.open()
+    pair.run(RECOVERY)
+
+    assert {len(answer.results) for answer in chaos.sets + chaos.others} == {1}
+    assert max(answer.seconds for answer in chaos.sets) <= 0.9
+    assert max(answer.seconds for answer in chaos.others) <= LONGEST
+    for device in chaos.devices:
+        light = pair.controller.lights[device.source]
+        assert light.connected
+        assert light.agreement.agreed == device.configuration
+        assert light.status.enabled == device.enabled
+        assert light.next_deadline() > pair.now
+    assert pair.controller.sender.next_deadline() == float('inf')

@@ -1,0 +1,103 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""With ``off_on_shutdown`` the light goes dark with the node, within the second that it has."""
+
+from collections.abc import Iterator
+import contextlib
+import signal
+
+import pytest
+from std_srvs.srv import SetBool
+from support.light import CONFIGURE, MavResult, ON_OFF, ServedLight
+from support.processes import Program, STOP_LIMIT
+from support.ros import Parameters, Ros, start_bridge
+
+
+@contextlib.contextmanager
+def lit(ros: Ros, port: int, **parameters: object) -> Iterator[tuple[Program, ServedLight]]:
+    """Run a bridge with a light that is on."""
+    with ServedLight(port, enable=1) as light:
+        program = start_bridge(ros.domain, port, **{'off_on_shutdown': True, **parameters})
+        try:
+            Parameters(ros).wait(brightness=100.0)
+            yield program, light
+        finally:
+            program.kill()
+
+
+def ends(program: Program, number: int = signal.SIGTERM) -> bool:
+    status, taken = program.end(number)
+    return status == 0 and taken < STOP_LIMIT and 'Traceback' not in program.log
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_the_light_is_switched_off(own_ros: Ros, port: int, number: int) -> None:
+    with lit(own_ros, port) as (program, light):
+        assert ends(program, number)
+
+        assert light.fake.fields['enable'] == 0
+
+
+def test_without_it_the_light_is_left_as_it_is(own_ros: Ros, port: int) -> None:
+    with lit(own_ros, port, off_on_shutdown=False) as (program, light):
+        assert ends(program)
+
+        assert light.commands(ON_OFF) == []
+
+
+def test_a_lost_command_is_sent_again(own_ros: Ros, port: int) -> None:
+    with lit(own_ros, port) as (program, light):
+        light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
+
+        assert ends(program)
+
+        assert light.fake.fields['enable'] == 0
+
+
+def test_a_light_that_says_nothing_does_not_hold_the_node(own_ros: Ros, port: int) -> None:
+    with lit(own_ros, port) as (program, light):
+        light.fake.results[ON_OFF] = None
+
+        assert ends(program)
+
+        assert light.commands(ON_OFF)
+
+
+def test_requests_that_the_light_takes_long_for_do_not_hold_it_up(
+    own_ros: Ros, port: int,
+) -> None:
+    with lit(own_ros, port) as (program, light):
+        light.fake.results[ON_OFF] = [MavResult.IN_PROGRESS, MavResult.ACCEPTED]
+        light.fake.results[CONFIGURE] = MavResult.IN_PROGRESS
+        own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+        own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+        Parameters(own_ros).start_set(brightness=20.0)
+        light.wait_for(ON_OFF)
+        light.wait_for(CONFIGURE)
+
+        assert ends(program)
+
+        assert [command.param1 for command in light.commands(ON_OFF)] == [1.0, 0.0]
+        assert light.fake.fields['enable'] == 0
+
+
+def test_a_lost_light_is_not_waited_for(own_ros: Ros, port: int) -> None:
+    with lit(own_ros, port, heartbeat_timeout=1.1) as (program, light):
+        light.fake.silent = True
+        program.wait_for('lost')
+
+        assert ends(program)
+
+        assert light.commands(ON_OFF) == []

@@ -1,0 +1,171 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""SIGINT and SIGTERM end every program at any moment: status 0, in time, without a traceback."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from std_srvs.srv import SetBool
+from support.light import eventually, free_port, ON_OFF, ServedLight
+from support.processes import environment, Program, python, STOP_LIMIT
+from support.ros import Ros, start_bridge
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM]
+# Programs at a time; more would only measure how they wait for each other.
+AT_ONCE = 3
+
+
+def signals_are_taken(program: Program) -> bool:
+    """Return whether a program has come so far that it answers for signals itself."""
+    with open(f'/proc/{program.pid}/status') as file:
+        [mask] = [line.split()[1] for line in file if line.startswith('SigBlk:')]
+    wanted = sum(1 << number - 1 for number in SIGNALS)
+    return int(mask, 16) & wanted == wanted
+
+
+class Case:
+    """One run of a program, to be ended at some moment of it."""
+
+    def __init__(self, ros: Ros, seed: str) -> None:
+        self.ros = ros
+        self.random = random.Random(seed)
+        self.port = free_port()
+        self.node = f'case_{self.port}'
+
+    def pause(self, longest: float) -> None:
+        """Let a random time pass: the moment of the signal is what is tested."""
+        time.sleep(self.random.uniform(0.0, longest))
+
+    def bridge(self) -> Program:
+        return start_bridge(self.ros.domain, self.port, '-r', f'__node:={self.node}')
+
+    def end(self, program: Program, number: int) -> tuple[int, float, str]:
+        try:
+            return *program.end(number), program.log
+        finally:
+            program.kill()
+
+
+def bridge_starting(case: Case, number: int) -> tuple[int, float, str]:
+    program = case.bridge()
+    eventually(lambda: signals_are_taken(program))
+    case.pause(0.5)
+    return case.end(program, number)
+
+
+def bridge_connecting(case: Case, number: int) -> tuple[int, float, str]:
+    program = case.bridge()
+    program.wait_for('link open')
+    with ServedLight(case.port):
+        case.pause(0.1)
+        return case.end(program, number)
+
+
+def bridge_idle(case: Case, number: int) -> tuple[int, float, str]:
+    program = case.bridge()
+    program.wait_for('link open')
+    with ServedLight(case.port):
+        program.wait_for('connected')
+        case.pause(0.5)
+        return case.end(program, number)
+
+
+def bridge_in_a_command(case: Case, number: int) -> tuple[int, float, str]:
+    program = case.bridge()
+    program.wait_for('link open')
+    with ServedLight(case.port) as light:
+        program.wait_for('connected')
+        light.fake.results[ON_OFF] = None
+        case.ros.start(SetBool, f'/{case.node}/enable', SetBool.Request(data=True))
+        light.wait_for(ON_OFF)
+        case.pause(0.3)
+        return case.end(program, number)
+
+
+def simulator_starting(case: Case, number: int) -> tuple[int, float, str]:
+    program = python('illuminator_ros.simulator', f'udpout://127.0.0.1:{case.port}')
+    eventually(lambda: signals_are_taken(program))
+    case.pause(0.3)
+    return case.end(program, number)
+
+
+def simulator_running(case: Case, number: int) -> tuple[int, float, str]:
+    program = python('illuminator_ros.simulator', f'udpout://127.0.0.1:{case.port}')
+    program.wait_for('link open')
+    case.pause(0.3)
+    return case.end(program, number)
+
+
+@pytest.mark.parametrize('number', SIGNALS, ids=lambda number: number.name)
+@pytest.mark.parametrize(('moment', 'count'), [
+    (bridge_starting, 8), (bridge_connecting, 4), (bridge_idle, 4), (bridge_in_a_command, 4),
+    (simulator_starting, 6), (simulator_running, 4),
+], ids=lambda value: getattr(value, '__name__', ''))
+def test_a_program_ends(
+    ros: Ros, moment: Callable[[Case, int], tuple[int, float, str]], count: int,
+    number: signal.Signals,
+) -> None:
+    cases = [Case(ros, f'{moment.__name__} {number.name} {n}') for n in range(count)]
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        outcomes = list(pool.map(lambda case: moment(case, number), cases))
+
+    for status, taken, log in outcomes:
+        assert (status, 'Traceback' in log, 'Exception' in log) == (0, False, False), log
+        assert taken < STOP_LIMIT, f'it took {taken:.2f} s to end:\n{log}'
+
+
+def test_impatience_changes_nothing(ros: Ros) -> None:
+    case = Case(ros, 'impatience')
+    program = case.bridge()
+    program.wait_for('link open')
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
+        program.send(number)
+
+    assert program.wait() == 0
+    assert 'Traceback' not in program.log
+
+
+@pytest.mark.parametrize('module', ['illuminator_ros.bridge', 'illuminator_ros.simulator'])
+def test_signals_are_taken_before_anything_slow_is_imported(module: str) -> None:
+    slow = {'rclpy', 'pymavlink', 'argparse', 'logging', 'numpy', 'socket'}
+
+    loaded = subprocess.run(
+        [sys.executable, '-c', f'import sys, {module}; print(*sys.modules)'],
+        env=environment(), text=True, capture_output=True, check=True).stdout.split()
+
+    assert slow & set(loaded) == set()
+
+
+def test_a_program_in_the_background_of_a_script_ends_too(ros: Ros) -> None:
+    """A shell without job control has its background programs ignore SIGINT."""
+    port = free_port()
+    program = Program(
+        'sh', '-c', f'{sys.executable} -m illuminator_ros.simulator udpout://127.0.0.1:{port} & '
+        'echo pid $!; wait $!; echo status $?')
+    program.wait_for('link open')
+    [line] = [line for line in program.lines if line.startswith('pid')]
+
+    subprocess.run(['kill', '-INT', line.split()[1]], check=True)
+
+    program.wait_for('status 0')
+    assert program.wait() == 0
