@@ -38,8 +38,13 @@ def enter(name: str, run: Callable[[Termination], int]) -> int:
         as one later does.
     """
     termination = Termination()
+    return explained(name, lambda: run(termination))
+
+
+def explained(name: str, run: Callable[[], int]) -> int:
+    """Run a program and return its exit status; name what it needs where that is missing."""
     try:
-        return run(termination)
+        return run()
     except ModuleNotFoundError as error:
         package = (error.name or '').partition('.')[0]
         if package not in _REMEDIES:

@@ -23,6 +23,8 @@ from __future__ import annotations
 
 import signal
 
+from ..entry import explained
+
 
 def main(args: list[str] | None = None) -> int:
     """
@@ -32,5 +34,9 @@ def main(args: list[str] | None = None) -> int:
     """
     # Until something has been changed there is nothing to bring back, nor to say.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    from .run import run
-    return run(args)
+
+    def start() -> int:
+        from .run import run
+        return run(args)
+
+    return explained('conformance', start)

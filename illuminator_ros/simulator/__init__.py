@@ -26,8 +26,8 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name.
     """
-    def simulate(termination: Termination) -> int:
-        from . import run
-        return run.run(args, termination)
+    def start(termination: Termination) -> int:
+        from .run import run
+        return run(args, termination)
 
-    return enter('simulator', simulate)
+    return enter('simulator', start)

@@ -41,8 +41,8 @@ async def on_request(bench: Bench) -> str:
     return ', '.join(filter(None, (identity.vendor, identity.model))) or 'no names'
 
 
-def _information(bench: Bench) -> Any:
-    if not bench.informations:
+async def _information(bench: Bench) -> Any:
+    if not bench.informations and await bench.information() is None:
         raise Skipped('there is no COMPONENT_INFORMATION_BASIC')
     return bench.informations[-1]
 
@@ -51,7 +51,7 @@ def _information(bench: Bench) -> Any:
              'COMPONENT_INFORMATION_BASIC')
 async def terminated(bench: Bench) -> None:
     """Look for the terminator that the fields' descriptions ask for."""
-    message = _information(bench)
+    message = await _information(bench)
     wrong = [name for name in STRINGS if b'\0' not in wire_value(message, name)]
     if wrong:
         raise Failed(f'no terminator in {", ".join(wrong)}')
@@ -61,7 +61,7 @@ async def terminated(bench: Bench) -> None:
              'COMPONENT_INFORMATION_BASIC')
 async def text(bench: Bench) -> None:
     """Look for bytes that no screen can show."""
-    message = _information(bench)
+    message = await _information(bench)
     wrong = []
     for name in STRINGS:
         raw = wire_value(message, name).partition(b'\0')[0]
