@@ -96,6 +96,9 @@ class BridgeProcess:
         self.link.start()
         self._spinners[0].run()
         self._stop()
+        # Whoever looks at the ROS graph is to see at once that they are gone.
+        for node in self.nodes:
+            node.destroy_node()
 
     def end(self) -> None:
         """Have :meth:`run` return; callable from any thread."""
@@ -187,9 +190,6 @@ class BridgeProcess:
         deadline = time.monotonic() + THREADS_LIMIT
         for thread in self._threads:
             thread.join(max(deadline - time.monotonic(), 0))
-        # Left to the interpreter's end, many nodes take long where no signal's limit holds.
-        for node in self.nodes:
-            node.destroy_node()
 
 
 def without_node_name(arguments: list[str]) -> list[str]:
