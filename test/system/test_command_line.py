@@ -24,7 +24,7 @@ from support.processes import environment, ROOT, run
 
 from illuminator_ros import __version__
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
-from illuminator_ros.simulation import parser
+from illuminator_ros.simulator.options import parser
 
 BRIDGE, SIMULATOR = 'illuminator_ros.bridge', 'illuminator_ros.simulator'
 
