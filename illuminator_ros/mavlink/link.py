@@ -220,7 +220,7 @@ class Link:
 
     def _turn(self) -> None:
         due = min(self.endpoint.next_deadline(), self._reception.next_deadline(),
-                  self._proven_at, self._knock_at)
+                  self._knock_at)
         wait = min(max(due - self.clock(), self._pause), IDLE)
         self._pause = 0.0
         for key, events in self._selector.select(wait):

@@ -50,13 +50,17 @@ def load_key(path: str) -> bytes:
     if not path:
         raise KeyFileError('no key file is given (signing_key_file)')
     try:
-        with open(path, 'rb') as file:
-            mode = os.fstat(file.fileno()).st_mode
-            content = file.read(MAX_KEY_FILE + 1)
+        # Without waiting: a FIFO without a writer would hold up the start for ever.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with open(descriptor, 'rb') as file:
+            mode = os.fstat(descriptor).st_mode
+            content = file.read(MAX_KEY_FILE + 1) if stat.S_ISREG(mode) else b''
     except OSError as error:
         raise KeyFileError(f'key file {path!r}: {error.strerror}') from None
     except ValueError as error:
         raise KeyFileError(f'key file {path!r}: {error}') from None
+    if not stat.S_ISREG(mode):
+        raise KeyFileError(f'key file {path!r} is no regular file')
     if stat.S_IMODE(mode) & 0o077:
         raise KeyFileError(
             f'key file {path!r} can be read by others (mode {stat.S_IMODE(mode):04o}); '

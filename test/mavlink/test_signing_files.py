@@ -288,3 +288,10 @@ def test_key_is_in_neither_name_nor_content(tmp_path: Path) -> None:
 
 def test_ticks_of_the_margin_are_those_of_signing() -> None:
     assert stamp_at(NOW + 60) - stamp_at(NOW) == 60 * TICKS_PER_SECOND == NEW_STREAM_TICKS
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    pipe = tmp_path / 'key'
+    os.mkfifo(pipe, 0o600)
+    with pytest.raises(KeyFileError, match='is no regular file'):
+        load_key(str(pipe))

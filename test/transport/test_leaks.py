@@ -72,8 +72,9 @@ def test_a_tcp_server_that_is_restarted(run: Callable[[LiveLink], LiveLink]) -> 
     def go() -> None:
         # What was said has to be heard, or the connection was of no use.
         link.endpoint.heard.wait_for(lambda heard: True, count=link.history().count(True))
+        # The listener first, or the link would be in its queue before it is gone.
         while sockets:
-            sockets.pop().close()
+            sockets.pop(0).close()
 
     cycle(link, come, go)
     go()

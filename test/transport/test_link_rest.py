@@ -21,16 +21,19 @@ from pathlib import Path
 import socket
 import threading
 import time
-from typing import Any
 
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
-from support.live_link import Jump, LiveLink
+from support.live_link import Jump, LiveLink, Talker
 from support.open_channel import bound_socket, free_port, OpenChannel
+from support.ptys import PtyDevice
+from support.simulated_link import SimulatedLink
 
 from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.link import KNOCK_INTERVAL, SILENCE
+from illuminator_ros.mavlink.reception import STALL
 
 Run = Callable[[LiveLink], LiveLink]
 
@@ -63,7 +66,6 @@ def test_waiting_takes_next_to_no_time_of_a_processor(run: Run, url: str) -> Non
 def test_a_line_that_takes_nothing_makes_no_work(
     run: Run, tmp_path: Path,
 ) -> None:
-    from support.ptys import PtyDevice
     pytest.importorskip('serial', reason='pyserial is not installed')
     device = PtyDevice(tmp_path)
     link = run(LiveLink(f'serial://{device.path}:57600'))
@@ -138,12 +140,20 @@ def test_noise_is_no_sign_of_life(run: Run, clock: Jump) -> None:
             assert link.endpoint.greetings.wait_for(lambda at: True, count=count)
 
 
-def test_good_frames_behind_a_false_start_are_taken_in_time(
-    run: Run, clock: Jump, channel: Callable[[str], Any],
-) -> None:
-    other = channel('memory://noise')
-    link = run(LiveLink('memory://noise', clock=clock))
-    link.wait_open()
-    other.broadcast(b'\xfe\xfa\x00\x01\x01\x6e' + heartbeat_frame(LIGHT))
-    # No more bytes come: it is the link's own deadline that lets the frame out.
-    assert link.endpoint.wait_for(LIGHT)
+def test_good_frames_behind_a_false_start_are_taken_at_the_moment_that_it_is_given_up() -> None:
+    endpoint = Talker()
+    link = SimulatedLink(endpoint, lambda data, peer: None)
+    came_at = []
+    monitored = endpoint.receive
+
+    def receive(source: Source, message: object, now: float) -> None:
+        came_at.append(now)
+        monitored(source, message, now)
+
+    endpoint.receive = receive  # type: ignore[method-assign]
+    begun = link.now
+    link.receive((heartbeat_frame(LIGHT), 'peer'))
+    link.receive((b'\xfe\xfa\x00\x01\x01\x6e' + heartbeat_frame(LIGHT), 'peer'))
+    link.run(2.0)
+    link.stop()
+    assert came_at == [begun, begun + STALL]

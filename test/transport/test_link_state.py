@@ -92,7 +92,21 @@ def test_what_does_not_go_out_is_counted(
     link = run(LiveLink('memory://state'))
     link.wait_open()
     fill(link)
-    assert link.link.state().traffic.frames_dropped > 0
+    assert link.ask(lambda now: link.link._channel.dropped == (
+        link.link.state().traffic.frames_dropped))
+
+
+def test_a_lost_link_leads_nowhere_and_awaits_nothing(run: Run) -> None:
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        connection = server.accept()[0]
+    with connection:
+        connection.sendall(heartbeat_frame() + heartbeat_frame()[:9])
+        link.endpoint.wait_for(LIGHT)
+        assert link.link.state().peers == 1
+    link.wait_lost()
+    assert link.link.state().peers == 0
+    assert link.ask(lambda now: link.link._reception.next_deadline()) == float('inf')
 
 
 def test_drops_are_counted_over_all_openings(run: Run) -> None:
