@@ -130,6 +130,21 @@ def test_a_light_that_falls_silent_in_the_middle_is_found_and_the_rest_is_skippe
     assert run.result('thermal-flags').detail == 'the light has fallen silent'
 
 
+def test_a_light_that_has_accepted_what_it_must_not_is_set_right_before_the_next_try():
+    run = Run(faults=('anything',)).finish()
+    configured = [one for one in run.bench.transactions if one.command == 406]
+    brightness = next(i for i, one in enumerate(configured) if one.text.endswith('1 -1 0 0'))
+    assert configured[brightness + 1].text.endswith(' 1 10 0 0')
+
+
+def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
+    run = Run(faults=('duplicate=1',)).finish()
+    for one in run.bench.transactions:
+        assert len(one.finals) <= 2
+    assert 'on-off-values' not in run.failed
+    assert all(len(one.finals) == 2 for one in run.bench.transactions if one.expected)
+
+
 def test_thermal_flags_that_go_with_the_temperature_are_in_order():
     run = Run(DeviceProperties(time_scale=60.0), heat=20.0).finish()
     assert run.result('thermal-flags').verdict.value == 'PASS'

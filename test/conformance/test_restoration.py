@@ -84,6 +84,15 @@ def test_an_interrupted_run_brings_it_back(after):
     assert len(run.suite.results) == len(REQUIREMENTS)
 
 
+def test_bringing_it_back_is_not_interrupted():
+    run = prepared()
+    run.link.run_until(lambda: run.bench.tidying, within=100.0)
+    assert state(run) != (True, BEFORE)
+    run.bench.interrupt(run.link.now)
+    run.finish()
+    assert state(run) == (True, BEFORE)
+
+
 def test_an_interrupted_run_checks_nothing_more():
     run = Run()
     run.link.run(8.0)
@@ -96,7 +105,9 @@ def test_an_interrupted_run_checks_nothing_more():
 def test_a_run_that_is_interrupted_before_it_begins_ends():
     run = Run()
     run.bench.interrupt(run.link.now)
-    assert not run.finish().suite.passed
+    run.finish()
+    assert run.suite.interrupted
+    assert {one.detail for one in run.suite.results} == {'interrupted'}
 
 
 def test_a_check_with_an_error_in_it_fails_and_the_light_is_brought_back(monkeypatch):

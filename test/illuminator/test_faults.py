@@ -97,6 +97,27 @@ def test_it_restarts_again_and_again():
     assert uptimes == [0, 1000, 2000, 3000, 0, 1000, 2000, 3000, 0, 1000]
 
 
+@pytest.mark.parametrize('fault', ['slow=2', 'progress=2'])
+def test_what_was_under_way_is_forgotten_with_a_restart(fault):
+    light = Faulty(fault)
+    light.command()
+    light.device.restart(0.5)
+    light.now = 0.5
+    light.run(5.0)
+    assert light.device.enabled is False
+    assert MavResult.ACCEPTED not in light.results()
+
+
+def test_what_was_not_sent_yet_is_lost_with_a_restart():
+    light = Faulty('delay=3', status_interval=0.0)
+    light.device.poll(0.0)
+    for _ in range(20):
+        light.command()
+    light.device.restart(0.0)
+    light.run(5.0)
+    assert light.of(CommandAck) == []
+
+
 def test_a_failed_thermistor_is_reported_and_measures_nothing():
     light = Faulty('thermistor').run(0.0)
     (_, status), = light.of(IlluminatorStatus)
