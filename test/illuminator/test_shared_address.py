@@ -89,6 +89,30 @@ def test_a_command_that_one_of_two_lights_does_not_carry_out_is_no_success(diffe
     assert 'several lights answer as 1/1' in result.message
 
 
+def test_clocks_of_their_own_do_not_hide_the_light_that_does_not_obey():
+    pair = two(second_boot=-3600.0, enable=1, brightness=40.0).settle(10.0)
+    for light in pair.other.lights:
+        light.fields['enable'] = 0
+    pair.run(3.0)
+    pair.other.lights[0].applies = False
+    result = pair.enable(True)
+    assert (result.success, 'shows off' in result.message) == (False, True)
+
+
+def test_a_status_that_is_lost_does_not_move_the_parameters(different):
+    agreed = different.light.agreement.agreed
+    for light in different.other.lights:
+        light.delay_status(1.0)
+        different.run(5.0)
+    assert different.light.sharing.recognised
+    assert different.light.agreement.agreed == agreed
+
+
+def test_lights_that_were_lost_are_judged_anew(different):
+    different.close()
+    assert not different.light.sharing.recognised
+
+
 def test_a_set_makes_two_lights_one_again(different):
     result = different.configure(brightness=70.0)
     assert result.success
