@@ -38,7 +38,9 @@ def enter(name: str, run: Callable[[Termination], int]) -> int:
         as one later does.
     """
     termination = Termination()
-    return explained(name, lambda: run(termination))
+    status = explained(name, lambda: run(termination))
+    termination.finish()
+    return status
 
 
 def explained(name: str, run: Callable[[], int]) -> int:

@@ -93,6 +93,9 @@ class BridgeProcess:
                 self.node.get_logger().error(
                     f'internal error: {error!r}', throttle_duration_sec=5.0)
         self._stop()
+        # Whoever looks at the ROS graph is to see at once that they are gone.
+        for node in self.nodes:
+            node.destroy_node()
 
     def end(self) -> None:
         """Have :meth:`run` return; callable from any thread."""

@@ -222,6 +222,7 @@ def test_a_restart_brings_back_the_default_settings_but_not_the_cold():
     bench.device.thermal.temperature = 60.0
     bench.now = 100.0
     bench.device.restart(bench.now)
+    assert isinstance(bench.run(0.0)[0], Heartbeat)
     status = bench.device.status(bench.now)
     assert (status.uptime_ms, status.enable, status.mode, status.brightness) == (0, 0, 1, 100.0)
     assert status.temp_c == 60.0

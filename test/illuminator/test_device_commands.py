@@ -204,11 +204,17 @@ def test_a_light_that_has_cooled_down_is_as_bright_as_it_was_told_to_be():
     assert (status.error_status, status.brightness) == (0, 100.0)
 
 
-def test_a_strobe_heats_by_its_duty_cycle():
+@pytest.mark.parametrize(('brightness', 'period', 'duty', 'rise'), [
+    (100, 1, 10, 8.0),
+    (50, 1, 50, 20.0),
+    (40, 0, 10, 32.0),      # no strobe
+    (40, 1, 0, 32.0),       # strobe unused
+])
+def test_a_strobe_heats_by_its_duty_cycle(brightness, period, duty, rise):
     device = fresh(thermal=HOT)
     send(device, ON_OFF, 1)
-    send(device, CONFIGURE, 1, 100, 1, 10)
-    assert device.status(100.0).temp_c == pytest.approx(48.0, abs=0.1)
+    send(device, CONFIGURE, 1, brightness, period, duty)
+    assert device.status(100.0).temp_c == pytest.approx(40.0 + rise, abs=0.1)
 
 
 def test_time_can_be_scaled():

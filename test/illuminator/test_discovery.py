@@ -14,6 +14,8 @@
 
 """Which components on a link are taken for lights."""
 
+import math
+
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight, status_message
@@ -65,6 +67,16 @@ def test_nothing_is_sent_before_the_link_is_open():
     controller = Controller(BRIDGE, Settings())
     controller.poll(0.0)
     assert not controller.outgoing
+
+
+def test_nothing_is_sent_after_the_link_was_closed(controller):
+    controller.receive(Source(1, 243), ILLUMINATOR, 0.0)
+    controller.outgoing.clear()
+    controller.link_closed(0.1)
+    for second in range(10):
+        controller.poll(float(second))
+    assert not controller.outgoing
+    assert controller.next_deadline() == math.inf
 
 
 def test_whoever_comes_within_hearing_gets_a_heartbeat_at_once(controller):

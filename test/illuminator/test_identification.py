@@ -72,14 +72,30 @@ def test_an_acknowledgement_without_the_message_is_not_waited_for_for_ever():
     assert pair.light.identification.failure == 'acknowledged, but not sent'
 
 
-def test_the_message_counts_without_its_acknowledgement():
+@pytest.mark.parametrize('acknowledged', ['never', 'afterwards'])
+def test_the_message_counts_without_its_acknowledgement(acknowledged):
     fake = FakeLight(results={MavCmd.REQUEST_MESSAGE: None})
     pair = Pair(fake).settle(0.1)
     fake.send(fake.information())
     pair.turn()
     pair.run(0.1)
+    if acknowledged == 'afterwards':
+        fake.results.clear()
+        fake.answers.clear()
+    pair.run(10.0)
     assert pair.light.identification.identity is not None
     assert pair.light.identification.failure == ''
+
+
+def test_whoever_asks_while_it_is_being_asked_for_waits_for_the_same_answer(fake, faked):
+    before = len(questions(faked))
+    answers = []
+    for _ in range(5):
+        faked.light.identification.ask(faked.now, lambda failure, now: answers.append(failure))
+    faked.turn()
+    faked.run(1.0)
+    assert len(questions(faked)) == before + 1
+    assert answers == [''] * 5
 
 
 def test_it_is_settled_when_it_is_known(pair):

@@ -121,6 +121,17 @@ class TestAtTheFirstConnection:
         assert 'shows brightness 80 %' in message
         assert len(sent(pair)) <= 5
 
+    def test_after_a_restart_what_was_given_up_is_tried_as_often_again(self, fake):
+        fake.applies = False
+        fake.fields['brightness'] = 80.0
+        pair = overriding(fake, brightness=100.0).settle(60.0)
+        given_up = len(sent(pair))
+        assert pair.light.agreement.agreed.brightness == 80.0
+        fake.restart(pair.now, brightness=20.0)
+        pair.run(60.0)
+        assert len(sent(pair)) == 2 * given_up
+        assert [success for success, _ in pair.recorder.restorations] == [False, False]
+
     def test_what_was_set_meanwhile_is_not_overridden(self, fake):
         fake.results[CONFIGURE] = None
         pair = overriding(fake, brightness=30.0, strobe_period=2.0).settle(1.5)

@@ -15,6 +15,7 @@
 """Asking a light again for its status and its identity."""
 
 import pytest
+from support.back_to_back import Pair
 from support.records import Answer
 
 from illuminator_ros.illuminator.refresh import REFRESH_LIMIT
@@ -63,6 +64,41 @@ def test_without_a_status_it_is_a_failure_that_says_why(fake, faked):
     assert result.message.startswith(
         'ILLUMINATOR_STATUS: MAV_RESULT_UNSUPPORTED, '
         'COMPONENT_INFORMATION_BASIC: refused: MAV_RESULT_UNSUPPORTED (')
+
+
+def test_it_ends_as_soon_as_both_are_decided(fake, faked):
+    fake.stream = 0.0
+    fake.results[REQUEST] = [MavResult.ACCEPTED, MavResult.DENIED]
+    answer = refresh(faked)
+    result = faked.wait_for(answer)
+    assert result.message.startswith('ILLUMINATOR_STATUS: MAV_RESULT_DENIED, '
+                                     'COMPONENT_INFORMATION_BASIC: received')
+    assert answer.seconds < 0.02
+
+
+def test_a_status_that_was_promised_is_waited_for_until_the_limit(fake, faked):
+    fake.stream = 0.0
+    fake.answers.discard(STATUS_ID)
+    answer = refresh(faked)
+    result = faked.wait_for(answer)
+    assert result.message == ('ILLUMINATOR_STATUS: nothing came, '
+                              'COMPONENT_INFORMATION_BASIC: received (5.00 s)')
+    assert answer.seconds == pytest.approx(REFRESH_LIMIT)
+
+
+def test_the_limit_holds_however_long_a_command_may_take(fake):
+    pair = Pair(fake, command_timeout=10.0).settle()
+    fake.stream, fake.results[REQUEST] = 0.0, None
+    assert pair.wait_for(refresh(pair)).message == (
+        'ILLUMINATOR_STATUS: nothing came, COMPONENT_INFORMATION_BASIC: nothing came (5.00 s)')
+
+
+def test_a_status_that_comes_by_itself_will_do(fake, faked):
+    fake.answers.discard(STATUS_ID)
+    fake.stream, fake._status_due = 10.0, faked.now + 3.0
+    answer = refresh(faked)
+    assert faked.wait_for(answer).success
+    assert answer.seconds == pytest.approx(3.0, abs=0.01)
 
 
 @pytest.mark.parametrize('result', [None, MavResult.ACCEPTED, MavResult.IN_PROGRESS,

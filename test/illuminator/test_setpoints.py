@@ -177,6 +177,7 @@ def test_a_setpoint_does_not_wait_for_a_light_that_was_lost_meanwhile(fake, fake
     fake.results[CONFIGURE] = None
     publish(faked, 30.0, 40.0)
     faked.close()
+    assert 'the light is lost: the link was lost' in faked.recorder.failed_setpoints
     faked.run(5.0)
     fake.results[CONFIGURE] = MavResult.ACCEPTED
     faked.open()

@@ -20,7 +20,8 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.light import ServedLight
-from support.ros import Recorder, Ros, running_bridge, STREAM
+from support.recording import Recorder
+from support.ros import Ros, running_bridge, STREAM
 
 INFORMATION = 396
 # What is text by nature; all other values are one number or true or false.

@@ -19,7 +19,8 @@ import re
 import pytest
 from std_srvs.srv import SetBool
 from support.light import MavResult, ON_OFF, ServedLight, Source
-from support.ros import Call, Ros
+from support.recording import Call
+from support.ros import Ros
 
 MS = r'\d+ ms'
 

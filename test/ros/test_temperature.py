@@ -20,7 +20,8 @@ import pytest
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Float64
 from support.light import ServedLight
-from support.ros import Recorder, Ros, running_bridge, STREAM
+from support.recording import Recorder
+from support.ros import Ros, running_bridge, STREAM
 
 THERMISTOR_FAILURE = 4
 

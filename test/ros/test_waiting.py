@@ -20,7 +20,8 @@ import pytest
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from support.light import CONFIGURE, MavResult, ON_OFF, ServedLight
-from support.ros import Call, Parameters, Ros
+from support.recording import Call
+from support.ros import Parameters, Ros
 
 AT_ONCE = 0.2
 

@@ -56,6 +56,7 @@ class _Recorder(FakeLight):
 
     :ivar delays: s from each command to its being taken, by MAV_CMD.
     :ivar steps: what it rounds brightness to, 0 for nothing.
+    :ivar heard_from: the addresses that commands have come from.
     :ivar most_at_once: how many commands, resends not counted, it ever had to take at a time.
     """
 
@@ -66,6 +67,7 @@ class _Recorder(FakeLight):
         self.changed = threading.Condition()
         self.delays: dict[int, float] = {}
         self.steps = 0.0
+        self.heard_from: set[Source] = set()
         self.most_at_once = 0
         self._late: list[tuple[float, Source, Any]] = []
 
@@ -74,6 +76,7 @@ class _Recorder(FakeLight):
             return
         with self.changed:
             self.received.append(message)
+            self.heard_from.add(source)
             self.changed.notify_all()
         if delay := self.delays.get(message.command, 0.0):
             self._late.append((now + delay, source, message))

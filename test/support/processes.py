@@ -125,12 +125,11 @@ def run(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> A
 
 @contextlib.contextmanager
 def ended(program: Program) -> Iterator[Program]:
-    """End a program with SIGINT and hold it to what it promises about that."""
+    """End a program with SIGINT; its status must be 0 then, and its log have no traceback."""
     try:
         yield program
         if program.running:
-            status, taken = program.end()
+            status, _ = program.end()
             assert (status, 'Traceback' in program.log) == (0, False), program.log
-            assert taken < STOP_LIMIT, f'it took {taken:.2f} s to end'
     finally:
         program.kill()

@@ -16,14 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 import contextlib
 import os
 from pathlib import Path
 import random
 import socket
 import threading
-import time
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
@@ -42,6 +41,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from support.light import eventually
 from support.processes import ended, Program, python
+from support.recording import Call, Recorder
 
 STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                    durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -55,84 +55,16 @@ def own_domain() -> Iterator[int]:
         while True:
             # Domains up to 101 have ports below the ephemeral ones.
             domain = random.randint(1, 101)
-            try:
+            with contextlib.suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
+                # Where the first participant of a domain listens (DDSI-RTPS, 9.6.1.1).
+                probe.bind(('', 7410 + 250 * domain))
                 claim.bind(f'\0illuminator_ros_test_domain_{domain}')
-            except OSError:
-                continue
-            break
+                break
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         # The first name is that of Fast DDS 2, which Jazzy has, the second that of Fast DDS 3.
         for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
             os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
-
-
-class Recorder:
-    """Keeps the messages of a topic, and waits for them."""
-
-    def __init__(self) -> None:
-        self.messages: list[Any] = []
-        self._grown = threading.Condition()
-
-    def take(self, message: Any) -> None:
-        """Keep a message."""
-        with self._grown:
-            self.messages.append(message)
-            self._grown.notify_all()
-
-    @property
-    def values(self) -> list[Any]:
-        """The ``data`` of all messages."""
-        return [message.data for message in self.messages]
-
-    def clear(self) -> None:
-        """Forget the messages so far."""
-        with self._grown:
-            self.messages.clear()
-
-    def wait(self, wanted: Callable[[Any], Any] = lambda message: True, timeout: float = 5.0,
-             count: int = 1) -> Any:
-        """Wait until ``count`` messages are as wanted, and return the last of them."""
-        def found() -> list[Any]:
-            return [message for message in self.messages if wanted(message)]
-
-        with self._grown:
-            assert self._grown.wait_for(lambda: len(found()) >= count, timeout), (
-                f'no such message among {self.messages[-3:]}')
-            return found()[count - 1]
-
-    def wait_value(self, value: Any, timeout: float = 5.0) -> None:
-        """Wait until a message has this ``data``."""
-        self.wait(lambda message: message.data == value, timeout)
-
-
-class Call:
-    """A service call that is under way."""
-
-    def __init__(self, future: Any) -> None:
-        self._future = future
-        self._answered = threading.Event()
-        self._started = time.monotonic()
-        self.elapsed = 0.0
-        future.add_done_callback(self._note)
-
-    def _note(self, future: Any) -> None:
-        self.elapsed = time.monotonic() - self._started
-        self._answered.set()
-
-    @property
-    def answered(self) -> bool:
-        """Whether the answer has come."""
-        return self._answered.is_set()
-
-    def answers_within(self, timeout: float) -> bool:
-        """Wait for the answer, and return whether it came in time."""
-        return self._answered.wait(timeout)
-
-    def result(self, timeout: float = 10.0) -> Any:
-        """Wait for the answer and return it."""
-        assert self._answered.wait(timeout), f'no answer within {timeout} s'
-        return self._future.result()
 
 
 class Ros:

@@ -133,6 +133,17 @@ def test_a_program_ends(
         assert taken < STOP_LIMIT, f'it took {taken:.2f} s to end:\n{log}'
 
 
+def test_the_node_is_gone_from_the_graph_at_once(ros: Ros) -> None:
+    case = Case(ros, 'graph')
+    program = case.bridge()
+    eventually(lambda: case.node in ros.node.get_node_names())
+
+    program.end(signal.SIGTERM)
+
+    # A participant that only fell silent would be listed for another 20 s.
+    eventually(lambda: case.node not in ros.node.get_node_names(), timeout=1.0)
+
+
 def test_impatience_changes_nothing(ros: Ros) -> None:
     case = Case(ros, 'impatience')
     program = case.bridge()

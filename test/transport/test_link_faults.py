@@ -126,6 +126,7 @@ def test_a_fault_of_who_hears_the_events_does_not_keep_a_link_lost(
                 connection.sendall(heartbeat_frame())
                 link.endpoint.heard.wait_for(lambda heard: True, count=count)
         link.wait_open(2)
+        assert len(link.endpoint.closings) == 1
     assert set(faults(caplog)) == {'event'}
 
 

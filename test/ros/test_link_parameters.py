@@ -1,0 +1,96 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the parameters of the link do (DESIGN.md, 2)."""
+
+import pytest
+from std_srvs.srv import SetBool
+from support.light import MavCmd, ON_OFF, params, ServedLight, Source
+from support.ros import Parameters, Ros, running_bridge
+
+INTERVAL = MavCmd.SET_MESSAGE_INTERVAL
+STATUS = 440.0
+
+
+def enable(ros: Ros) -> SetBool.Response:
+    return ros.call(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+
+
+def test_our_address_is_1_194_by_default(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port), ServedLight(port) as light:
+        light.wait_for(MavCmd.REQUEST_MESSAGE)
+
+        assert light.fake.heard_from == {Source(1, 194)}
+
+
+def test_our_address_is_what_system_id_and_component_id_say(own_ros: Ros, port: int) -> None:
+    with (running_bridge(own_ros.domain, port, system_id=7, component_id=42),
+          ServedLight(port) as light):
+        assert enable(own_ros).success
+
+        assert light.fake.heard_from == {Source(7, 42)}
+
+
+def test_status_interval_is_asked_for_in_microseconds(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port, status_interval=0.05), ServedLight(port) as light:
+        [command] = light.wait_for(INTERVAL)
+
+        assert params(command)[:2] == (STATUS, 50_000.0)
+
+
+def test_a_light_that_has_restarted_is_asked_again(own_ros: Ros, port: int) -> None:
+    with (running_bridge(own_ros.domain, port, status_interval=0.05) as bridge,
+          ServedLight(port) as light):
+        Parameters(own_ros).wait(brightness=100.0)
+
+        light.restart()
+
+        bridge.wait_for('has restarted')
+        light.wait_for(INTERVAL, 2)
+
+
+def test_the_light_s_own_interval_is_left_alone_by_default(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port), ServedLight(port) as light:
+        assert enable(own_ros).success
+
+        assert light.commands(INTERVAL) == []
+
+
+@pytest.mark.parametrize(('retries', 'text'), [(0, '(1 try, '), (1, '(2 tries, ')])
+def test_command_retries_and_command_timeout_bound_the_wait(
+    own_ros: Ros, port: int, retries: int, text: str,
+) -> None:
+    with (running_bridge(own_ros.domain, port, command_retries=retries, command_timeout=0.1),
+          ServedLight(port) as light):
+        Parameters(own_ros).wait(brightness=100.0)
+        light.fake.results[ON_OFF] = None
+        call = own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+
+        response = call.result()
+
+        assert not response.success
+        assert text in response.message
+        assert call.elapsed < 0.1 * (retries + 1) + 0.2
+
+
+@pytest.mark.parametrize(('timeout', 'text'), [
+    (1.1, 'no heartbeat for 1.1'), (1.6, 'no heartbeat for 1.6')])
+def test_heartbeat_timeout_is_the_silence_after_which_a_light_is_lost(
+    own_ros: Ros, port: int, timeout: float, text: str,
+) -> None:
+    with running_bridge(own_ros.domain, port, heartbeat_timeout=timeout) as bridge:
+        with ServedLight(port):
+            bridge.wait_for('connected')
+
+        bridge.wait_for(f'light 1/243 lost: {text}')

@@ -1,0 +1,90 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What comes from ROS in another thread, kept and waited for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+import time
+from typing import Any
+
+
+class Recorder:
+    """Keeps the messages of a topic, and waits for them."""
+
+    def __init__(self) -> None:
+        self.messages: list[Any] = []
+        self._grown = threading.Condition()
+
+    def take(self, message: Any) -> None:
+        """Keep a message."""
+        with self._grown:
+            self.messages.append(message)
+            self._grown.notify_all()
+
+    @property
+    def values(self) -> list[Any]:
+        """The ``data`` of all messages."""
+        return [message.data for message in self.messages]
+
+    def clear(self) -> None:
+        """Forget the messages so far."""
+        with self._grown:
+            self.messages.clear()
+
+    def wait(self, wanted: Callable[[Any], Any] = lambda message: True, timeout: float = 5.0,
+             count: int = 1) -> Any:
+        """Wait until ``count`` messages are as wanted, and return the last of them."""
+        def found() -> list[Any]:
+            return [message for message in self.messages if wanted(message)]
+
+        with self._grown:
+            assert self._grown.wait_for(lambda: len(found()) >= count, timeout), (
+                f'no such message among {self.messages[-3:]}')
+            return found()[count - 1]
+
+    def wait_value(self, value: Any, timeout: float = 5.0) -> None:
+        """Wait until a message has this ``data``."""
+        self.wait(lambda message: message.data == value, timeout)
+
+
+class Call:
+    """A service call that is under way."""
+
+    def __init__(self, future: Any) -> None:
+        self._future = future
+        self._answered = threading.Event()
+        self._started = time.monotonic()
+        self.elapsed = 0.0
+        future.add_done_callback(self._note)
+
+    def _note(self, future: Any) -> None:
+        self.elapsed = time.monotonic() - self._started
+        self._answered.set()
+
+    @property
+    def answered(self) -> bool:
+        """Whether the answer has come."""
+        return self._answered.is_set()
+
+    def answers_within(self, timeout: float) -> bool:
+        """Wait for the answer, and return whether it came in time."""
+        return self._answered.wait(timeout)
+
+    def result(self, timeout: float = 10.0) -> Any:
+        """Wait for the answer and return it."""
+        assert self._answered.wait(timeout), f'no answer within {timeout} s'
+        return self._future.result()

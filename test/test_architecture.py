@@ -1,0 +1,152 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the parts of the package may know of each other (DESIGN.md, 5)."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+import subprocess
+import warnings
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = 'illuminator_ros'
+# From the bottom to the top; a module may import from its own layer and from those below.
+LAYERS = ('mavlink', 'illuminator', 'ros', '')
+ROS = {'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'sensor_msgs', 'diagnostic_msgs',
+       'ament_index_python'}
+IO = {'socket', 'selectors', 'select', 'serial', 'asyncio', 'subprocess', 'os', 'io', 'pathlib'}
+TIME = {'time', 'datetime'}
+THREADS = {'threading', 'queue', 'multiprocessing', 'concurrent'}
+FORBIDDEN = {'mavlink': ROS, 'illuminator': ROS | IO | TIME | THREADS, 'ros': {'socket'}}
+# Inside mavlink/ too, the protocol itself does no I/O and has no clock.
+SANS_IO = ('agenda', 'command', 'dialect', 'endpoint', 'framing', 'round_trip', 'signing',
+           'statistics', 'url')
+# Imported before signals are taken, and therefore quick to import.
+FIRST = ('', 'bridge', 'simulator', 'entry', 'termination')
+QUICK = {'__future__', 'collections', 'contextlib', 'os', 're', 'signal', 'sys', 'threading',
+         'time', 'typing', PACKAGE}
+LONGEST = 300
+HEADER = '# Copyright 2026 The illuminator_ros developers\n#\n# Licensed under the Apache License'
+
+MODULES = {
+    '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
+    for path in sorted((ROOT / PACKAGE).rglob('*.py'))}
+
+
+def layer(module: str) -> str:
+    """Return the folder of a module of ours; '' for the entry points."""
+    parts = module.split('.')
+    return parts[1] if len(parts) > 1 and parts[1] in LAYERS else ''
+
+
+def imports(module: str, nodes: Iterator[ast.AST] | None = None) -> set[str]:
+    """Return the full names of what a module imports, wherever in it."""
+    path = MODULES[module]
+    package = module if path.name == '__init__.py' else module.rpartition('.')[0]
+    names = set()
+    for node in nodes or ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level:
+            base = package.split('.')[:len(package.split('.')) - node.level + 1]
+            target = '.'.join([*base, *filter(None, [node.module])])
+            names |= {f'{target}.{alias.name}' if f'{target}.{alias.name}' in MODULES else target
+                      for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names.add(str(node.module))
+    return names
+
+
+def roots(names: set[str]) -> set[str]:
+    return {name.partition('.')[0] for name in names}
+
+
+@pytest.mark.parametrize('module', MODULES)
+def test_imports_point_downwards(module: str) -> None:
+    own = LAYERS.index(layer(module))
+
+    above = {name for name in imports(module) if name.startswith(f'{PACKAGE}.')
+             and LAYERS.index(layer(name)) > own}
+
+    assert above == set()
+
+
+@pytest.mark.parametrize('module', [m for m in MODULES if layer(m) in FORBIDDEN])
+def test_a_layer_knows_nothing_of_what_is_not_its_own(module: str) -> None:
+    assert roots(imports(module)) & FORBIDDEN[layer(module)] == set()
+
+
+@pytest.mark.parametrize('name', SANS_IO)
+def test_the_protocol_in_mavlink_does_no_io_and_has_no_clock(name: str) -> None:
+    module = f'{PACKAGE}.mavlink.{name}'
+
+    assert roots(imports(module)) & (IO | TIME | THREADS) == set()
+    assert not any(other.startswith((f'{PACKAGE}.mavlink.transport', f'{PACKAGE}.mavlink.link'))
+                   for other in imports(module))
+
+
+@pytest.mark.parametrize(
+    'module', [m for m in MODULES if layer(m) == 'mavlink' and not m.endswith('.dialect')])
+def test_mavlink_knows_no_light(module: str) -> None:
+    """It is to carry other payloads later; only the dialect lists the messages of this one."""
+    names = set()
+    for node in ast.walk(ast.parse(MODULES[module].read_text())):
+        if isinstance(node, ast.Name):
+            names.add(node.id)
+        elif isinstance(node, ast.Attribute):
+            names.add(node.attr)
+        elif isinstance(node, ast.alias):
+            names.add(node.name)
+
+    assert [name for name in names if 'illuminator' in name.lower()] == []
+
+
+@pytest.mark.parametrize('name', FIRST)
+def test_what_comes_before_signals_are_taken_imports_nothing_slow(name: str) -> None:
+    module = f'{PACKAGE}.{name}'.rstrip('.')
+    top_level = iter(ast.parse(MODULES[module].read_text()).body)
+
+    names = imports(module, top_level)
+
+    assert roots(names) <= QUICK
+    assert {n for n in names if n.startswith(f'{PACKAGE}.')} <= {
+        f'{PACKAGE}.{first}' for first in FIRST}
+
+
+def tracked() -> list[Path]:
+    """Return all Python files that belong to the repository."""
+    listed = subprocess.run(['git', 'ls-files', '*.py'], cwd=ROOT, text=True,
+                            capture_output=True, check=False).stdout.split()
+    if listed:
+        return [ROOT / name for name in listed if (ROOT / name).exists()]
+    return [*MODULES.values(), *sorted((ROOT / 'test').rglob('*.py'))]
+
+
+@pytest.mark.parametrize('path', tracked(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_file_bears_the_licence(path: Path) -> None:
+    text = path.read_text()
+
+    assert text.removeprefix('#!/usr/bin/env python3\n').startswith(HEADER)
+
+
+def test_files_are_of_a_size_to_be_read_at_once() -> None:
+    for path in tracked():
+        lines = len(path.read_text().splitlines())
+        if lines > LONGEST:
+            warnings.warn(f'{path.relative_to(ROOT)} has {lines} lines, aimed at are {LONGEST}',
+                          stacklevel=1)
+    assert tracked()
