@@ -2,13 +2,17 @@
 PYTHON_IN_VENV := .venv/bin/python
 TESTS ?= test
 
-.PHONY: help demo test lint unit fuzz soak bench clean environment
+SECONDS ?= 60
+
+.PHONY: help demo test lint unit fuzz soak clean environment
 
 help:
 	@echo 'make demo    a simulated light and the bridge: the main job, shown'
 	@echo 'make test    all tests, and the linters'
 	@echo 'make unit    the tests that need no ROS'
 	@echo 'make lint    ruff and mypy'
+	@echo 'make fuzz    hostile input to both sides of the link for SECONDS=60'
+	@echo 'make soak    simulator and bridge with random faults for SECONDS=60'
 	@echo 'make clean   remove .venv and what was built'
 
 environment:
@@ -27,6 +31,12 @@ unit: environment
 lint: environment
 	@$(PYTHON_IN_VENV) -m ruff check .
 	@$(PYTHON_IN_VENV) -m mypy -p illuminator_ros
+
+fuzz: environment
+	@$(PYTHON_IN_VENV) test/fuzz/run.py --seconds $(SECONDS)
+
+soak: environment
+	@$(PYTHON_IN_VENV) test/soak/run.py --seconds $(SECONDS)
 
 clean:
 	rm -rf .venv build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis

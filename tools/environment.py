@@ -38,6 +38,9 @@ ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
 PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'hypothesis>=6.100', 'pyyaml>=6', 'ruff>=0.8',
         'mypy>=1.13', 'colcon-common-extensions>=0.3']
+# A router for the tests, alone: run without a display it needs none of the gigabyte of graphics
+# packages that it asks for.
+ALONE = ['MAVProxy>=1.8.70']
 
 
 def fail(reason):
@@ -132,7 +135,7 @@ def main():
     """Make the environment unless it is there and made of the same things."""
     python = interpreter()
     packages = requirements()
-    recipe = repr((python, version_of(python), packages, os.environ.get('ROS_DISTRO')))
+    recipe = repr((python, version_of(python), packages, ALONE, os.environ.get('ROS_DISTRO')))
     stamp = VENV / 'made-of'
     digest = hashlib.sha256(recipe.encode()).hexdigest()
     if stamp.exists() and stamp.read_text() == digest:
@@ -143,6 +146,7 @@ def main():
         *version_of(python), ros), flush=True)
     make_venv(python)
     install(packages)
+    install(['--no-deps'] + ALONE)
     stamp.write_text(digest)
 
 

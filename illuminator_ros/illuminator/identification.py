@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # s from the acknowledgement to the message.
 MESSAGE_TIMEOUT = 0.5
+# How often a message that was acknowledged and has not come is asked for: it may be lost.
+MAX_QUESTIONS = 3
 # s after which whoever needs an id for the light takes what there is.
 SETTLING_TIME = 2.0
 
@@ -50,6 +52,7 @@ class Identification:
         self._message_until = math.inf
         self._waiting: list[Done] = []
         self._asking = False
+        self._questions = 0
         self._first_asked = math.inf
 
     def settled(self, now: float) -> bool:
@@ -64,7 +67,13 @@ class Identification:
         if self._asking:
             return
         self._asking = True
+        self._questions = 0
         self._first_asked = min(self._first_asked, now)
+        self._send(now)
+
+    def _send(self, now: float) -> None:
+        self._questions += 1
+        self._message_until = math.inf
         self._light.sender.start(
             Command(self._light.source, MavCmd.REQUEST_MESSAGE, (float(INFORMATION_ID),)),
             now, self._answered)
@@ -85,8 +94,12 @@ class Identification:
             self._finish(outcome.verdict, now)
 
     def poll(self, now: float) -> None:
-        """Give up on a message that does not come."""
-        if now >= self._message_until:
+        """Ask again for a message that does not come, or give up."""
+        if now < self._message_until:
+            return
+        if self._questions < MAX_QUESTIONS:
+            self._send(now)
+        else:
             self._finish('acknowledged, but not sent', now)
 
     def next_deadline(self) -> float:

@@ -18,7 +18,7 @@ import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
 
-from illuminator_ros.illuminator.identification import SETTLING_TIME
+from illuminator_ros.illuminator.identification import MAX_QUESTIONS, SETTLING_TIME
 from illuminator_ros.illuminator.model import Identity
 from illuminator_ros.mavlink.dialect import INFORMATION_ID, MavCmd, MavResult
 
@@ -68,8 +68,20 @@ def test_a_light_that_does_not_answer_is_asked_as_often_as_any_command_is_tried(
 def test_an_acknowledgement_without_the_message_is_not_waited_for_for_ever():
     fake = FakeLight()
     fake.answers.discard(INFORMATION_ID)
-    pair = Pair(fake).settle(5.0)
+    pair = Pair(fake).settle(30.0)
     assert pair.light.identification.failure == 'acknowledged, but not sent'
+    assert len(questions(pair)) == MAX_QUESTIONS
+
+
+def test_a_message_that_gets_lost_is_asked_for_again_before_anybody_needs_it():
+    fake = FakeLight()
+    fake.answers.discard(INFORMATION_ID)
+    pair = Pair(fake)
+    pair.run(0.3)
+    fake.answers.add(INFORMATION_ID)
+    pair.run(SETTLING_TIME - 0.3)
+    assert pair.light.identification.identity is not None
+    assert len(questions(pair)) == 2
 
 
 @pytest.mark.parametrize('acknowledged', ['never', 'afterwards'])
