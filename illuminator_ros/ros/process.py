@@ -71,8 +71,7 @@ class BridgeProcess:
             parameters.url, self.controller, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
         self._serve(node)
-        FleetInputs(node, self.link, lambda: list(self.controller.lights.values()),
-                    self._name_of, node.absence)
+        FleetInputs(node, self.link, self._lights, self._name_of, node.absence)
         _forward_logs(node)
         self._ended = threading.Event()
         self._spinners = [Spinner(node)]
@@ -121,6 +120,10 @@ class BridgeProcess:
             target=self._run_further, args=(light,), name=f'light {light.source}', daemon=True)
         self._threads.append(thread)
         thread.start()
+
+    def _lights(self) -> list[Light]:
+        """Return the lights by their addresses, in the link's thread."""
+        return sorted(self.controller.lights.values(), key=lambda light: light.source)
 
     def _name_of(self, light: Light) -> str:
         """Return what a light is called in answers about several."""
