@@ -25,7 +25,7 @@ from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
 from support.light import free_port
 from support.processes import ended, Program, python
-from support.ros import Parameters, Ros, running_bridge, STREAM
+from support.ros import own_domain, Parameters, Ros, running_bridge, STREAM
 
 ENABLED = 'confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'
 
@@ -52,9 +52,22 @@ KINDS = {
 
 
 @pytest.fixture(scope='module', params=KINDS)
-def kind(request: pytest.FixtureRequest, domain: int) -> Iterator[tuple[Kind, Program]]:
+def kind_name(request: pytest.FixtureRequest) -> str:
+    """Return the name of each kind in turn."""
+    return str(request.param)
+
+
+@pytest.fixture(scope='module')
+def domain(kind_name: str) -> Iterator[int]:
+    """Claim a ROS domain for each kind: a bridge is not to be mixed up with the one before."""
+    with own_domain() as domain:
+        yield domain
+
+
+@pytest.fixture(scope='module')
+def kind(kind_name: str, domain: int) -> Iterator[tuple[Kind, Program]]:
     """Run a bridge and a simulated light of each kind."""
-    kind, port = KINDS[request.param], free_port()
+    kind, port = KINDS[kind_name], free_port()
     url = f'udpout://127.0.0.1:{port}'
     with contextlib.ExitStack() as stack:
         bridge = stack.enter_context(running_bridge(domain, port))
