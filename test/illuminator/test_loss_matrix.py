@@ -60,7 +60,7 @@ class User:
     """
     One user of one light: asks for something, waits for the answer, and asks again.
 
-    :ivar due: when it does the next thing.
+    :ivar due: when it does the next thing, or later if it is still waiting then.
     """
 
     def __init__(self, pair: Pair, light: Light, kind: MavCmd, draw: random.Random) -> None:
@@ -69,11 +69,13 @@ class User:
         self.requests: list[Request] = []
         self._waiting: list[Request] = []
 
+    @property
+    def idle(self) -> bool:
+        """Whether all that it has asked for is answered."""
+        return all(request.answer.results for request in self._waiting)
+
     def act(self) -> None:
-        """Ask, several things at once now and then, when all before is answered."""
-        if any(not request.answer.results for request in self._waiting):
-            self.due = self.pair.now + 0.05
-            return
+        """Ask, several things at once now and then."""
         self._waiting = [self._ask() for _ in range(self.draw.choice((1, 1, 1, 2, 3)))]
         self.requests += self._waiting
         self.due = self.pair.now + self.draw.choice((0.001, 0.1, 0.3))
@@ -149,9 +151,9 @@ def play(line: str, share: float) -> tuple[Pair, list[Request], Judge]:
               Joystick(pair, third, draw), Joystick(pair, fourth, draw)]
     while sum(len(user.requests) for user in users) < COMMANDS:
         for user in users:
-            if user.due <= pair.now:
+            if user.due <= pair.now and user.idle:
                 user.act()
-        pair.step(min(user.due for user in users))
+        pair.step(min(user.due for user in users if user.idle))
     requests = [request for user in users for request in user.requests]
     pair.run_until(lambda: all(request.answer.results for request in requests))
     return pair, requests, judge
