@@ -25,7 +25,8 @@ test: lint
 	@$(PYTHON_IN_VENV) -m pytest $(TESTS)
 
 unit: environment
-	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator
+	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \
+		test/conformance test/transport/test_conformance_process.py
 
 lint: environment
 	@$(PYTHON_IN_VENV) -m ruff check .

@@ -34,7 +34,7 @@ setup(
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
-    extras_require={'serial': ['pyserial>=3.5']},
+    extras_require={'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4']},
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',
@@ -43,6 +43,7 @@ setup(
     entry_points={
         'console_scripts': [
             'bridge = illuminator_ros.bridge:main',
+            'conformance = illuminator_ros.conformance:main',
             'simulator = illuminator_ros.simulator:main',
         ],
     },

@@ -38,13 +38,18 @@ def enter(name: str, run: Callable[[Termination], int]) -> int:
         as one later does.
     """
     termination = Termination()
+    status = explained(name, lambda: run(termination))
+    termination.finish()
+    return status
+
+
+def explained(name: str, run: Callable[[], int]) -> int:
+    """Run a program and return its exit status; name what it needs where that is missing."""
     try:
-        status = run(termination)
+        return run()
     except ModuleNotFoundError as error:
         package = (error.name or '').partition('.')[0]
         if package not in _REMEDIES:
             raise
         print(f'{name}: {package} is not installed: {_REMEDIES[package]}', file=sys.stderr)
         return 1
-    termination.finish()
-    return status

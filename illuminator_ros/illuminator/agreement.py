@@ -66,6 +66,11 @@ class Agreement:
         # What was last asked for or told: small steps away from it add up to a change.
         self._reference: Configuration | None = None
 
+    @property
+    def changing(self) -> bool:
+        """Whether a command of ours is under way."""
+        return self._queue.current is not None
+
     # Requests
 
     def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
@@ -244,7 +249,7 @@ class Agreement:
             if not unexplained(wanted, reported, status.error_flags, step=True):
                 # It kept its configuration, or got it back from somebody else.
                 self._want_no_more(self._wanted)
-        else:
+        elif self._light.sharing.settled and not self._light.sharing.recognised:
             self._follow(status, self.agreed, reported)
 
     def _follow(self, status: Status, agreed: Configuration, reported: Configuration) -> None:

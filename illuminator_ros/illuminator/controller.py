@@ -39,7 +39,7 @@ from .model import Identity, Status
 MAX_LIGHTS = 128
 # Lost lights that are looked for at once, so that a slow line is not filled.
 MAX_ASKED = 8
-# s for which a heartbeat from our own address counts as a clash.
+# s for which a message from our own address counts as a clash.
 CLASH_MEMORY = 10.0
 
 
@@ -52,14 +52,16 @@ class Controller(Endpoint):
 
     :param identity: our own address.
     :param on_light: called with each light when it is first heard.
+    :param wanted: tells whether a light at an address is of interest; others are left alone.
     :ivar lights: those found so far, by address, in the order in which they were found.
-    :ivar clash_at: when a heartbeat from our own address was last heard.
+    :ivar clash_at: when somebody else was last heard from our own address.
     :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
     """
 
     def __init__(
         self, identity: Source, settings: Settings, *, command_timeout: float = 0.5,
         command_retries: int = 3, on_light: Callable[[Light], None] = lambda light: None,
+        wanted: Callable[[Source], bool] = lambda source: True,
     ) -> None:
         super().__init__()
         self.identity = identity
@@ -68,6 +70,7 @@ class Controller(Endpoint):
         self.clash_at = -math.inf
         self.passed_over = False
         self._on_light = on_light
+        self._wanted = wanted
         self._heartbeat = Heartbeat(identity, MavType.ONBOARD_CONTROLLER)
         self._link_open = False
         self._agenda: Agenda[Source] = Agenda()
@@ -98,8 +101,8 @@ class Controller(Endpoint):
             # 0 is the address of everybody, and what is sent to it switches every light.
             return
         if source == self.identity:
-            if isinstance(message, HeartbeatMessage):
-                self.clash_at = now
+            # What we have sent ourselves and comes back does not get here: the link drops it.
+            self.clash_at = now
             return
         if isinstance(message, IlluminatorStatus):
             light = self._light(source)
@@ -129,9 +132,9 @@ class Controller(Endpoint):
             self._schedule(source)
 
     def _light(self, source: Source) -> Light | None:
-        """Return the light at an address, a new one if need be; None if there is no room."""
+        """Return the light at an address, a new one if need be; None if it is passed over."""
         light = self.lights.get(source)
-        if light is None:
+        if light is None and self._wanted(source):
             if len(self.lights) >= MAX_LIGHTS:
                 self.passed_over = True
                 return None

@@ -28,6 +28,7 @@ from .model import ErrorFlag, Identity, Limits, Status
 from .observer import LightObserver
 from .operation import Done, Enable, OperationQueue, Result
 from .refresh import Refresh
+from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
 
 # s without a status after which the light is asked for one, and between the askings.
@@ -57,15 +58,19 @@ class Light:
     :ivar connected: whether it is heard.
     :ivar status: the newest status, None before the first.
     :ivar restarts: how often it has restarted since it was found.
+    :ivar instance: which light of the component it is; 0 is all of them, which is all that the
+        commands can say until mavlink pull request 2490 is settled.
+    :ivar sharing: whether it is several lights in truth.
     :ivar measures_temperature: whether it has ever sent a temperature other than 0.
     :ivar changed: called when a request may have changed :meth:`next_deadline`.
     """
 
     def __init__(
         self, source: Source, sender: CommandSender, settings: Settings,
-        observer: LightObserver | None = None,
+        observer: LightObserver | None = None, *, instance: int = 0,
     ) -> None:
         self.source = source
+        self.instance = instance
         self.sender = sender
         self.settings = settings
         self.observer = observer or LightObserver()
@@ -78,6 +83,7 @@ class Light:
         self.changed: Callable[[], None] = lambda: None
         self.identification = Identification(self)
         self.agreement = Agreement(self)
+        self.sharing = Sharing()
         self._switching = OperationQueue()
         self._status_due = math.inf
         # Whether it was lost since the newest status.
@@ -99,8 +105,11 @@ class Light:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
         self.heard(now)
         was_away, self._was_away = self._was_away, False
+        self.sharing.take(
+            status, now, commanded=bool(self._switching.current or self.agreement.changing))
         meaning = Uptime.RUNNING
-        if self.status is not None:
+        # The uptimes of several lights say nothing about one another.
+        if self.status is not None and not self.sharing.recognised:
             meaning = compare_uptime(
                 self.status.uptime_ms, status.uptime_ms, now - self.status_at, away=was_away)
         if meaning is Uptime.LATE:
@@ -112,7 +121,8 @@ class Light:
         self.measures_temperature |= bool(status.temperature)
         if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and was_away):
             self._restarted(now)
-        sent_by = self._sending_times.sent_by(status.uptime_ms, now)
+        sent_by = (now if self.sharing.recognised
+                   else self._sending_times.sent_by(status.uptime_ms, now))
         if self._switching.current:
             self._switching.current.status(status, sent_by, now)
         self.agreement.take_status(status, sent_by, now)
@@ -132,6 +142,7 @@ class Light:
             self.connected = False
             self._was_away = True
             self._status_due = math.inf
+            self.sharing.clear()
             self.observer.lost(self, reason)
             self.agreement.lost(reason)
 

@@ -90,6 +90,8 @@ class Operation(ABC):
         self._outcome: Outcome | None = None
         self._contradiction: Status | None = None
         self._outdated = False
+        # Statuses in a row that show the change.
+        self._shown = 0
         self._accepted_at = math.inf
         self._confirm_until = math.inf
         self._ask_at = math.inf
@@ -161,11 +163,16 @@ class Operation(ABC):
             return
         if sent_by < self._started:
             self._outdated = True
-        elif self.shown_by(status):
+            return
+        if not self.shown_by(status):
+            self._contradiction = status
+            self._shown = 0
+            return
+        self._shown += 1
+        # Of several lights that report in turn, not only the first must show it.
+        if self._shown >= (2 if self.light.sharing.recognised else 1):
             self.accepted(status)
             self._finish(self._success(self.proof(status), now), now)
-        else:
-            self._contradiction = status
 
     def supersede(self, now: float) -> None:
         """End an accepted change without its confirmation: a newer one replaces it."""
@@ -191,7 +198,9 @@ class Operation(ABC):
         if self._contradiction is not None:
             found = ', '.join(filter(None, (
                 self.found(self._contradiction),
-                *flag_names(self._contradiction.error_flags))))
+                *flag_names(self._contradiction.error_flags),
+                f'several lights answer as {self.light.source}'
+                if self.light.sharing.recognised else '')))
             self._failure(f'but ILLUMINATOR_STATUS shows {found}', now, contradicted=True)
         elif self.light.sends_status:
             waited = format_seconds(now - self._accepted_at)
@@ -233,7 +242,8 @@ class Enable(Operation):
 
     def command(self) -> Command:
         """See :meth:`Operation.command`."""
-        return Command(self.light.source, MavCmd.ILLUMINATOR_ON_OFF, (float(self.on),))
+        return Command(self.light.source, MavCmd.ILLUMINATOR_ON_OFF,
+                       (float(self.on), float(self.light.instance)))
 
     def shown_by(self, status: Status) -> bool:
         """See :meth:`Operation.shown_by`."""
@@ -278,7 +288,8 @@ class Configure(Operation):
     def command(self) -> Command:
         """See :meth:`Operation.command`."""
         return Command(
-            self.light.source, MavCmd.DO_ILLUMINATOR_CONFIGURE, self.wanted.params())
+            self.light.source, MavCmd.DO_ILLUMINATOR_CONFIGURE,
+            (*self.wanted.params(), float(self.light.instance)))
 
     def shown_by(self, status: Status) -> bool:
         """See :meth:`Operation.shown_by`."""

@@ -21,6 +21,9 @@ import math
 
 from .model import ErrorFlag
 
+# degC; what an open thermistor reads like, and what receivers take for "not measured".
+BROKEN_READING = 0.0
+
 
 @dataclass(frozen=True)
 class ThermalProperties:
@@ -59,13 +62,32 @@ class ThermalModel:
     The temperature of a light over time.
 
     :ivar temperature: degC.
+    :ivar ambient: degC.
     :ivar flags: what it makes the light report.
     """
 
     def __init__(self, properties: ThermalProperties) -> None:
         self.properties = properties
-        self.temperature = properties.ambient
+        self.ambient = self.temperature = properties.ambient
         self.flags = ErrorFlag(0)
+        self._sensor_failed = False
+
+    @property
+    def sensor_failed(self) -> bool:
+        """Whether the light cannot tell its temperature: it then knows no heat but that flag."""
+        return self._sensor_failed
+
+    @sensor_failed.setter
+    def sensor_failed(self, failed: bool) -> None:
+        if failed == self._sensor_failed:
+            return
+        self._sensor_failed = failed
+        self.flags = ErrorFlag.THERMISTOR_FAILURE if failed else ErrorFlag(0)
+
+    @property
+    def reading(self) -> float:
+        """The temperature as the light reports it, degC."""
+        return BROKEN_READING if self._sensor_failed else self.temperature
 
     @property
     def output(self) -> float:
@@ -89,9 +111,11 @@ class ThermalModel:
 
     def _step(self, seconds: float, power: float) -> None:
         properties = self.properties
-        final = properties.ambient + properties.rise * power * self.output
+        final = self.ambient + properties.rise * power * self.output
         decay = math.exp(-seconds / properties.time_constant)
         self.temperature = final + (self.temperature - final) * decay
+        if self._sensor_failed:
+            return
         self._switch(ErrorFlag.THERMAL_THROTTLING, properties.throttle_at,
                      properties.throttle_until)
         self._switch(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN, properties.shutdown_at,

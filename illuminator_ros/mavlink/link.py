@@ -22,13 +22,15 @@ import contextlib
 from dataclasses import dataclass
 import logging
 import math
+import random
 import selectors
 import socket
 import threading
 import time
 from typing import Any
 
-from .dialect import decode_payload, encode_payload, HANDLED, LAYOUTS, Source
+from .dialect import decode_payload, encode_payload, HANDLED, Source
+from .echoes import Echoes
 from .endpoint import Endpoint
 from .framing import DecoderCounters, encode_frame, Frame
 from .opener import Opener
@@ -137,6 +139,7 @@ class Link:
         self._sequences: dict[Source, int] = {}
         self._reception = Reception(self._signing)
         self._routes = Routes()
+        self._echoes = Echoes()
         self._traffic = Traffic()
         self._since = clock()
         # Why the link is not open, as far as others know; '' where it is.
@@ -289,6 +292,8 @@ class Link:
             self._accept(channel, peer, frame, now)
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
+        if frame.source in self._sequences and self._echoes.has(frame, now):
+            return
         if not self._spoken:
             self._spoken = True
             self._opener.answered()
@@ -323,11 +328,14 @@ class Link:
                     self._lost(error)
 
     def _send(self, channel: Channel, source: Source, message: Any) -> None:
-        sequence = self._sequences.get(source, 0)
+        # Begun anywhere: two that were started together with one address are then told apart.
+        sequence = self._sequences.get(source, random.randrange(256))
         self._sequences[source] = (sequence + 1) & 0xFF
+        payload = encode_payload(message)
+        self._echoes.sent(source, sequence, message.id, payload, self.clock())
         frame = encode_frame(
-            message.id, encode_payload(message), sequence=sequence, source=source,
-            crc_extra=LAYOUTS[message.id].crc_extra, signed=self._signing.signs)
+            message.id, payload, sequence=sequence, source=source,
+            crc_extra=message.crc_extra, signed=self._signing.signs)
         if self._signing.signs:
             frame = self._signing.sign(frame, self._wall_clock())
         peers = self._routes.towards(message, channel.peers(self.clock()), self.clock())

@@ -143,6 +143,9 @@ def lamp_findings(light: Light, now: float) -> list[Finding]:
             findings.append((WARN, flag_names(status.error_flags & ~KNOWN_FLAGS)[0]))
         if status.invalid:
             findings.append((WARN, f'not believable: {", ".join(status.invalid)}'))
+    if light.sharing.recognised:
+        findings.append((WARN, f'several lights answer as {light.source}: their statuses '
+                               'contradict one another'))
     if light.agreement.discrepancy:
         findings.append((WARN, light.agreement.discrepancy))
     return findings
@@ -156,6 +159,7 @@ def lamp_status(node_name: str, hardware_id: str, light: Light, now: float) -> D
         'connected': light.connected,
         'heard_s_ago': now - light.heard_at,
         'restarts': light.restarts,
+        'shared_address': light.sharing.recognised,
     }
     if status is not None:
         values |= {

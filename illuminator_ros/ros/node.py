@@ -75,7 +75,7 @@ class IlluminatorNode(Node):
         for warning in misspelt(self):
             self.get_logger().warning(warning)
         self.outputs = Outputs(self, frame_id, self._check_lamp)
-        self.inputs = Inputs(self, link, lambda: self.light, self._absence)
+        self.inputs = Inputs(self, link, lambda: self.light, self.absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._period = period
         self._diagnostics_due = self._started
@@ -88,7 +88,8 @@ class IlluminatorNode(Node):
         if self._overrides:
             light.agreement.want(self._overrides, now)
 
-    def _absence(self) -> str:
+    def absence(self) -> str:
+        """Return why there is no light, for people."""
         state = self._link.state()
         if not state.is_open:
             return f'no light connected: {state.name} is not open: {state.reason}'

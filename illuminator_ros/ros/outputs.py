@@ -58,6 +58,7 @@ class Outputs(LightObserver):
         self._connected.publish(Bool(data=False))
         self._identity: Identity | None = None
         self._limits = Limits()
+        self._shared = False
         self._mirroring = threading.RLock()
         self._mirrored_by: int | None = None
         node.add_on_set_parameters_callback(self._may_set)
@@ -107,6 +108,10 @@ class Outputs(LightObserver):
         if temperature is not None:
             stamp = self._node.get_clock().now().to_msg()
             self._temperature.publish(temperature_message(temperature, stamp, self._frame_id))
+        if light.sharing.recognised and not self._shared:
+            self._node.get_logger().warning(
+                f'several lights answer as {light.source}: parameters stay as they are')
+        self._shared = light.sharing.recognised
         if status.limits != self._limits:
             self._limits = status.limits
             self._fit()

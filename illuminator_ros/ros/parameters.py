@@ -113,6 +113,7 @@ LINK_PARAMETERS = (
                   high=255),
     ParameterSpec('target_component', 0, 'component id of the light to serve; 0 = any', low=0,
                   high=255),
+    ParameterSpec('only_target', False, 'leave lights alone that the target does not select'),
     ParameterSpec('names', [''], 'node names of further lights, such as 1/244=belly'),
     ParameterSpec('heartbeat_timeout', 3.0, 'silence after which the light is lost', 's', 1.1,
                   3600.0),
@@ -149,6 +150,7 @@ class LinkParameters:
     url: Url
     identity: Source
     target: Source
+    only_target: bool
     names: Mapping[Source, str]
     heartbeat_timeout: float
     command_timeout: float
@@ -182,14 +184,15 @@ def declare_link_parameters(node: Node) -> LinkParameters:
     return LinkParameters(
         url=url, identity=Source(values['system_id'], values['component_id']),
         target=Source(values['target_system'], values['target_component']),
-        names=_parse_names(values['names']), signing_mode=SigningMode(values['signing_mode']),
+        names=_parse_names(values['names'], node.get_name()),
+        signing_mode=SigningMode(values['signing_mode']),
         **{name: values[name] for name in (
-            'heartbeat_timeout', 'command_timeout', 'command_retries', 'status_interval',
-            'off_on_shutdown', 'restore_configuration', 'signing_key_file',
+            'only_target', 'heartbeat_timeout', 'command_timeout', 'command_retries',
+            'status_interval', 'off_on_shutdown', 'restore_configuration', 'signing_key_file',
             'connection_url', 'frame_id', 'diagnostics_period')})
 
 
-def _parse_names(entries: list[str]) -> dict[Source, str]:
+def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
     names: dict[Source, str] = {}
     for entry in filter(None, entries):
         ids, equals, name = entry.partition('=')
@@ -202,6 +205,8 @@ def _parse_names(entries: list[str]) -> dict[Source, str]:
         source = Source(int(system), int(component))
         if source in names or name in names.values():
             raise ParameterError(f'names: {entry!r} repeats an address or a name')
+        if name == first:
+            raise ParameterError(f'names: {entry!r} is the name of the first node')
         names[source] = name
     return names
 

@@ -21,30 +21,33 @@ import threading
 import time
 from typing import Any
 
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings
+from ..mavlink.dialect import Source
 from ..mavlink.link import Link, LinkEvent
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
+from .fleet_inputs import FleetInputs
 from .node import IlluminatorNode
 from .parameters import declare_link_parameters, LinkParameters, ParameterError
+from .spinner import Spinner
 
 # s; SIGINT and SIGTERM end the process within 1 s, of which ROS takes 0.2 s.
 OFF_LIMIT = 0.5
 STOP_LIMIT = 0.15
-# s between looks at whether diagnostics are due or have got worse. One timer does for all nodes:
-# each of their own would have rclpy wake up for it and look through all of them.
+THREADS_LIMIT = 0.1
+# s between looks at whether diagnostics are due or have got worse. One thread does for all nodes:
+# timers of their own would have as many executors wake up each time.
 TICK = 0.25
 
 
 class BridgeProcess:
     """
     Connects the nodes of the lights on one link with that link.
+
+    Each node has a thread: nothing that one of them does delays another.
 
     :param node: that of the first light.
     :param arguments: the command line, which the nodes of further lights follow too.
@@ -61,37 +64,36 @@ class BridgeProcess:
                 parameters.heartbeat_timeout, parameters.status_interval,
                 parameters.restore_configuration),
             command_timeout=parameters.command_timeout,
-            command_retries=parameters.command_retries, on_light=self._found)
+            command_retries=parameters.command_retries, on_light=self._found,
+            wanted=self._selected if parameters.only_target else lambda source: True)
         signing, store = _signing(parameters)
         self.link = Link(
             parameters.url, self.controller, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
         self._serve(node)
+        FleetInputs(node, self.link, self._lights, self._name_of, node.absence)
         _forward_logs(node)
         self._ended = threading.Event()
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
+        self._spinners = [Spinner(node)]
         self._tick = min(TICK, parameters.diagnostics_period)
-        # On a steady clock: with use_sim_time and no /clock a ROS timer never fires.
-        node.create_timer(self._tick, self._poll, ReentrantCallbackGroup(),
-                          Clock(clock_type=ClockType.STEADY_TIME))
+        self._threads = [threading.Thread(target=self._poll, name='diagnostics', daemon=True)]
+        # Nodes are made one after the other: each takes time of everybody.
+        self._making = threading.Lock()
 
     def _poll(self) -> None:
-        for node in list(self.nodes):
-            node.poll(self._tick / 2)
+        while not self._ended.wait(self._tick):
+            for node in list(self.nodes):
+                try:
+                    node.poll(self._tick / 2)
+                except Exception as error:
+                    node.get_logger().error(
+                        f'internal error: {error!r}', throttle_duration_sec=5.0)
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
+        self._threads[0].start()
         self.link.start()
-        while not self._ended.is_set() and self.node.context.ok():
-            try:
-                self._executor.spin_once()
-            except ExternalShutdownException:
-                break
-            except Exception as error:
-                # Our own callbacks answer for what goes wrong in them; rclpy's may not.
-                self.node.get_logger().error(
-                    f'internal error: {error!r}', throttle_duration_sec=5.0)
+        self._spinners[0].run()
         self._stop()
         # Whoever looks at the ROS graph is to see at once that they are gone.
         for node in self.nodes:
@@ -100,27 +102,53 @@ class BridgeProcess:
     def end(self) -> None:
         """Have :meth:`run` return; callable from any thread."""
         self._ended.set()
-        # Waking the executor is not enough: it goes on waiting until it has something to do.
-        self._executor.create_task(lambda: None)
+        for spinner in list(self._spinners):
+            spinner.end()
+
+    def _selected(self, source: Source) -> bool:
+        target = self.parameters.target
+        return (target.system in (0, source.system)
+                and target.component in (0, source.component))
 
     def _found(self, light: Light) -> None:
         """Give a light its node, in the link's thread."""
-        target = self.parameters.target
-        wanted = (target.system in (0, light.source.system)
-                  and target.component in (0, light.source.component))
-        if self.node.light is None and wanted:
+        if self.node.light is None and self._selected(light.source):
             self.node.bind(light, self.link.clock())
-        else:
-            # Making a node takes long: not here, where all lights would wait for it.
-            self._executor.create_task(self._add_node, light)
+            return
+        # Making a node takes long: not here, where all lights would wait for it.
+        thread = threading.Thread(
+            target=self._run_further, args=(light,), name=f'light {light.source}', daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _lights(self) -> list[Light]:
+        """Return the lights by their addresses, in the link's thread."""
+        return sorted(self.controller.lights.values(), key=lambda light: light.source)
+
+    def _name_of(self, light: Light) -> str:
+        """Return what a light is called in answers about several."""
+        names = [node.get_name() for node in list(self.nodes) if node.light is light]
+        return f'{names[0]} ({light.source})' if names else str(light.source)
 
     def _serve(self, node: IlluminatorNode) -> None:
         node.serve(
             self.link, self.controller, url=self.parameters.connection_url,
             frame_id=self.parameters.frame_id, period=self.parameters.diagnostics_period)
 
-    def _add_node(self, light: Light) -> None:
-        """Make the node of a further light, on the executor."""
+    def _run_further(self, light: Light) -> None:
+        """Make and run the node of a further light, in a thread of its own."""
+        with self._making:
+            node = None if self._ended.is_set() else self._make_node(light)
+            if node is None:
+                return
+            spinner = Spinner(node)
+            self.nodes.append(node)
+            self._spinners.append(spinner)
+        self.link.call(lambda now: node.bind(light, now))
+        if not self._ended.is_set():
+            spinner.run()
+
+    def _make_node(self, light: Light) -> IlluminatorNode | None:
         system, component = light.source
         name = (self.parameters.names.get(light.source)
                 or f'{self.node.get_name()}_{system}_{component}')
@@ -132,11 +160,9 @@ class BridgeProcess:
             self._serve(node)
         except Exception as error:
             logger.error(f'light {light.source} gets no node: {error}')
-            return
+            return None
         logger.info(f'light {light.source} is served by {node.get_fully_qualified_name()}')
-        self.nodes.append(node)
-        self._executor.add_node(node)
-        self.link.call(lambda now: node.bind(light, now))
+        return node
 
     def _link_event(self, event: LinkEvent) -> None:
         logger = self.node.get_logger()
@@ -148,7 +174,7 @@ class BridgeProcess:
             node.publish_diagnostics()
 
     def _stop(self) -> None:
-        """Switch the lights off if that is wanted, and close the link; takes 0.65 s at most."""
+        """Switch the lights off if that is wanted, and end all; takes 0.75 s at most."""
         if self.parameters.off_on_shutdown:
             lights = [node.light for node in self.nodes if node.light and node.light.connected]
             answers = threading.Semaphore(0)
@@ -163,6 +189,10 @@ class BridgeProcess:
             for _ in lights:
                 answers.acquire(timeout=max(deadline - time.monotonic(), 0))
         self.link.stop(STOP_LIMIT)
+        self.end()
+        deadline = time.monotonic() + THREADS_LIMIT
+        for thread in self._threads:
+            thread.join(max(deadline - time.monotonic(), 0))
 
 
 def without_node_name(arguments: list[str]) -> list[str]:

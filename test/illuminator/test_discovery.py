@@ -125,6 +125,15 @@ def test_further_lights_are_passed_over_when_there_are_too_many(controller):
     assert list(controller.lights) == sources[:MAX_LIGHTS]
 
 
+def test_a_light_that_is_not_wanted_is_left_alone():
+    controller = Controller(BRIDGE, Settings(), wanted=lambda source: source.system == 2)
+    for system in (1, 2):
+        controller.receive(Source(system, 243), ILLUMINATOR, 0.0)
+        controller.receive(Source(system, 243), status_message(), 0.0)
+    assert list(controller.lights) == [Source(2, 243)]
+    assert {message.target_system for _, message in controller.outgoing} == {2}
+
+
 def test_a_heartbeat_from_our_own_address_is_a_clash_for_a_while(controller):
     assert not controller.clashes(0.0)
     controller.receive(BRIDGE, heartbeat(SUBMARINE), 5.0)

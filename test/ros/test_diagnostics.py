@@ -38,10 +38,10 @@ LINK_KEYS = {
     'signatures_replayed', 'unsigned_frames',
 }
 LAMP_KEYS = {
-    'address', 'connected', 'heard_s_ago', 'restarts', 'enabled', 'mode', 'brightness_percent',
-    'strobe_period_s', 'strobe_duty_cycle_percent', 'temperature_c', 'error_flags', 'uptime_s',
-    'status_s_ago', 'agreed', 'vendor', 'model', 'software_version', 'hardware_version',
-    'serial_number',
+    'address', 'connected', 'heard_s_ago', 'restarts', 'shared_address', 'enabled', 'mode',
+    'brightness_percent', 'strobe_period_s', 'strobe_duty_cycle_percent', 'temperature_c',
+    'error_flags', 'uptime_s', 'status_s_ago', 'agreed', 'vendor', 'model', 'software_version',
+    'hardware_version', 'serial_number',
 }
 
 

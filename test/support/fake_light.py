@@ -97,6 +97,10 @@ class FakeLight(Endpoint):
         self.fields = {**DEFAULT_STATUS, **fields}
         self._status_due = self.heartbeat.due = now
 
+    def delay_status(self, seconds: float) -> None:
+        """Have the statuses of the stream come later."""
+        self._status_due += seconds
+
     def receive(self, source: Source, message: Any, now: float) -> None:
         if self.silent or not isinstance(message, CommandLong | CommandInt):
             return

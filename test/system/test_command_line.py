@@ -24,7 +24,7 @@ from support.processes import environment, ROOT, run
 
 from illuminator_ros import __version__
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
-from illuminator_ros.simulation import parser
+from illuminator_ros.simulator.options import parser
 
 BRIDGE, SIMULATOR = 'illuminator_ros.bridge', 'illuminator_ros.simulator'
 
@@ -99,7 +99,7 @@ def test_the_bridge_refuses_what_it_does_not_know_in_one_line(
     (['--ambient', 'inf'], 'argument --ambient: inf is outside -60 to 150'),
     (['--time-scale', '0'], 'argument --time-scale: 0 is outside'),
     (['--min-strobe-period', '2', '--max-strobe-period', '1'],
-     '--min-strobe-period is above --max-strobe-period'),
+     'min_strobe_period is above max_strobe_period'),
     (['--signing-mode', 'maybe'], "invalid choice: 'maybe'"),
     (['--signing-mode', 'require'], 'no key file is given'),
     (['--signing-mode', 'sign', '--signing-key-file', '/nonexistent'],

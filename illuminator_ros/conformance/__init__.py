@@ -12,28 +12,31 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executable ``simulator``: MAVLink illuminators without hardware, and without ROS."""
+"""
+The executable ``conformance``: checks any light against the illuminator protocol, without ROS.
+
+``bench`` talks to the light, ``requirements`` has the checks, ``suite`` runs them: all without
+I/O. ``run`` is the command line.
+"""
 
 from __future__ import annotations
 
-import sys
+import signal
 
-from .entry import enter
-from .termination import Termination
+from ..entry import explained
 
 
 def main(args: list[str] | None = None) -> int:
     """
-    Run the simulator until SIGINT or SIGTERM; see :mod:`~.simulation`.
+    Check a light; see :mod:`~.run`.
 
     :param args: the command line without the program's name.
     """
-    def run(termination: Termination) -> int:
-        from . import simulation
-        return simulation.run(args, termination)
+    # Until something has been changed there is nothing to bring back, nor to say.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    return enter('simulator', run)
+    def start() -> int:
+        from .run import run
+        return run(args)
 
-
-if __name__ == '__main__':
-    sys.exit(main())
+    return explained('conformance', start)

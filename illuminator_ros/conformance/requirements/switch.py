@@ -1,0 +1,47 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""MAV_CMD_ILLUMINATOR_ON_OFF."""
+
+from __future__ import annotations
+
+from ...mavlink.dialect import MavCmd
+from ..bench import Bench
+from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement
+
+
+@requirement('on', 'is switched on', ILLUMINATOR, 'ON/OFF', changes=True)
+async def on(bench: Bench) -> None:
+    """Switch it on at low brightness."""
+    await bench.baseline()
+    one = await bench.switch(True)
+    if not one.accepted:
+        fail_if([one.finding()])
+
+
+@requirement('off', 'is switched off', ILLUMINATOR, 'ON/OFF', changes=True)
+async def off(bench: Bench) -> None:
+    """Switch it off."""
+    one = await bench.switch(False)
+    if not one.accepted:
+        fail_if([one.finding()])
+
+
+@requirement('on-off-values', 'denies to be switched to anything but 0 and 1', MESSAGES,
+             'MAV_CMD_ILLUMINATOR_ON_OFF', changes=True)
+async def values(bench: Bench) -> None:
+    """Try what is neither."""
+    await bench.baseline()
+    fail_if([await bench.refused(MavCmd.ILLUMINATOR_ON_OFF, (value,))
+             for value in (-1.0, 2.0, 0.5, 255.0)])

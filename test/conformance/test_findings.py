@@ -1,0 +1,164 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A check that cannot fail is worth nothing: each fault is found, by the check that is for it."""
+
+from dataclasses import replace
+import math
+
+import pytest
+from support.conformance_run import Run
+
+from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.behaviour import Behaviour
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.model import Identity, Limits
+from illuminator_ros.mavlink.dialect import Source
+
+ACCEPTED_CHANGES = {'on', 'off', 'mode-internal', 'mode-external', 'brightness', 'strobe',
+                    'strobe-limit-values', 'duty-cycle', 'command-int'}
+DENIED_VALUES = {'on-off-values', 'mode-values', 'brightness-values', 'strobe-values',
+                 'duty-cycle-values', 'not-a-number'}
+
+# The fault, and exactly what is found.
+SEEDED = {
+    'silence': {'heartbeat'},
+    'reboot': {'uptime', 'interval-stop'},
+    'thermistor': {'flags-at-rest'},
+    'refuse': ACCEPTED_CHANGES,
+    'refuse=failed': ACCEPTED_CHANGES | DENIED_VALUES,
+    'progress': {'finished'},
+    'busy': {'not-busy'},
+    'slow': {'acknowledged-promptly'},
+    'lie': {'status-agrees'},
+    'heartbeat': {'heartbeat-rate'},
+    'type': {'heartbeat-type'},
+    'autopilot': {'heartbeat-autopilot'},
+    'no-clock': {'uptime'},
+    'no-int': {'command-int'},
+    'no-broadcast': {'broadcast'},
+    'any-target': {'other-target'},
+    'no-stop': {'interval-stop'},
+    'fixed-rate': {'interval'},
+    'no-identity': {'information-request'},
+    'no-terminator': {'information-terminated'},
+    'nan': {'not-a-number'},
+    'anything': DENIED_VALUES,
+    'disobey': {'status-unchanged'},
+    'toggle': {'repeated'},
+    'unknown': {'unknown-command', 'unknown-message'},
+    'no-request': {'status-request'},
+    'no-resume': {'interval-default'},
+    'misaddress': {'acknowledged-to-us'},
+    'flags': {'flags-at-rest'},
+    'flags=0x80': {'flags-at-rest'},
+    'cold-throttling': {'thermal-flags'},
+}
+# What befalls messages by chance is found by the check that is for it, and may show elsewhere.
+BY_CHANCE = {
+    'drop': 'acknowledged', 'duplicate': 'acknowledged-once', 'delay': 'acknowledged-promptly',
+    'corrupt': 'checksums',
+}
+# What no fault but the properties of a light bring about.
+BUILT_IN = {
+    'address': DeviceProperties(source=Source(255, 0)),
+    'status-stream': DeviceProperties(status_interval=0.0),
+    'status-mode': DeviceProperties(mode_bitmask=0),
+    'strobe-limits': DeviceProperties(limits=Limits(5.0, 1.0)),
+    'information-text': DeviceProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
+    'mode-internal': DeviceProperties(modes=()),
+}
+
+
+@pytest.mark.parametrize('fault', SEEDED)
+def test_a_fault_is_found_by_the_check_that_is_for_it_and_by_no_other(fault):
+    assert Run(faults=(fault,)).finish().failed == SEEDED[fault]
+
+
+@pytest.mark.parametrize('fault', BY_CHANCE)
+@pytest.mark.parametrize('seed', range(3))
+def test_what_befalls_messages_by_chance_is_found_and_named(fault, seed):
+    run = Run(DeviceProperties(seed=seed), faults=(fault,)).finish()
+    assert BY_CHANCE[fault] in run.failed
+
+
+@pytest.mark.parametrize('name', BUILT_IN)
+def test_what_a_light_is_made_like_is_found(name):
+    assert name in Run(BUILT_IN[name]).finish().failed
+
+
+def test_a_value_that_cannot_be_is_found():
+    run = Run()
+    run.light.configuration = replace(run.light.configuration, brightness=math.nan)
+    assert run.finish().failed == {'status-content'}
+
+
+def test_every_fault_is_seeded():
+    assert set(FAULTS) == {name.partition('=')[0] for name in SEEDED} | set(BY_CHANCE)
+
+
+def test_every_requirement_can_fail():
+    found = set().union(*SEEDED.values()) | set(BY_CHANCE.values()) | set(BUILT_IN)
+    assert {one.name for one in REQUIREMENTS} == found | {'status-content'}
+
+
+def test_a_restart_in_the_middle_of_a_run_is_found():
+    run = Run()
+    run.link.run(12.0)
+    run.light.restart(run.link.now)
+    assert 'uptime' in run.finish().failed
+
+
+def test_a_light_that_falls_silent_in_the_middle_is_found_and_the_rest_is_skipped():
+    run = Run()
+    run.link.run(8.0)
+    run.light.behave(replace(run.light.behaviour, silence=math.inf), run.link.now)
+    run.finish()
+    assert {'heartbeat-rate', 'acknowledged'} < run.failed
+    assert run.result('thermal-flags').detail == 'the light has fallen silent'
+
+
+def test_a_light_that_has_accepted_what_it_must_not_is_set_right_before_the_next_try():
+    run = Run(faults=('anything',)).finish()
+    configured = [one for one in run.bench.transactions if one.command == 406]
+    brightness = next(i for i, one in enumerate(configured) if one.text.endswith('1 -1 0 0'))
+    assert configured[brightness + 1].text.endswith(' 1 10 0 0')
+
+
+def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
+    run = Run(faults=('duplicate=1',)).finish()
+    for one in run.bench.transactions:
+        assert len(one.finals) <= 2
+    assert 'on-off-values' not in run.failed
+    assert all(len(one.finals) == 2 for one in run.bench.transactions if one.expected)
+
+
+def test_thermal_flags_that_go_with_the_temperature_are_in_order():
+    run = Run(DeviceProperties(time_scale=60.0), heat=20.0).finish()
+    assert run.result('thermal-flags').verdict.value == 'PASS'
+    assert 'thermal throttling from' in run.result('thermal-flags').detail
+
+
+def test_the_reason_and_what_was_said_stand_in_the_finding():
+    run = Run(faults=('anything',)).finish()
+    result = run.result('brightness-values')
+    assert 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101 0 0: MAV_RESULT_ACCEPTED' in result.detail
+    sent, came = result.exchange[-2:]
+    assert '> COMMAND_LONG to 1/243: MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101' in sent
+    assert '< COMMAND_ACK MAV_CMD_DO_ILLUMINATOR_CONFIGURE: MAV_RESULT_ACCEPTED' in came
+
+
+def test_a_light_without_faults_behaves_as_the_protocol_says():
+    assert DeviceProperties().behaviour == Behaviour()

@@ -1,0 +1,153 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The light is afterwards as it was before, whatever happens."""
+
+from dataclasses import replace
+import math
+
+import pytest
+from support.conformance_run import Run
+
+from illuminator_ros.conformance.requirement import Verdict
+from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.model import Configuration, Mode
+
+BEFORE = Configuration(Mode.EXTERNAL_SYNC, 60.0, 0.5, 25.0)
+SHOULD_NOT_MATTER = sorted(set(FAULTS) - {
+    # These keep the light from doing what it is told, or from being heard.
+    'silence', 'refuse', 'lie', 'no-stop', 'reboot', 'toggle', 'no-resume'})
+
+
+def prepared(*faults, **options):
+    """Return a run against a light that somebody uses."""
+    run = Run(faults=faults, **options)
+    run.light.press(run.link.now, enabled=True)
+    run.light.configuration = BEFORE
+    return run
+
+
+def state(run):
+    return run.light.enabled, run.light.configuration
+
+
+def test_switch_and_configuration_are_brought_back():
+    run = prepared().finish()
+    assert state(run) == (True, BEFORE)
+    assert run.suite.restored == 'the light is as it was'
+
+
+@pytest.mark.parametrize('fault', SHOULD_NOT_MATTER)
+def test_switch_and_configuration_are_brought_back_from_a_light_that_misbehaves(fault):
+    run = prepared(fault).finish()
+    assert run.light.enabled is True
+    assert run.light.configuration.differences(BEFORE) == []
+
+
+@pytest.mark.parametrize('interval', [0.2, 1.0, 3.0])
+def test_a_default_rate_is_brought_back(interval):
+    run = Run(DeviceProperties(status_interval=interval)).finish()
+    assert run.light.interval == interval
+
+
+def test_a_rate_that_somebody_has_set_is_brought_back():
+    run = Run()
+    run.light.interval = 0.4
+    assert run.finish().light.interval == pytest.approx(0.4)
+
+
+def test_a_stream_that_somebody_has_stopped_stays_so():
+    run = Run(DeviceProperties(status_interval=0.0)).finish()
+    assert run.light.interval == 0.0
+
+
+@pytest.mark.parametrize('after', [0.5 + 0.7 * step for step in range(52)])
+def test_an_interrupted_run_brings_it_back(after):
+    run = prepared()
+    run.link.run(after)
+    run.bench.interrupt(run.link.now)
+    run.finish()
+    assert state(run) == (True, BEFORE)
+    assert len(run.suite.results) == len(REQUIREMENTS)
+
+
+def test_bringing_it_back_is_not_interrupted():
+    run = prepared()
+    run.link.run_until(lambda: run.bench.tidying, within=100.0)
+    assert state(run) != (True, BEFORE)
+    run.bench.interrupt(run.link.now)
+    run.finish()
+    assert state(run) == (True, BEFORE)
+
+
+def test_an_interrupted_run_checks_nothing_more():
+    run = Run()
+    run.link.run(8.0)
+    run.bench.interrupt(run.link.now)
+    assert run.finish().result('uptime').detail == 'interrupted'
+    assert not run.suite.passed
+    assert run.link.now < 1000.0 + 8.0 + 5.0
+
+
+def test_a_run_that_is_interrupted_before_it_begins_ends():
+    run = Run()
+    run.bench.interrupt(run.link.now)
+    run.finish()
+    assert run.suite.interrupted
+    assert {one.detail for one in run.suite.results} == {'interrupted'}
+
+
+def test_a_check_with_an_error_in_it_fails_and_the_light_is_brought_back(monkeypatch):
+    async def broken(bench):
+        await bench.switch(False)
+        raise ZeroDivisionError('oops')
+
+    monkeypatch.setattr('illuminator_ros.conformance.suite.REQUIREMENTS', [
+        replace(one, check=broken) if one.name == 'on' else one for one in REQUIREMENTS])
+    run = prepared().finish()
+    assert run.failed == {'on'}
+    assert 'ZeroDivisionError' in run.result('on').detail
+    assert state(run) == (True, BEFORE)
+
+
+def test_a_light_that_cannot_be_brought_back_is_said_to_be_changed():
+    run = prepared()
+    run.link.run(20.0)
+    run.fault('refuse')
+    run.finish()
+    assert run.suite.restored.startswith('THE LIGHT IS NOT AS IT WAS (')
+    assert 'it was on, mode external_sync, brightness 60 %' in run.suite.restored
+    assert not run.suite.passed
+
+
+def test_a_light_that_is_silent_for_a_while_is_brought_back_when_it_is_heard_again():
+    run = prepared()
+    run.link.run(20.0)
+    run.light.behave(replace(run.light.behaviour, silence=14.0), run.link.now)
+    run.finish()
+    assert state(run) == (True, BEFORE)
+
+
+def test_a_light_that_says_nothing_of_its_state_is_not_changed():
+    run = prepared()
+    run.light.interval = 0.0
+    run.light._status_due = math.inf
+    run.fault('no-request')
+    run.light.behave(replace(run.light.behaviour, pushes=False), run.link.now)
+    run.finish()
+    assert state(run) == (True, BEFORE)
+    assert run.result('on').verdict is Verdict.SKIPPED
+    assert 'could not be restored' in run.result('on').detail

@@ -1,0 +1,64 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which light is checked, and that others on the line do not matter."""
+
+from support.conformance_run import Run
+
+from illuminator_ros.illuminator.behaviour import Behaviour
+from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.faults import with_fault
+from illuminator_ros.mavlink.dialect import Source
+
+FIRST, SECOND = Source(1, 243), Source(1, 244)
+BAD = with_fault(with_fault(Behaviour(), 'nan'), 'lie')
+
+
+def test_the_first_light_that_is_heard_is_checked():
+    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND)).finish()
+    assert run.bench.found == FIRST
+    assert run.failed == set()
+
+
+def test_the_light_that_is_named_is_checked():
+    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND, behaviour=BAD),
+              target=SECOND).finish()
+    assert run.bench.found == SECOND
+    assert {'not-a-number', 'status-agrees'} <= run.failed
+
+
+def test_another_light_that_misbehaves_is_no_finding():
+    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND, behaviour=BAD))
+    assert run.finish().failed == set()
+
+
+def test_another_light_is_not_changed():
+    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND))
+    other = run.lights.devices[1]
+    other.press(run.link.now, enabled=True)
+    run.finish()
+    assert other.enabled is True
+    assert other.configuration.brightness == 100.0
+
+
+def test_a_light_without_a_heartbeat_of_its_own_is_found_by_its_status():
+    run = Run(faults=('type=12',)).finish()
+    assert run.bench.found == FIRST
+
+
+def test_without_a_light_there_is_one_finding_and_nothing_is_said_to_be_met():
+    run = Run(DeviceProperties(source=FIRST), target=SECOND).finish()
+    assert run.failed == {'heartbeat'}
+    assert not run.suite.passed
+    assert run.result('on').detail == 'no light was heard'

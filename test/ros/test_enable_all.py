@@ -1,0 +1,125 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``~/enable_all`` and ``~/cmd/enable_all``: every connected light, and one answer."""
+
+from collections.abc import Iterator
+import contextlib
+
+import pytest
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+from support.light import eventually, free_port, ON_OFF, ServedLight, Source
+from support.processes import Program
+from support.ros import Ros, running_bridge
+
+SOURCES = [Source(1, component) for component in (243, 244, 245)]
+NAMES = ['illuminator (1/243)', 'illuminator_1_244 (1/244)', 'tail (1/245)']
+
+
+@pytest.fixture(scope='module')
+def fleet(domain: int) -> Iterator[tuple[Program, list[ServedLight]]]:
+    """Run a bridge and three lights."""
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        bridge = stack.enter_context(running_bridge(
+            domain, port, target_component=243, names='["1/245=tail"]', command_timeout=0.1))
+        lights = [stack.enter_context(ServedLight(port, source)) for source in SOURCES]
+        bridge.wait_for('connected', count=3)
+        yield bridge, lights
+
+
+@pytest.fixture
+def lights(fleet: tuple[Program, list[ServedLight]]) -> Iterator[list[ServedLight]]:
+    """Return the lights, all off and obedient, which a test may change."""
+    for light in fleet[1]:
+        light.report(enable=0)
+        light.forget()
+    yield fleet[1]
+    for light in fleet[1]:
+        light.behave()
+
+
+def enable_all(ros: Ros, on: bool = True) -> SetBool.Response:
+    return ros.call(SetBool, '/illuminator/enable_all', SetBool.Request(data=on))
+
+
+def are_on(lights: list[ServedLight]) -> list[bool]:
+    return [bool(light.fake.fields['enable']) for light in lights]
+
+
+def test_one_request_switches_all_and_names_each(
+    ros: Ros, lights: list[ServedLight],
+) -> None:
+    response = enable_all(ros)
+
+    assert response.success
+    assert are_on(lights) == [True] * 3
+    summary, *outcomes = response.message.split('; ')
+    assert summary == '3 of 3 on'
+    assert [outcome.partition(': ')[0] for outcome in outcomes] == NAMES
+    assert enable_all(ros, on=False).success
+    assert are_on(lights) == [False] * 3
+
+
+def test_one_failure_is_named_and_makes_it_no_success(
+    ros: Ros, lights: list[ServedLight],
+) -> None:
+    lights[1].fake.results[ON_OFF] = 2
+
+    response = enable_all(ros)
+
+    assert not response.success
+    assert response.message.startswith('2 of 3 on; ')
+    assert f'{NAMES[1]}: refused: MAV_RESULT_DENIED' in response.message
+    assert are_on(lights) == [True, False, True]
+
+
+def test_a_lost_light_is_named_and_does_not_count(
+    ros: Ros, fleet: tuple[Program, list[ServedLight]], lights: list[ServedLight],
+) -> None:
+    connected = ros.subscribe(Bool, '/tail/connected')
+    lights[2].vanish()
+    connected.wait_value(False)
+
+    response = enable_all(ros)
+
+    assert response.success
+    assert response.message.startswith('2 of 2 on; ')
+    assert f'{NAMES[2]}: light 1/245 is lost' in response.message
+    connected.clear()
+    lights[2].serve()
+    connected.wait_value(True)
+
+
+def test_the_topic_does_the_same(ros: Ros, lights: list[ServedLight]) -> None:
+    ros.publish(Bool, '/illuminator/cmd/enable_all', True)
+    eventually(lambda: are_on(lights) == [True] * 3)
+
+
+def test_the_topic_warns_of_what_failed(
+    ros: Ros, fleet: tuple[Program, list[ServedLight]], lights: list[ServedLight],
+) -> None:
+    lights[1].fake.results[ON_OFF] = 2
+    ros.publish(Bool, '/illuminator/cmd/enable_all', True)
+    fleet[0].wait_for('~/cmd/enable_all: 2 of 3 on; ')
+
+
+def test_without_any_light_it_fails_at_once(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port):
+        call = own_ros.start(SetBool, '/illuminator/enable_all', SetBool.Request(data=True))
+        response = call.result()
+    assert not response.success
+    assert response.message.startswith('no light connected: ')
+    assert call.elapsed < 0.5

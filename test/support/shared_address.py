@@ -1,0 +1,60 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Several lights that answer from one address."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from support.fake_light import FakeLight
+
+from illuminator_ros.mavlink.dialect import CommandAck, Source
+from illuminator_ros.mavlink.endpoint import Endpoint
+
+
+class SharedAddress(Endpoint):
+    """
+    Lights behind one component, as those of ArduSub: each reports, and the component answers.
+
+    :param lights: all of the same address; commands reach all of them.
+    :param offset: s by which the statuses of each come after those of the one before.
+    """
+
+    def __init__(self, *lights: FakeLight, offset: float = 0.0) -> None:
+        super().__init__()
+        self.lights = lights
+        for number, light in enumerate(lights):
+            light.outgoing = self.outgoing
+            light.beats = light.beats and not number
+            light.delay_status(number * offset)
+
+    def link_opened(self, now: float) -> None:
+        for light in self.lights:
+            light.link_opened(now)
+
+    def receive(self, source: Source, message: Any, now: float) -> None:
+        for number, light in enumerate(self.lights):
+            before = len(self.outgoing)
+            light.receive(source, message, now)
+            sent = [self.outgoing.pop() for _ in range(len(self.outgoing) - before)]
+            self.outgoing += [one for one in reversed(sent)
+                              if not (number and isinstance(one[1], CommandAck))]
+
+    def poll(self, now: float) -> None:
+        for light in self.lights:
+            light.poll(now)
+
+    def next_deadline(self) -> float:
+        return min(light.next_deadline() for light in self.lights)

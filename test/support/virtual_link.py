@@ -1,0 +1,88 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Two endpoints and a line between them: real bytes, and a clock that jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from illuminator_ros.mavlink.dialect import decode_payload, encode_payload, HANDLED, Source
+from illuminator_ros.mavlink.endpoint import Endpoint
+from illuminator_ros.mavlink.framing import Decoder, encode_frame
+
+# s on the clock at the beginning: not 0, so that 0 as a time is found out.
+START = 1000.0
+# Turns at one moment: more of them mean that a link's thread would spin.
+MAX_TURNS = 200
+
+
+class VirtualLink:
+    """
+    Joins two endpoints as two links would.
+
+    :ivar now: s.
+    :ivar decoders: what each of them has received, first and second.
+    """
+
+    def __init__(self, first: Endpoint, second: Endpoint) -> None:
+        self.now = START
+        self.ends = (first, second)
+        self.decoders = (Decoder(), Decoder())
+        self._sequences: dict[Source, int] = {}
+        self._turns = 0
+        for end in self.ends:
+            end.link_opened(self.now)
+
+    def run_until(self, condition: Callable[[], Any], *, within: float) -> None:
+        """Let time pass until something is so; an error if that takes too long (s)."""
+        until = self.now + within
+        while not condition():
+            due = min(end.next_deadline() for end in self.ends)
+            assert due <= until, f'not so within {within} s'
+            self._turns = self._turns + 1 if due <= self.now else 0
+            assert self._turns < MAX_TURNS, f'a link would spin at {self.now}'
+            self.now = max(self.now, due)
+            self.turn()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        until = self.now + seconds
+        while (due := min(end.next_deadline() for end in self.ends)) <= until:
+            self.now = max(self.now, due)
+            self.turn()
+        self.now = until
+
+    def turn(self) -> None:
+        """Do what both links' threads do in one turn."""
+        for end in self.ends:
+            end.poll(self.now)
+        first, second = self.ends
+        while first.outgoing or second.outgoing:
+            self._carry(first, second, self.decoders[1])
+            self._carry(second, first, self.decoders[0])
+
+    def _carry(self, sender: Endpoint, receiver: Endpoint, decoder: Decoder) -> None:
+        while sender.outgoing:
+            source, message = sender.outgoing.popleft()
+            sequence = self._sequences.get(source, 0)
+            self._sequences[source] = (sequence + 1) & 0xFF
+            frames = decoder.feed(encode_frame(
+                message.id, encode_payload(message), sequence=sequence, source=source,
+                crc_extra=message.crc_extra))
+            for frame in frames:
+                if frame.message_id in HANDLED:
+                    receiver.receive(
+                        frame.source, decode_payload(frame.message_id, frame.payload), self.now)

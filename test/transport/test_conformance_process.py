@@ -1,0 +1,193 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``conformance`` and ``simulator`` as processes, over UDP, on a machine without ROS."""
+
+import json
+import os
+import pty
+import signal
+import socket
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import pytest
+from support.processes import environment, Program, ROOT, run
+
+from illuminator_ros.conformance.requirements import REQUIREMENTS
+
+# Started like this, none of what `pip install` does not bring can be imported.
+WITHOUT_ROS = (
+    'import sys, support.no_ros\n'
+    'sys.modules.update(dict.fromkeys(["yaml", "serial"]))\n'
+    'from illuminator_ros.{0} import main\n'
+    'sys.exit(main(sys.argv[1:]))\n')
+# s; a whole run takes about 30.
+WHOLE_RUN = 150.0
+
+
+def start(module, *arguments):
+    """Start one of the two without ROS."""
+    path = os.pathsep.join((str(ROOT), str(ROOT / 'test')))
+    return Program(sys.executable, '-c', WITHOUT_ROS.format(module), *arguments,
+                   env={'PYTHONPATH': path})
+
+
+@pytest.fixture
+def url():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return f'127.0.0.1:{probe.getsockname()[1]}'
+
+
+@pytest.fixture
+def programs():
+    """Return a function that starts a program, which is ended with the test."""
+    started = []
+
+    def keep(*arguments):
+        started.append(start(*arguments))
+        return started[-1]
+
+    yield keep
+    for one in started:
+        one.kill()
+
+
+@pytest.mark.timeout(WHOLE_RUN)
+def test_nothing_is_found_in_the_simulator_and_the_reports_say_so(url, programs, tmp_path):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    conformance = programs(
+        'conformance', f'udpout://{url}', '--yes', '--heat', '0', '--junit',
+        str(tmp_path / 'report.xml'), '--json', str(tmp_path / 'report.json'))
+    assert conformance.wait(WHOLE_RUN) == 0, conformance.log
+    assert f'{len(REQUIREMENTS) - 1} passed, 0 failed, 1 skipped' in conformance.log
+    assert conformance.log.rstrip().endswith('the light is as it was')
+    content = json.loads((tmp_path / 'report.json').read_text())
+    assert content['passed'] is True
+    suite = ElementTree.parse(tmp_path / 'report.xml').getroot()
+    assert len(suite.findall('testcase')) == len(REQUIREMENTS)
+
+
+def test_what_is_found_is_exit_status_1(url, programs):
+    simulator = programs('simulator', f'udpin://{url}', '--fault', 'corrupt=0.4')
+    simulator.wait_for('link open')
+    conformance = programs('conformance', f'udpout://{url}', '--only', 'checksums')
+    assert conformance.wait(40.0) == 1
+    assert 'FAIL    checksums' in conformance.log
+
+
+def test_a_signal_ends_it_with_the_light_as_it_was(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    conformance = programs('conformance', f'udpout://{url}', '--yes')
+    conformance.wait_for('PASS    brightness ', timeout=40.0)
+    conformance.send(signal.SIGINT)
+    assert conformance.wait(20.0) == 1
+    assert conformance.log.rstrip().endswith('the light is as it was')
+    assert 'Traceback' not in conformance.log
+    simulator.wait_for('100 %', count=2)
+    assert 'off    100 %  no strobe' in simulator.lines[-1]
+
+
+def test_without_a_light_it_is_exit_status_1(url, programs):
+    conformance = programs('conformance', f'udpin://{url}', '--wait', '0.5')
+    assert conformance.wait(20.0) == 1
+    assert 'no light was heard within 0.5 s' in conformance.log
+    assert '0 passed, 1 failed' in conformance.log
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    ([], 'the connection URL is missing'),
+    (['udp:x:y'], "port 'y' is no number"),
+    (['udpin://:1', '--only', 'nope'], "invalid choice: 'nope'"),
+    (['udpin://:1', '--target', '1'], "'1' is no address such as 1/243"),
+    (['udpin://:1', '--junit', '/nowhere/at/all.xml'], 'there is no such directory'),
+    (['udpin://:1', '--signing-mode', 'sign'], 'key'),
+])
+def test_a_wrong_argument_is_said_in_one_line_with_exit_status_2(arguments, said):
+    ended = run('illuminator_ros.conformance', *arguments)
+    assert ended.returncode == 2
+    assert said in ended.stderr
+    assert ended.stderr.count('\n') == 1
+
+
+def test_the_requirements_can_be_listed():
+    ended = run('illuminator_ros.conformance', '--list')
+    assert ended.returncode == 0
+    assert len(ended.stdout.splitlines()) == len(REQUIREMENTS)
+
+
+def conversation(*arguments, answers):
+    """Run a module on a terminal, type lines as they are asked for, and return what came."""
+    master, slave = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', *arguments], stdin=slave, stdout=slave, stderr=slave, cwd=ROOT,
+        env=environment(), start_new_session=True)
+    os.close(slave)
+    seen = ''
+    try:
+        for awaited, line in answers:
+            while awaited not in seen:
+                seen += os.read(master, 4096).decode()
+            os.write(master, f'{line}\n'.encode())
+        while True:
+            try:
+                seen += os.read(master, 4096).decode()
+            except OSError:
+                break
+        return process.wait(20.0), seen
+    finally:
+        process.kill()
+        process.wait()
+        os.close(master)
+
+
+def test_on_a_terminal_it_asks_before_it_dazzles(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    status, seen = conversation(
+        'illuminator_ros.conformance', f'udpout://{url}', '--only', 'strobe', '--only',
+        'heartbeat', answers=[('[y/N]', 'n')])
+    assert 'seizures' in seen
+    assert 'SKIPPED strobe' in seen
+    assert status == 0
+
+
+def test_the_simulator_is_operated_on_a_terminal(url):
+    status, seen = conversation(
+        'illuminator_ros.simulator', f'udpin://{url}', '--light', '1/7=bow',
+        answers=[('1/7 bow', 'bow on'), ('ON ', 'quit')])
+    assert status == 0
+    assert '\x1b7' in seen
+
+
+def test_the_simulator_is_operated_through_a_pipe(url):
+    ended = subprocess.run(
+        [sys.executable, '-m', 'illuminator_ros.simulator', f'udpin://{url}'], cwd=ROOT,
+        env=environment(), input='on\nbrightness 40\nfault nope\nstatus\nquit\n', text=True,
+        capture_output=True, timeout=20)
+    assert ended.returncode == 0
+    assert "no fault 'nope'" in ended.stdout
+    assert 'ON      40 %' in ended.stdout
+    assert '\x1b' not in ended.stdout
+
+
+def test_a_simulator_whose_input_has_ended_goes_on(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    assert simulator.running
+    assert simulator.end()[0] == 0
