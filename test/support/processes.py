@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import contextlib
+import ctypes
 import os
 from pathlib import Path
 import signal
@@ -30,6 +31,9 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 # s; DESIGN.md, 3.4.
 STOP_LIMIT = 1.0
+# Looked up here: after a fork as little as possible is to happen.
+PRCTL = ctypes.CDLL(None).prctl
+PR_SET_PDEATHSIG = 1
 
 
 class Program:
@@ -39,7 +43,8 @@ class Program:
                  cwd: Path | None = None) -> None:
         self._process = subprocess.Popen(
             command, text=True, env=environment(env), cwd=cwd or ROOT, errors='replace',
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            preexec_fn=_end_with_parent)
         self.lines: list[str] = []
         self._grown = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -101,6 +106,11 @@ class Program:
     def running(self) -> bool:
         """Whether it has not ended."""
         return self._process.poll() is None
+
+
+def _end_with_parent() -> None:
+    """Have the kernel end this program with the thread that starts it, should that be killed."""
+    PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:

@@ -50,14 +50,13 @@ STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Yield a ROS domain that no other test on this machine uses meanwhile."""
+    """Yield a ROS domain that nobody else on this machine uses meanwhile."""
     with socket.socket(socket.AF_UNIX) as claim:
         while True:
             # Domains up to 101 have ports below the ephemeral ones.
             domain = random.randint(1, 101)
-            with contextlib.suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
-                # Where the first participant of a domain listens (DDSI-RTPS, 9.6.1.1).
-                probe.bind(('', 7410 + 250 * domain))
+            with contextlib.suppress(OSError):
+                _look_for_participants(domain)
                 claim.bind(f'\0illuminator_ros_test_domain_{domain}')
                 break
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -65,6 +64,13 @@ def own_domain() -> Iterator[int]:
         for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
             os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
+
+
+def _look_for_participants(domain: int) -> None:
+    """Raise OSError if somebody listens where participants do (DDSI-RTPS, 9.6.1.1)."""
+    for participant in range(10):
+        with socket.socket(type=socket.SOCK_DGRAM) as probe:
+            probe.bind(('', 7410 + 250 * domain + 2 * participant))
 
 
 class Ros:

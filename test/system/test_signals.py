@@ -14,6 +14,8 @@
 
 """SIGINT and SIGTERM end every program at any moment: status 0, in time, without a traceback."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 import random
@@ -32,6 +34,9 @@ SIGNALS = [signal.SIGINT, signal.SIGTERM]
 # Programs at a time; more would only measure how they wait for each other.
 AT_ONCE = 3
 
+# Exit status, s from the signal to the exit, and what was printed.
+Ending = tuple[int, float, str]
+
 
 def signals_are_taken(program: Program) -> bool:
     """Return whether a program has come so far that it answers for signals itself."""
@@ -49,46 +54,55 @@ class Case:
         self.random = random.Random(seed)
         self.port = free_port()
         self.node = f'case_{self.port}'
+        self._programs: list[Program] = []
+
+    def __enter__(self) -> Case:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for program in self._programs:
+            program.kill()
 
     def pause(self, longest: float) -> None:
         """Let a random time pass: the moment of the signal is what is tested."""
         time.sleep(self.random.uniform(0.0, longest))
 
     def bridge(self) -> Program:
-        return start_bridge(self.ros.domain, self.port, '-r', f'__node:={self.node}')
+        self._programs.append(
+            start_bridge(self.ros.domain, self.port, '-r', f'__node:={self.node}'))
+        return self._programs[-1]
 
-    def end(self, program: Program, number: int) -> tuple[int, float, str]:
-        try:
-            return *program.end(number), program.log
-        finally:
-            program.kill()
+    def simulator(self) -> Program:
+        self._programs.append(
+            python('illuminator_ros.simulator', f'udpout://127.0.0.1:{self.port}'))
+        return self._programs[-1]
 
 
-def bridge_starting(case: Case, number: int) -> tuple[int, float, str]:
+def bridge_starting(case: Case, number: int) -> Ending:
     program = case.bridge()
     eventually(lambda: signals_are_taken(program))
     case.pause(0.5)
-    return case.end(program, number)
+    return *program.end(number), program.log
 
 
-def bridge_connecting(case: Case, number: int) -> tuple[int, float, str]:
+def bridge_connecting(case: Case, number: int) -> Ending:
     program = case.bridge()
     program.wait_for('link open')
     with ServedLight(case.port):
         case.pause(0.1)
-        return case.end(program, number)
+        return *program.end(number), program.log
 
 
-def bridge_idle(case: Case, number: int) -> tuple[int, float, str]:
+def bridge_idle(case: Case, number: int) -> Ending:
     program = case.bridge()
     program.wait_for('link open')
     with ServedLight(case.port):
         program.wait_for('connected')
         case.pause(0.5)
-        return case.end(program, number)
+        return *program.end(number), program.log
 
 
-def bridge_in_a_command(case: Case, number: int) -> tuple[int, float, str]:
+def bridge_in_a_command(case: Case, number: int) -> Ending:
     program = case.bridge()
     program.wait_for('link open')
     with ServedLight(case.port) as light:
@@ -97,21 +111,21 @@ def bridge_in_a_command(case: Case, number: int) -> tuple[int, float, str]:
         case.ros.start(SetBool, f'/{case.node}/enable', SetBool.Request(data=True))
         light.wait_for(ON_OFF)
         case.pause(0.3)
-        return case.end(program, number)
+        return *program.end(number), program.log
 
 
-def simulator_starting(case: Case, number: int) -> tuple[int, float, str]:
-    program = python('illuminator_ros.simulator', f'udpout://127.0.0.1:{case.port}')
+def simulator_starting(case: Case, number: int) -> Ending:
+    program = case.simulator()
     eventually(lambda: signals_are_taken(program))
     case.pause(0.3)
-    return case.end(program, number)
+    return *program.end(number), program.log
 
 
-def simulator_running(case: Case, number: int) -> tuple[int, float, str]:
-    program = python('illuminator_ros.simulator', f'udpout://127.0.0.1:{case.port}')
+def simulator_running(case: Case, number: int) -> Ending:
+    program = case.simulator()
     program.wait_for('link open')
     case.pause(0.3)
-    return case.end(program, number)
+    return *program.end(number), program.log
 
 
 @pytest.mark.parametrize('number', SIGNALS, ids=lambda number: number.name)
@@ -120,13 +134,15 @@ def simulator_running(case: Case, number: int) -> tuple[int, float, str]:
     (simulator_starting, 6), (simulator_running, 4),
 ], ids=lambda value: getattr(value, '__name__', ''))
 def test_a_program_ends(
-    ros: Ros, moment: Callable[[Case, int], tuple[int, float, str]], count: int,
+    ros: Ros, moment: Callable[[Case, int], Ending], count: int,
     number: signal.Signals,
 ) -> None:
-    cases = [Case(ros, f'{moment.__name__} {number.name} {n}') for n in range(count)]
+    def run(n: int) -> Ending:
+        with Case(ros, f'{moment.__name__} {number.name} {n}') as case:
+            return moment(case, number)
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        outcomes = list(pool.map(lambda case: moment(case, number), cases))
+        outcomes = list(pool.map(run, range(count)))
 
     for status, taken, log in outcomes:
         assert (status, 'Traceback' in log, 'Exception' in log) == (0, False, False), log
@@ -134,26 +150,26 @@ def test_a_program_ends(
 
 
 def test_the_node_is_gone_from_the_graph_at_once(ros: Ros) -> None:
-    case = Case(ros, 'graph')
-    program = case.bridge()
-    eventually(lambda: case.node in ros.node.get_node_names())
+    with Case(ros, 'graph') as case:
+        program = case.bridge()
+        eventually(lambda: case.node in ros.node.get_node_names())
 
-    program.end(signal.SIGTERM)
+        program.end(signal.SIGTERM)
 
-    # A participant that only fell silent would be listed for another 20 s.
-    eventually(lambda: case.node not in ros.node.get_node_names(), timeout=1.0)
+        # A participant that only fell silent would be listed for another 20 s.
+        eventually(lambda: case.node not in ros.node.get_node_names(), timeout=1.0)
 
 
 def test_impatience_changes_nothing(ros: Ros) -> None:
-    case = Case(ros, 'impatience')
-    program = case.bridge()
-    program.wait_for('link open')
+    with Case(ros, 'impatience') as case:
+        program = case.bridge()
+        program.wait_for('link open')
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
-        program.send(number)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
+            program.send(number)
 
-    assert program.wait() == 0
-    assert 'Traceback' not in program.log
+        assert program.wait() == 0
+        assert 'Traceback' not in program.log
 
 
 @pytest.mark.parametrize('module', ['illuminator_ros.bridge', 'illuminator_ros.simulator'])
