@@ -111,6 +111,8 @@ def _serve(arguments: list[str], termination: Termination) -> int:
     from .ros.parameters import ParameterError
     from .ros.process import BridgeProcess
 
+    # From here on the ROS graph has to be left in order, so a signal only has effect later.
+    termination.calls(lambda: None)
     try:
         rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = IlluminatorNode()

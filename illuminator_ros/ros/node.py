@@ -103,7 +103,8 @@ class IlluminatorNode(Node):
         """
         now = self._link.clock()
         if now >= self._diagnostics_due - tolerance:
-            self._diagnostics_due = max(self._diagnostics_due, now - tolerance) + self._period
+            late = now - self._diagnostics_due >= self._period
+            self._diagnostics_due = (now if late else self._diagnostics_due) + self._period
             self.publish_diagnostics()
         elif self._worst(now) != self._levels:
             self.publish_diagnostics()
