@@ -35,7 +35,7 @@ from .parameters import declare_link_parameters, LinkParameters, ParameterError
 from .spinner import Spinner
 
 # s; SIGINT and SIGTERM end the process within 1 s, of which ROS takes 0.2 s.
-OFF_LIMIT = 0.5
+OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
 THREADS_LIMIT = 0.1
 # s between looks at whether diagnostics are due or have got worse. One thread does for all nodes:
@@ -174,7 +174,7 @@ class BridgeProcess:
             node.publish_diagnostics()
 
     def _stop(self) -> None:
-        """Switch the lights off if that is wanted, and end all; takes 0.75 s at most."""
+        """Switch the lights off if that is wanted, and end all; takes 0.85 s at most."""
         if self.parameters.off_on_shutdown:
             lights = [node.light for node in self.nodes if node.light and node.light.connected]
             answers = threading.Semaphore(0)
