@@ -34,7 +34,7 @@ from .node import IlluminatorNode
 from .parameters import declare_link_parameters, LinkParameters, ParameterError
 from .spinner import Spinner
 
-# s; SIGINT and SIGTERM end the process within 1 s, of which ROS takes 0.2 s.
+# s; SIGINT and SIGTERM end the process within 1 s, these and the leaving of ROS included.
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
 THREADS_LIMIT = 0.1
