@@ -33,10 +33,10 @@ TIME = {'time', 'datetime'}
 THREADS = {'threading', 'queue', 'multiprocessing', 'concurrent'}
 FORBIDDEN = {'mavlink': ROS, 'illuminator': ROS | IO | TIME | THREADS, 'ros': {'socket'}}
 # Inside mavlink/ too, the protocol itself does no I/O and has no clock.
-SANS_IO = ('agenda', 'command', 'dialect', 'endpoint', 'framing', 'round_trip', 'signing',
-           'statistics', 'url')
+SANS_IO = ('agenda', 'command', 'dialect', 'echoes', 'endpoint', 'framing', 'round_trip',
+           'signing', 'statistics', 'url')
 # Imported before signals are taken, and therefore quick to import.
-FIRST = ('', 'bridge', 'simulator', 'entry', 'termination')
+FIRST = ('', 'bridge', 'conformance', 'simulator', 'entry', 'termination')
 QUICK = {'__future__', 'collections', 'contextlib', 'os', 're', 'signal', 'sys', 'threading',
          'time', 'typing', PACKAGE}
 LONGEST = 300
@@ -88,6 +88,13 @@ def test_imports_point_downwards(module: str) -> None:
 @pytest.mark.parametrize('module', [m for m in MODULES if layer(m) in FORBIDDEN])
 def test_a_layer_knows_nothing_of_what_is_not_its_own(module: str) -> None:
     assert roots(imports(module)) & FORBIDDEN[layer(module)] == set()
+
+
+@pytest.mark.parametrize(
+    'module', [m for m in MODULES if m.split('.')[1:2] in (['simulator'], ['conformance'])])
+def test_simulator_and_conformance_need_no_ros(module: str) -> None:
+    assert roots(imports(module)) & ROS == set()
+    assert not [name for name in imports(module) if name.startswith(f'{PACKAGE}.ros')]
 
 
 @pytest.mark.parametrize('name', SANS_IO)
