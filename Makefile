@@ -22,7 +22,7 @@ demo: environment
 	@$(PYTHON_IN_VENV) demo/run.py
 
 test: lint
-	@$(PYTHON_IN_VENV) -m pytest $(TESTS)
+	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile $(TESTS)
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \

@@ -114,13 +114,32 @@ class Agreement:
         :raises InvalidValue: if nothing is agreed yet and the changes are not complete.
         """
         if self.agreed is not None:
-            return self.agreed.with_changes(changes)
+            return self._sendable(self.agreed, changes).with_changes(changes)
         missing = [name for name in FIELDS if name not in changes]
         if missing:
             raise InvalidValue(
                 'the light has not reported its configuration yet, so '
                 f'{", ".join(missing)} must be set in the same call')
         return Configuration(**changes)
+
+    def _sendable(self, agreed: Configuration, changes: Mapping[str, Any]) -> Configuration:
+        """
+        Return what is agreed but for what the light's own limits rule out.
+
+        A light that has once reported such a value would deny every change that carries it.
+        """
+        status, limits = self._light.status, self._light.limits
+        if status is None:
+            return agreed
+        reported = status.configuration(agreed)
+        ruled_out = {}
+        for name in FIELDS:
+            try:
+                if name != 'mode' and name not in changes:
+                    checked(name, getattr(agreed, name), limits)
+            except InvalidValue:
+                ruled_out[name] = getattr(reported, name)
+        return agreed.with_changes(ruled_out)
 
     def set_brightness(self, brightness: float, now: float) -> None:
         """
@@ -253,10 +272,12 @@ class Agreement:
             self._follow(status, self.agreed, reported)
 
     def _follow(self, status: Status, agreed: Configuration, reported: Configuration) -> None:
-        names = unexplained(agreed, reported, status.error_flags, step=False)
+        # Under external sync too: somebody else may have changed what cannot be told apart.
+        names = unexplained(agreed, reported, status.error_flags, step=False, external=False)
         if names:
             far = unexplained(
-                self._reference or agreed, reported, status.error_flags, step=True)
+                self._reference or agreed, reported, status.error_flags, step=True,
+                external=False)
             self._adopt(
                 agreed.with_changes({name: getattr(reported, name) for name in names}),
                 Cause.LIGHT if far else Cause.ROUNDING)

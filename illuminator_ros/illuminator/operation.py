@@ -322,6 +322,7 @@ class Configure(Operation):
 
 def unexplained(
     agreed: Configuration, reported: Configuration, flags: int, *, step: bool,
+    external: bool = True,
 ) -> list[str]:
     """
     Return the fields in which a light differs from its agreed configuration without reason.
@@ -329,6 +330,7 @@ def unexplained(
     There are two good reasons: it dims itself because it is hot, and under external sync its
     output follows another signal.
 
+    :param external: whether external sync is to count as a reason.
     :param step: whether the light's own rounding is passed over.
     """
     names = agreed.differences(reported, step=step)
@@ -337,7 +339,7 @@ def unexplained(
         names = [name for name in names if name != 'mode']
     if flags & DIMMING_FLAGS and reported.brightness < agreed.brightness:
         names = [name for name in names if name != 'brightness']
-    if agreed.mode is reported.mode is Mode.EXTERNAL_SYNC:
+    if external and agreed.mode is reported.mode is Mode.EXTERNAL_SYNC:
         names = []
     return names
 

@@ -40,6 +40,7 @@ SIGNATURE = 13
 FLAG_SIGNED = 0x01
 MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
+STARTS = (b'\xfd', b'\xfe')
 _START = re.compile(b'[\xfd\xfe]')
 
 
@@ -107,6 +108,8 @@ class Decoder:
     counters: DecoderCounters = field(default_factory=DecoderCounters)
     taken: int = 0
     _rest: bytes = b''
+    # How much of the rest may be the signature of the frame before.
+    _signature_end: int = 0
 
     @property
     def incomplete(self) -> int | None:
@@ -118,6 +121,7 @@ class Decoder:
         frames: list[Frame] = []
         while self.incomplete is not None and self.incomplete < position:
             rest, self._rest = self._rest[1:], b''
+            self._signature_end = max(self._signature_end - 1, 0)
             self.taken -= len(rest)
             self.counters.skipped_bytes += 1
             frames += self.feed(rest)
@@ -129,10 +133,15 @@ class Decoder:
         data = self._rest + data if self._rest else data
         frames: list[Frame] = []
         position = end = 0
+        signature_end = self._signature_end
         while match := _START.search(data, position):
             start = match.start()
             found = self._read(data, start)
             if found is None:
+                if start < signature_end and data[signature_end:signature_end + 1] in STARTS:
+                    # The signature was whole, and only looks like the beginning of a frame.
+                    position = signature_end
+                    continue
                 break
             size, frame = found
             if frame is None:
@@ -146,11 +155,13 @@ class Decoder:
                 # like its end is the beginning of the next frame.
                 within = data.find(STX_V2, end - SIGNATURE, end)
                 position = within if within >= 0 else end
+                signature_end = end
         else:
             start = len(data)
         self.counters.frames += len(frames)
         self.counters.skipped_bytes += start - end
         self._rest = data[start:]
+        self._signature_end = max(signature_end - start, 0)
         return frames
 
     def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:

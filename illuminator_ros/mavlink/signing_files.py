@@ -48,7 +48,8 @@ def load_key(path: str) -> bytes:
     :raises KeyFileError: if it cannot be read, is open to others, or holds none of these.
     """
     if not path:
-        raise KeyFileError('no key file is given (signing_key_file)')
+        raise KeyFileError('no key file is given')
+    path = os.path.expanduser(path)
     try:
         # Without waiting: a FIFO without a writer would hold up the start for ever.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

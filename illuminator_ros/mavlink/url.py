@@ -182,7 +182,7 @@ class _Parser:
 
     def port(self, text: str) -> int:
         if not re.fullmatch(r'[0-9]+', text):
-            self.fail(f'port {text!r} is no number')
+            self.fail(f'port {text!r} is not a number')
         # The length goes first: int() refuses a number of thousands of digits.
         if len(text) > 5 or not 1 <= int(text) <= 65535:
             self.fail(f'port {text} is outside 1..65535')

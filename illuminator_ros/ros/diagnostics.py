@@ -35,6 +35,8 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 # s in which a light may be looked for before its absence is an error.
 DISCOVERY_GRACE = 10.0
+# s without a status from a light that has sent some: it is asked for one every 2.5 s.
+STATUS_SILENCE = 10.0
 # % of the frames of a light that may be lost before it is worth a warning.
 LOSS_WARNING = 5.0
 
@@ -69,6 +71,21 @@ def level(findings: list[Finding]) -> bytes:
     return max((finding[0] for finding in findings), default=OK)
 
 
+def why_nothing_is_heard(state: LinkState) -> str:
+    """Return the likeliest reason why an open link brings no light, for people."""
+    signing = state.signing
+    if signing.bad:
+        return f'{signing.bad} frames refused for their signature, made with another key'
+    if signing.unsigned and not state.traffic.frames_received:
+        return f'{signing.unsigned} frames refused because they are not signed'
+    if state.traffic.frames_received:
+        return f'{state.traffic.frames_received} frames came, none from an illuminator'
+    if state.traffic.bytes_received:
+        return f'{state.traffic.bytes_received} bytes came and no good frame, as with a wrong ' \
+               'baud rate'
+    return 'nothing comes in'
+
+
 def link_findings(
     state: LinkState, controller: Controller, light: Light | None, *, now: float, started: float,
 ) -> list[Finding]:
@@ -80,7 +97,11 @@ def link_findings(
         findings.append((ERROR, f'another sender uses our address {controller.identity}'))
     if light is None:
         severity = WARN if now - started < DISCOVERY_GRACE else ERROR
-        findings.append((severity, f'no illuminator heard for {format_seconds(now - started)}'))
+        findings.append((severity, f'no illuminator heard for {format_seconds(now - started)}: '
+                                   f'{why_nothing_is_heard(state)}'))
+    if state.signing.unchecked and controller.sender.counters.unanswered:
+        findings.append((WARN, 'commands go unanswered, and the others sign their frames while '
+                               'signing_mode is off'))
     if controller.passed_over:
         findings.append((WARN, f'more than {len(controller.lights)} lights, some passed over'))
     counter = state.traffic.sources.get(light.source) if light else None
@@ -127,6 +148,7 @@ def link_status(
         'signatures_bad': signing.bad,
         'signatures_replayed': signing.replayed,
         'unsigned_frames': signing.unsigned,
+        'signatures_unchecked': signing.unchecked,
     })
 
 
@@ -141,6 +163,9 @@ def lamp_findings(light: Light, now: float) -> list[Finding]:
                      if status.error_flags & flag]
         if status.error_flags & ~KNOWN_FLAGS:
             findings.append((WARN, flag_names(status.error_flags & ~KNOWN_FLAGS)[0]))
+        silence = now - light.status_at
+        if silence > max(STATUS_SILENCE, 3 * light.settings.status_interval):
+            findings.append((WARN, f'no status for {format_seconds(silence)}'))
         if status.invalid:
             findings.append((WARN, f'not believable: {", ".join(status.invalid)}'))
     if light.sharing.recognised:

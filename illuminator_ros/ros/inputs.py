@@ -54,6 +54,9 @@ class Inputs:
         self._handover: Handover[Result] = Handover(node, link)
         self._setpoint: float | None = None
         self._setting = threading.Lock()
+        # The newest on ~/cmd/enable that is still to be done, and whether one is under way.
+        self._switch: bool | None = None
+        self._switching = False
         group = self._handover.group
         node.create_service(SetBool, '~/enable', self._enable, callback_group=group)
         node.create_service(Trigger, '~/refresh', self._refresh, callback_group=group)
@@ -100,8 +103,20 @@ class Inputs:
         return light.limits if light else None
 
     async def _cmd_enable(self, message: Any) -> None:
-        result = await self.ask(
-            lambda light, now, done: light.enable(message.data, now, done))
+        """Switch; what comes while a switch is under way waits, and only the newest of it."""
+        waiting, self._switch = self._switch, bool(message.data)
+        if waiting is not None or self._switching:
+            return
+        self._switching = True
+        try:
+            while self._switch is not None:
+                on, self._switch = self._switch, None
+                await self._switch_to(on)
+        finally:
+            self._switching = False
+
+    async def _switch_to(self, on: bool) -> None:
+        result = await self.ask(lambda light, now, done: light.enable(on, now, done))
         if not result.success:
             self._node.get_logger().warning(
                 f'~/cmd/enable: {result.message}', throttle_duration_sec=5.0)

@@ -32,11 +32,14 @@ from .diagnostics import (
     level,
     link_findings,
     link_status,
+    why_nothing_is_heard,
 )
 from .inputs import Inputs
 from .outputs import Outputs, STREAM_QOS
 from .parameters import declare_device_parameters, misspelt
 
+# s without a light, after which the log says once what is known of the reason.
+PATIENCE = 5.0
 DEFAULT_NAME = 'illuminator'
 
 
@@ -78,6 +81,7 @@ class IlluminatorNode(Node):
         self.inputs = Inputs(self, link, lambda: self.light, self.absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._period = period
+        self._missed = False
         self._diagnostics_due = self._started
 
     def bind(self, light: Light, now: float) -> None:
@@ -93,7 +97,11 @@ class IlluminatorNode(Node):
         state = self._link.state()
         if not state.is_open:
             return f'no light connected: {state.name} is not open: {state.reason}'
-        return f'no light connected: none heard yet on {state.name}'
+        others = ', '.join(map(str, list(self._controller.lights)[:8]))
+        if others:
+            return f'no light connected: {others} heard, none of which is the target'
+        return (f'no light connected: none heard yet on {state.name}: '
+                f'{why_nothing_is_heard(state)}')
 
     def poll(self, tolerance: float) -> None:
         """
@@ -102,6 +110,9 @@ class IlluminatorNode(Node):
         :param tolerance: how much too early it may be, s.
         """
         now = self._link.clock()
+        if self.light is None and not self._missed and now >= self._started + PATIENCE:
+            self._missed = True
+            self.get_logger().warning(self.absence())
         if now >= self._diagnostics_due - tolerance:
             late = now - self._diagnostics_due >= self._period
             self._diagnostics_due = (now if late else self._diagnostics_due) + self._period

@@ -57,6 +57,7 @@ class Outputs(LightObserver):
         self._connected = node.create_publisher(Bool, '~/connected', STATE_QOS)
         self._connected.publish(Bool(data=False))
         self._identity: Identity | None = None
+        self._enabled: bool | None = None
         self._limits = Limits()
         self._shared = False
         self._mirroring = threading.RLock()
@@ -89,7 +90,10 @@ class Outputs(LightObserver):
 
     def restarted(self, light: Light) -> None:
         """See :meth:`LightObserver.restarted`."""
-        self._node.get_logger().info(f'light {light.source} has restarted')
+        logger = self._node.get_logger()
+        logger.info(f'light {light.source} has restarted', throttle_duration_sec=1.0)
+        if self._enabled and light.status and light.status.enabled is False:
+            logger.warning(f'light {light.source} was on before it restarted, and is off now')
 
     def identified(self, light: Light, identity: Identity) -> None:
         """See :meth:`LightObserver.identified`."""
@@ -98,10 +102,12 @@ class Outputs(LightObserver):
         self._identity = identity
         known = ' '.join(filter(None, (identity.vendor, identity.model)))
         serial = f', serial number {identity.serial_number}' if identity.serial_number else ''
-        self._node.get_logger().info(f'light {light.source} is {known or "nameless"}{serial}')
+        self._node.get_logger().info(
+            f'light {light.source} is {known or "nameless"}{serial}')
 
     def status(self, light: Light, status: Status) -> None:
         """See :meth:`LightObserver.status`."""
+        self._enabled = status.enabled
         for name, message in status_messages(status).items():
             self._publishers[name].publish(message)
         temperature = light.temperature

@@ -20,6 +20,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import difflib
 import math
+import re
+import reprlib
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -103,7 +105,7 @@ class ParameterSpec:
 
 
 _TYPE_NAMES = {float: 'number', int: 'integer', str: 'string', bool: 'boolean',
-               list: 'list of strings'}
+               list: "list of strings, as in -p names:=\"['1/244=belly']\""}
 
 LINK_PARAMETERS = (
     ParameterSpec('connection_url', DEFAULT_URL, 'where the light is: UDP, TCP or serial'),
@@ -195,14 +197,14 @@ def declare_link_parameters(node: Node) -> LinkParameters:
 def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
     names: dict[Source, str] = {}
     for entry in filter(None, entries):
-        ids, equals, name = entry.partition('=')
-        system, slash, component = ids.partition('/')
-        if not (equals and slash and system.isdigit() and component.isdigit()
-                and int(system) < 256 and int(component) < 256):
-            raise ParameterError(f'names: {entry!r} is not of the form 1/244=belly')
-        if not (name.replace('_', 'a').isalnum() and name.isascii() and not name[0].isdigit()):
+        match = re.fullmatch(r'([0-9]{1,3})/([0-9]{1,3})=(.*)', str(entry))
+        if not match or int(match[1]) > 255 or int(match[2]) > 255:
+            raise ParameterError(
+                f'names: {reprlib.repr(entry)} is not of the form 1/244=belly')
+        name = match[3]
+        if not re.fullmatch(r'[A-Za-z_][A-Za-z0-9_]*', name):
             raise ParameterError(f'names: {name!r} in {entry!r} is no node name')
-        source = Source(int(system), int(component))
+        source = Source(int(match[1]), int(match[2]))
         if source in names or name in names.values():
             raise ParameterError(f'names: {entry!r} repeats an address or a name')
         if name == first:

@@ -169,7 +169,8 @@ class BridgeProcess:
         if event.is_open:
             logger.info(f'link open: {event.name}')
         else:
-            logger.warning(f'link not open: {event.name}: {event.reason}; trying again')
+            what = 'lost' if self.link.state().openings else 'not open'
+            logger.warning(f'link {what}: {event.name}: {event.reason}; trying again')
         for node in list(self.nodes):
             node.publish_diagnostics()
 
@@ -211,6 +212,8 @@ def without_node_name(arguments: list[str]) -> list[str]:
 
 
 def _signing(parameters: LinkParameters) -> tuple[Signing, TimestampStore | None]:
+    if parameters.signing_mode is SigningMode.OFF and parameters.signing_key_file:
+        raise ParameterError('signing_key_file: is given, but signing_mode is off')
     if parameters.signing_mode is SigningMode.OFF:
         return Signing(), None
     try:

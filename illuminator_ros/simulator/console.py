@@ -42,7 +42,7 @@ def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise _Wrong(f'{text!r} is no number') from None
+        raise _Wrong(f'{text!r} is not a number') from None
 
 
 def _fault(device: Device, words: list[str], now: float) -> str:

@@ -151,7 +151,7 @@ def read(name: str, value: Any, place: str) -> Any:
     except (ValueError, argparse.ArgumentTypeError) as error:
         reason = str(error)
         if 'could not convert' in reason or 'invalid literal' in reason:
-            reason = f'{value!r} is no number'
+            reason = f'{value!r} is not a number'
         raise SettingError(f'{place}: {reason}') from error
 
 

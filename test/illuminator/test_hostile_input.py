@@ -240,6 +240,22 @@ def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSie
     bridge.check_service()
 
 
+def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied(
+    bridge: BridgeSiege,
+) -> None:
+    # Under external sync a light's output is not taken for its configuration.
+    light = bridge.controller.lights[GENUINE]
+    bridge.link.ask(lambda now: light.agreement.configure(
+        {'mode': 'external_sync'}, now, lambda result, now: None))
+    bridge.link.run(1.0)
+    internal, external = (frame_of(status(
+        light.status.uptime_ms + 10 * mode, mode=mode, strobe_period=440.0), 0, GENUINE)
+        for mode in (1, 2))
+    flood(bridge, [internal, external])
+    assert light.agreement.agreed.strobe_period == 440.0
+    bridge.check_service()
+
+
 @pytest.mark.parametrize('param', [math.nan, math.inf, -math.inf, -1.0, 0.5, 3.4e38])
 @pytest.mark.parametrize('command', [405, 406, 511, 512])
 def test_a_light_refuses_params_that_mean_nothing(command: int, param: float) -> None:

@@ -134,10 +134,7 @@ def test_whatever_happens(seed):
     for device in chaos.devices:
         light = pair.controller.lights[device.source]
         assert light.connected
-        agreed = light.agreement.agreed
-        assert agreed.mode is device.configuration.mode
-        # Under external sync the rest is another signal's.
-        assert agreed.mode is Mode.EXTERNAL_SYNC or agreed == device.configuration
+        assert light.agreement.agreed == device.configuration
         assert light.status.enabled == device.enabled
         assert light.next_deadline() > pair.now
     assert pair.controller.sender.next_deadline() == float('inf')

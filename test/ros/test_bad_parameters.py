@@ -38,7 +38,7 @@ WRONG: dict[str, tuple[tuple[str, ...], str]] = {
     'a number out of range': (
         ('-p', 'brightness:=101'), 'parameter brightness 101 % is out of range: 0 to 100 %'),
     'a string for a number': (
-        ('-p', 'brightness:=bright'), "parameter brightness 'bright' is no number"),
+        ('-p', 'brightness:=bright'), "parameter brightness 'bright' is not a number"),
     'a mode that is none': (
         ('-p', 'mode:=disco'), "mode 'disco' is none of internal_control, external_sync"),
     'a URL of an unknown kind': (
@@ -46,6 +46,12 @@ WRONG: dict[str, tuple[tuple[str, ...], str]] = {
         "parameter connection_url: connection URL 'http://x': unknown scheme 'http'"),
     'a name without ids': (
         ('-p', 'names:=[belly]'), "parameter names: 'belly' is not of the form 1/244=belly"),
+    'a key without signing': (
+        ('-p', 'signing_key_file:=KEYS/open'),
+        'parameter signing_key_file: is given, but signing_mode is off'),
+    'a name with ids that are none': (
+        ('-p', 'names:=["²/244=x"]'), "parameter names: '²/244=x' is not of the form"),
+    'names that are numbers': (('-p', 'names:=[1]'), 'parameter names: 1 is not of the form'),
     'an unknown signing mode': (
         ('-p', 'signing_mode:=maybe'),
         "parameter signing_mode: 'maybe' is none of off, sign, require"),
@@ -109,8 +115,8 @@ def test_it_ends_the_start(outcomes: dict[str, Any], keys: Path, what: str) -> N
 @pytest.mark.parametrize(('given', 'reason'), [
     ({'strobe_period': float('inf')}, 'strobe_period inf is not a finite number'),
     ({'strobe_period': -1.0}, 'strobe_period -1 s is out of range: 0 to 3600 s'),
-    ({'strobe_duty_cycle': True}, 'strobe_duty_cycle True is no number'),
-    ({'brightness': [1.0, 2.0]}, 'brightness [1.0, 2.0] is no number'),
+    ({'strobe_duty_cycle': True}, 'strobe_duty_cycle True is not a number'),
+    ({'brightness': [1.0, 2.0]}, 'brightness [1.0, 2.0] is not a number'),
     ({'mode': 1}, 'mode 1 is none of internal_control, external_sync'),
     ({'frame_id': 7}, 'frame_id: 7 is no string'),
     ({'system_id': 'one'}, "system_id: 'one' is no integer"),

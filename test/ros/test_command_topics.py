@@ -33,6 +33,16 @@ class TestEnable:
 
         assert command.param1 == float(on)
 
+    def test_of_what_comes_while_it_switches_only_the_newest_is_done(
+        self, ros: Ros, light: ServedLight,
+    ) -> None:
+        light.fake.apply_after = 0.2
+
+        ros.publish(Bool, '/illuminator/cmd/enable', *[True] * 50, False)
+
+        eventually(lambda: light.commands(ON_OFF)[-1:] and not light.commands(ON_OFF)[-1].param1)
+        assert len(light.commands(ON_OFF)) < 10
+
     def test_a_refusal_is_logged(self, ros: Ros, light: ServedLight, bridge: Program) -> None:
         light.fake.results[ON_OFF] = MavResult.DENIED
 
@@ -77,6 +87,16 @@ class TestBrightness:
             bridge.wait_for(f'~/cmd/brightness: {reason}')
             light.wait_for(CONFIGURE)
             assert [params(c)[1] for c in light.commands(CONFIGURE)] == [50.0]
+
+    def test_of_what_comes_while_it_switches_only_the_newest_is_done(
+        self, ros: Ros, light: ServedLight,
+    ) -> None:
+        light.fake.apply_after = 0.2
+
+        ros.publish(Bool, '/illuminator/cmd/enable', *[True] * 50, False)
+
+        eventually(lambda: light.commands(ON_OFF)[-1:] and not light.commands(ON_OFF)[-1].param1)
+        assert len(light.commands(ON_OFF)) < 10
 
     def test_a_refusal_is_logged_and_the_parameter_keeps_its_value(
         self, ros: Ros, light: ServedLight, bridge: Program, parameters: Parameters,

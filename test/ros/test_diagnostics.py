@@ -35,7 +35,7 @@ LINK_KEYS = {
     'bytes_sent_per_s', 'crc_errors', 'frames_lost', 'frames_duplicate', 'frames_reordered',
     'loss_percent', 'round_trip_p50_ms', 'round_trip_p95_ms', 'commands_sent',
     'commands_resent', 'commands_unanswered', 'signatures_good', 'signatures_bad',
-    'signatures_replayed', 'unsigned_frames',
+    'signatures_replayed', 'unsigned_frames', 'signatures_unchecked',
 }
 LAMP_KEYS = {
     'address', 'connected', 'heard_s_ago', 'restarts', 'shared_address', 'enabled', 'mode',

@@ -38,7 +38,8 @@ class TestNoLight:
 
             assert not call.result().success
             assert call.result().message == (
-                f'no light connected: none heard yet on udp 127.0.0.1:{port}')
+                f'no light connected: none heard yet on udp 127.0.0.1:{port}: '
+                'nothing comes in')
             assert call.elapsed < AT_ONCE
 
     def test_fails_at_once_where_it_is_lost(

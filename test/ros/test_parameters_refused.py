@@ -160,7 +160,8 @@ class TestNoLight:
 
             assert not result.successful
             assert result.reason == (
-                f'no light connected: none heard yet on udp 127.0.0.1:{port}')
+                f'no light connected: none heard yet on udp 127.0.0.1:{port}: '
+                'nothing comes in')
             assert call.elapsed < 0.3
             assert parameters.get('brightness') == [None]
 

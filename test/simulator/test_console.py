@@ -73,11 +73,11 @@ def test_lights_are_switched_off(bench):
 
 
 @pytest.mark.parametrize(('line', 'said'), [
-    ('brightness 101', 'out of range'), ('brightness x', "'x' is no number"),
+    ('brightness 101', 'out of range'), ('brightness x', "'x' is not a number"),
     ('brightness nan', 'not a finite number'), ('strobe 99', 'outside what the light reports'),
     ('mode disco', "'disco' is none of"), ('brightness', 'usage: brightness PERCENT'),
     ('on now', 'usage: on'), ('jump', "no command or light 'jump'"),
-    ('fault nope', "no fault 'nope'"), ('fault drop=9', 'no SHARE'), ('ambient x', 'no number'),
+    ('fault nope', "no fault 'nope'"), ('fault drop=9', 'no SHARE'), ('ambient x', 'not a number'),
     ('ambient nan', 'not possible'), ('temperature 9999', 'not possible'),
     ('clear nope', "no fault 'nope'"), ('stern on', "no command or light 'stern'")])
 def test_a_line_that_means_nothing_is_answered_and_does_nothing(bench, line, said):

@@ -131,7 +131,7 @@ def test_a_file_without_lights_leaves_their_number_to_the_command_line():
     ({'lights': [3]}, 'lights is no list of lights'),
     ({'lights': [{}]}, "light 1: id: '' is no address"),
     ({'lights': [{'id': '1/2', 'colour': 'red'}]}, "light 1: no setting 'colour'"),
-    ({'lights': [{'id': '1/2', 'ambient': 'hot'}]}, "light 1: ambient: 'hot' is no number"),
+    ({'lights': [{'id': '1/2', 'ambient': 'hot'}]}, "light 1: ambient: 'hot' is not a number"),
     ({'lights': [{'id': '1/2', 'faults': ['nope']}]}, "light 1: faults: no fault 'nope'"),
     ({'lights': [{'id': '1/2'}, {'id': '1/2'}]}, 'two lights 1/2'),
     ({'lights': [{'id': f'1/{n}'} for n in range(1, 203)]}, '202 lights are more than 200'),
@@ -165,7 +165,7 @@ def test_what_does_not_go_together_is_said(arguments, said):
     (['--modes', 'a'], "argument --modes: 'a' is none of internal_control, external_sync"),
     (['--thermal', 'rise'], "argument --thermal: 'rise' is none of ambient=VALUE"),
     (['--profile', 'x'], "argument --profile: 'x' is none of default"),
-    (['--ambient', 'x'], "argument --ambient: 'x' is no number"),
+    (['--ambient', 'x'], "argument --ambient: 'x' is not a number"),
     (['--count', '0'], '0 is outside 1 to 200'),
     (['--nope'], 'unrecognized arguments'),
 ])

@@ -21,6 +21,7 @@ from collections.abc import Callable
 import selectors
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.endpoint import Endpoint
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.signing import Signing
@@ -78,6 +79,13 @@ class _Selector(selectors.BaseSelector):
         return []
 
 
+class _FromZero(dict[Source, int]):
+    """Sequence numbers that begin with 0, so that the same run gives the same bytes."""
+
+    def get(self, key: Source, default: Any = None) -> Any:
+        return super().get(key, 0)
+
+
 class SimulatedLink(Link):
     """
     A link over UDP whose turns are taken one by one; a fault in it is raised, not logged.
@@ -95,6 +103,7 @@ class SimulatedLink(Link):
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing)
         self._selector.close()
         self._selector = _Selector(self)
+        self._sequences = _FromZero()
         self.socket = _Socket(take)
         self.udp = UdpChannel(URL)
         self.udp._socket.close()

@@ -112,7 +112,7 @@ def test_without_a_light_it_is_exit_status_1(url, programs):
 
 @pytest.mark.parametrize(('arguments', 'said'), [
     ([], 'the connection URL is missing'),
-    (['udp:x:y'], "port 'y' is no number"),
+    (['udp:x:y'], "port 'y' is not a number"),
     (['udpin://:1', '--only', 'nope'], "invalid choice: 'nope'"),
     (['udpin://:1', '--target', '1'], "'1' is no address such as 1/243"),
     (['udpin://:1', '--junit', '/nowhere/at/all.xml'], 'there is no such directory'),
