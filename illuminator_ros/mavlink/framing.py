@@ -138,7 +138,7 @@ class Decoder:
             start = match.start()
             found = self._read(data, start)
             if found is None:
-                if start < signature_end and data[signature_end:signature_end + 1] in STARTS:
+                if start < signature_end and self._is_frame(data, signature_end):
                     # The signature was whole, and only looks like the beginning of a frame.
                     position = signature_end
                     continue
@@ -169,6 +169,11 @@ class Decoder:
         if data[start] == STX_V2:
             return self._read_v2(data, start)
         return self._read_v1(data, start)
+
+    def _is_frame(self, data: bytes, start: int) -> bool:
+        """Return whether a whole and good frame begins here."""
+        found = self._read(data, start) if data[start:start + 1] in STARTS else None
+        return found is not None and found[1] is not None
 
     def _read_v2(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
         if len(data) - start < HEADER_V2:

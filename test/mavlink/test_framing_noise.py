@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import random
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import pytest
 from support.frames import FILLER, frame_of, raw_v1, raw_v2
@@ -128,6 +128,18 @@ def test_frame_that_is_cut_short_costs_no_other(
     cut = victim[:data.draw(st.integers(0, len(victim) - 1))]
     found = in_pieces(b''.join([*others[:where], cut, *others[where:], FILLER]), [1000])
     assert [bytes_of(frame) for frame in found if authentic(frame)] == others
+
+
+@given(st.lists(st.tuples(frames, st.binary(min_size=6, max_size=6)), min_size=1, max_size=8))
+@example([(SIGNED[0], b'\xfd\xb5\x00\xbe\x8a\xdc'), (SIGNED[0], bytes(6))])
+@PROPERTY
+def test_frames_come_with_their_last_byte_whatever_their_signatures_look_like(
+        sent: list[tuple[bytes, bytes]]) -> None:
+    # On a link of their own: no noise that they could be taken for.
+    decoder = Decoder()
+    for frame, mark in sent:
+        whole = frame[:-6] + mark if frame[0] == 0xFD and frame[2] == FLAG_SIGNED else frame
+        assert [bytes_of(found) for found in decoder.feed(whole)] == [whole]
 
 
 @given(st.binary(max_size=2000), st.lists(st.integers(1, 300), min_size=1, max_size=5))
