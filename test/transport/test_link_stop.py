@@ -188,15 +188,22 @@ def test_what_opens_at_the_moment_of_ending_is_closed(monkeypatch: pytest.Monkey
     go_on.set()
 
 
-def test_what_was_opened_and_not_taken_yet_is_closed() -> None:
-    link = LiveLink(f'udpin://127.0.0.1:{free_port()}')
+def test_what_was_opened_and_not_taken_yet_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    genuine = opener.open_channel
     inside, go_on = threading.Event(), threading.Event()
+
+    def open_behind(url: Any) -> Any:
+        assert inside.wait(PATIENCE)
+        return genuine(url)
+
+    monkeypatch.setattr(opener, 'open_channel', open_behind)
+    link = LiveLink(f'udpin://127.0.0.1:{free_port()}')
 
     def hold(now: float) -> None:
         inside.set()
         go_on.wait(PATIENCE)
 
-    # The channel, if it is not there yet, comes behind this call and behind the end.
+    # The channel comes behind this call and behind the end.
     link.link.call(hold)
     assert inside.wait(PATIENCE)
     wait_for_openers()
