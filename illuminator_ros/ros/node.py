@@ -114,8 +114,7 @@ class IlluminatorNode(Node):
             self._missed = True
             self.get_logger().warning(self.absence())
         if now >= self._diagnostics_due - tolerance:
-            late = now - self._diagnostics_due >= self._period
-            self._diagnostics_due = (now if late else self._diagnostics_due) + self._period
+            self._diagnostics_due = now + self._period
             self.publish_diagnostics()
         elif self._worst(now) != self._levels:
             self.publish_diagnostics()

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from typing import Any
@@ -75,7 +76,9 @@ class BridgeProcess:
         _forward_logs(node)
         self._ended = threading.Event()
         self._spinners = [Spinner(node)]
-        self._tick = min(TICK, parameters.diagnostics_period)
+        # A whole number of them makes a period, which else would now and then be one too long.
+        period = parameters.diagnostics_period
+        self._tick = period / math.ceil(period / TICK)
         self._threads = [threading.Thread(target=self._poll, name='diagnostics', daemon=True)]
         # Nodes are made one after the other: each takes time of everybody.
         self._making = threading.Lock()
