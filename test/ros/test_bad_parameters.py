@@ -146,13 +146,13 @@ def test_the_reason_names_what_is_wrong(ros: Ros, given: dict[str, Any], reason:
     assert reason in str(error.value)
 
 
-@pytest.mark.parametrize(('wrong', 'right'), [
-    ('brightnes', 'brightness'), ('conection_url', 'connection_url'),
-    ('target_sytem', 'target_system'), ('strobe_periode', 'strobe_period'),
-])
-def test_a_misspelt_name_is_warned_about(ros: Ros, wrong: str, right: str) -> None:
-    with running_bridge(ros.domain, free_port(), **{wrong: 1}) as bridge:
-        bridge.wait_for(f"parameter '{wrong}' is unknown and ignored; did you mean '{right}'?")
+def test_misspelt_names_are_warned_about(ros: Ros) -> None:
+    misspelt = {'brightnes': 'brightness', 'conection_url': 'connection_url',
+                'target_sytem': 'target_system', 'strobe_periode': 'strobe_period'}
+    with running_bridge(ros.domain, free_port(), **dict.fromkeys(misspelt, 1)) as bridge:
+        for wrong, right in misspelt.items():
+            bridge.wait_for(
+                f"parameter '{wrong}' is unknown and ignored; did you mean '{right}'?")
 
 
 @pytest.mark.parametrize('given', ['off', "'off'"])

@@ -85,11 +85,10 @@ class TestArray:
             recorder.wait()
             recorder.clear()
 
-            arrays = [recorder.wait(count=n) for n in (1, 2, 3)]
+            arrays = [recorder.wait(count=n) for n in (1, 2)]
 
         stamps = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9 for array in arrays]
-        assert [later - earlier for earlier, later in zip(stamps, stamps[1:], strict=False)
-                ] == pytest.approx([1.0, 1.0], abs=0.2)
+        assert stamps[1] - stamps[0] == pytest.approx(1.0, abs=0.2)
 
     def test_its_period_is_a_parameter(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port, diagnostics_period=0.1):
@@ -113,13 +112,10 @@ class TestHardwareId:
 
         assert lamp.hardware_id == 'T-1'
 
-    @pytest.mark.parametrize('without', ['serial number', 'message'])
     def test_a_light_without_serial_number_has_its_address_for_it(
-        self, own_ros: Ros, port: int, without: str,
+        self, own_ros: Ros, port: int,
     ) -> None:
         light = ServedLight(port)
-        if without == 'message':
-            light.fake.answers.discard(INFORMATION)
         light.fake.identity = type(light.fake.identity)('maker', 'torch', '', '', '')
         with running_bridge(own_ros.domain, port), light:
             recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
@@ -133,14 +129,15 @@ class TestHardwareId:
     ) -> None:
         light = ServedLight(port)
         light.fake.answers.discard(INFORMATION)
-        with running_bridge(own_ros.domain, port), light:
+        with running_bridge(own_ros.domain, port, diagnostics_period=0.1), light:
             recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-            recorder.wait(lambda array: len(array.status) == 2)
+            array = recorder.wait(lambda array: len(array.status) == 2)
+            assert array.status[1].hardware_id == 'mavlink:1/243'
 
             light.send(light.fake.information())
 
-            array = recorder.wait(lambda array: 'serial_number' in values(array.status[-1]))
-            assert array.status[1].hardware_id == 'mavlink:1/243'
+            told = recorder.wait(lambda array: 'serial_number' in values(array.status[-1]))
+            assert told.status[1].hardware_id == 'mavlink:1/243'
 
 
 class TestValues:

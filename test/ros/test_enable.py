@@ -116,15 +116,6 @@ def test_a_light_that_accepts_and_stays_dark_has_failed(ros: Ros, light: ServedL
         r'\(1 try, 1\.\d\d s\)', response.message)
 
 
-def test_a_contradiction_is_told_with_the_flags_that_explain_it(
-    ros: Ros, light: ServedLight,
-) -> None:
-    light.fake.applies = False
-    light.report(error_status=2)
-
-    assert 'shows off, over temperature shutdown' in enable(ros).message
-
-
 def test_a_light_that_changes_a_little_later_has_succeeded(
     ros: Ros, light: ServedLight,
 ) -> None:
@@ -206,8 +197,9 @@ def test_an_acknowledgement_from_somebody_else_does_not_count(
     light.wait_for(ON_OFF)
 
     light.acknowledge(ON_OFF, MavResult.ACCEPTED, source=Source(1, 1))
+    light.acknowledge(ON_OFF, MavResult.DENIED)
 
-    assert not call.result().success
+    assert call.result().message.startswith('refused: MAV_RESULT_DENIED')
 
 
 def test_two_callers_each_get_the_answer_to_their_own_request(

@@ -15,9 +15,7 @@
 """``~/enable`` and ``~/refresh`` where no light is connected, or one that sends no status."""
 
 import socket
-from typing import Any
 
-import pytest
 from std_srvs.srv import SetBool, Trigger
 from support.light import ON_OFF, ServedLight
 from support.ros import Ros, running_bridge
@@ -25,51 +23,43 @@ from support.ros import Ros, running_bridge
 AT_ONCE = 0.3
 
 
-@pytest.mark.parametrize(('service', 'type_', 'request_'), [
-    ('enable', SetBool, SetBool.Request(data=True)),
-    ('refresh', Trigger, Trigger.Request()),
-])
+REQUESTS = [('enable', SetBool, SetBool.Request(data=True)),
+            ('refresh', Trigger, Trigger.Request())]
+
+
+def messages_at_once(ros: Ros) -> list[str]:
+    """Call both services; return what they say about having failed at once."""
+    calls = [ros.start(type_, f'/illuminator/{service}', request)
+             for service, type_, request in REQUESTS]
+    responses = [call.result() for call in calls]
+    assert [response.success for response in responses] == [False, False]
+    assert max(call.elapsed for call in calls) < AT_ONCE
+    return [response.message for response in responses]
+
+
 class TestNoLight:
-    def test_fails_at_once_where_none_was_ever_heard(
-        self, own_ros: Ros, port: int, service: str, type_: Any, request_: Any,
-    ) -> None:
+    def test_both_fail_at_once_where_none_was_ever_heard(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
-            call = own_ros.start(type_, f'/illuminator/{service}', request_)
+            assert messages_at_once(own_ros) == 2 * [
+                f'no light connected: none heard yet on udp 127.0.0.1:{port}: nothing comes in']
 
-            assert not call.result().success
-            assert call.result().message == (
-                f'no light connected: none heard yet on udp 127.0.0.1:{port}: '
-                'nothing comes in')
-            assert call.elapsed < AT_ONCE
-
-    def test_fails_at_once_where_it_is_lost(
-        self, own_ros: Ros, port: int, service: str, type_: Any, request_: Any,
-    ) -> None:
+    def test_both_fail_at_once_where_it_is_lost(self, own_ros: Ros, port: int) -> None:
         with (running_bridge(own_ros.domain, port, heartbeat_timeout=1.1) as bridge,
               ServedLight(port) as light):
             bridge.wait_for('connected')
             light.fake.silent = True
             bridge.wait_for('lost')
 
-            call = own_ros.start(type_, f'/illuminator/{service}', request_)
+            for message in messages_at_once(own_ros):
+                assert message.startswith('light 1/243 is lost: no heartbeat for 1.')
 
-            assert not call.result().success
-            assert call.result().message.startswith(
-                'light 1/243 is lost: no heartbeat for 1.')
-            assert call.elapsed < AT_ONCE
-
-    def test_says_why_where_the_link_is_not_open(
-        self, own_ros: Ros, port: int, service: str, type_: Any, request_: Any,
-    ) -> None:
+    def test_both_say_why_where_the_link_is_not_open(self, own_ros: Ros, port: int) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as occupant:
             occupant.bind(('127.0.0.1', port))
             with running_bridge(own_ros.domain, port, until='link not open'):
-                response = own_ros.call(type_, f'/illuminator/{service}', request_)
-
-        assert not response.success
-        assert response.message == (
-            f'no light connected: udpin://127.0.0.1:{port} is not open: '
-            f'cannot listen on 127.0.0.1:{port}: Address already in use')
+                assert messages_at_once(own_ros) == 2 * [
+                    f'no light connected: udpin://127.0.0.1:{port} is not open: '
+                    f'cannot listen on 127.0.0.1:{port}: Address already in use']
 
 
 def test_a_light_that_sends_no_status_at_all_is_believed(own_ros: Ros, port: int) -> None:

@@ -36,7 +36,8 @@ BACK_WITHIN = 1.0
 @pytest.fixture
 def bridge(own_ros: Ros, port: int) -> Iterator[Program]:
     """Run a bridge that misses a light soon."""
-    with running_bridge(own_ros.domain, port, heartbeat_timeout=1.1) as bridge:
+    with running_bridge(own_ros.domain, port, heartbeat_timeout=1.1,
+                        command_timeout=0.2) as bridge:
         yield bridge
 
 

@@ -91,56 +91,54 @@ def test_what_the_node_keeps_itself_is_taken_back_with_a_refused_atomic_set(
     assert parameters.get('use_sim_time', 'brightness') == [False, 80.0]
 
 
-@pytest.mark.parametrize('atomically', [False, True])
 class TestInTime:
-    def set(self, parameters: Parameters, atomically: bool) -> tuple[bool, str, float]:
-        call = parameters.start_set(atomically=atomically, brightness=30.0)
-        response = call.result()
-        result = response.result if atomically else response.results[0]
-        return result.successful, result.reason, call.elapsed
-
+    @pytest.mark.parametrize('atomically', [False, True])
     def test_a_light_that_says_nothing(
         self, light: ServedLight, parameters: Parameters, atomically: bool,
     ) -> None:
         light.fake.results[CONFIGURE] = None
+        call = parameters.start_set(atomically=atomically, brightness=30.0)
 
-        successful, reason, elapsed = self.set(parameters, atomically)
+        response = call.result()
 
-        assert not successful
-        assert reason.startswith('no acknowledgement (')
-        assert elapsed < LIMIT
+        result = response.result if atomically else response.results[0]
+        assert not result.successful
+        assert result.reason.startswith('no acknowledgement (')
+        assert call.elapsed < LIMIT
         assert parameters.get('brightness') == [80.0]
 
     def test_a_light_that_goes_on_asking_for_patience(
-        self, light: ServedLight, parameters: Parameters, atomically: bool,
+        self, light: ServedLight, parameters: Parameters,
     ) -> None:
         light.fake.results[CONFIGURE] = MavResult.TEMPORARILY_REJECTED
+        call = parameters.start_set(brightness=30.0)
 
-        successful, reason, elapsed = self.set(parameters, atomically)
+        [result] = call.result().results
 
-        assert not successful
-        assert 'MAV_RESULT_TEMPORARILY_REJECTED' in reason
-        assert elapsed < LIMIT
+        assert not result.successful
+        assert 'MAV_RESULT_TEMPORARILY_REJECTED' in result.reason
+        assert call.elapsed < LIMIT
 
     def test_a_light_that_accepts_and_does_not_show_it(
-        self, light: ServedLight, parameters: Parameters, atomically: bool,
+        self, light: ServedLight, parameters: Parameters,
     ) -> None:
         light.fake.applies = False
+        call = parameters.start_set(brightness=30.0)
 
-        successful, reason, elapsed = self.set(parameters, atomically)
+        [result] = call.result().results
 
-        assert not successful
-        assert reason.startswith('brightness 30 % not confirmed: MAV_RESULT_ACCEPTED, but '
-                                 'ILLUMINATOR_STATUS shows brightness 80 %')
-        assert elapsed < LIMIT
+        assert not result.successful
+        assert result.reason.startswith(
+            'brightness 30 % not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows '
+            'brightness 80 %')
+        assert call.elapsed < LIMIT
         assert parameters.get('brightness') == [80.0]
 
     def test_two_sets_for_a_light_that_says_nothing(
-        self, light: ServedLight, parameters: Parameters, atomically: bool,
+        self, light: ServedLight, parameters: Parameters,
     ) -> None:
         light.fake.results[CONFIGURE] = None
-        calls = [parameters.start_set(atomically=atomically, brightness=value)
-                 for value in (30.0, 31.0)]
+        calls = [parameters.start_set(brightness=value) for value in (30.0, 31.0)]
 
         for call in calls:
             call.result()
