@@ -116,6 +116,15 @@ def test_a_client_is_new_with_its_first_good_frame(ours: OpenChannel, connect: C
     assert [ours.channel.heard(peer, 0.0), ours.channel.heard(peer, 0.0)] == [True, False]
 
 
+def test_nothing_is_kept_of_a_client_that_has_left(ours: OpenChannel, connect: Connect) -> None:
+    channel: Any = ours.channel
+    client = connect()
+    channel.heard(say(ours, client), 0.0)
+    client.close()
+    ours.turn(PATIENCE)
+    assert (len(channel._clients), len(channel._heard)) == (0, 0)
+
+
 def test_a_client_more_than_there_is_room_for_is_turned_away(
     ours: OpenChannel, connect: Connect,
 ) -> None:
