@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import dataclass
 import logging
@@ -319,15 +319,21 @@ class Link:
     def _flush(self) -> None:
         """Send what the endpoint has to say; without a channel it is said to nobody."""
         outgoing = self.endpoint.outgoing
-        while outgoing:
-            source, message = outgoing.popleft()
-            if self._channel is not None:
-                try:
-                    self._send(self._channel, source, message)
-                except OSError as error:
-                    self._lost(error)
+        while outgoing and self._channel is not None:
+            channel, now = self._channel, self.clock()
+            all_peers = channel.peers(now)
+            peers = self._routes.towards(outgoing[0][1], all_peers, now)
+            # What goes the same way goes together: its receiver is then woken only once.
+            frames = []
+            while outgoing and self._routes.towards(outgoing[0][1], all_peers, now) == peers:
+                frames.append(self._encode(*outgoing.popleft()))
+            try:
+                self._send(channel, frames, peers)
+            except OSError as error:
+                self._lost(error)
+        outgoing.clear()
 
-    def _send(self, channel: Channel, source: Source, message: Any) -> None:
+    def _encode(self, source: Source, message: Any) -> bytes:
         # Begun anywhere: two that were started together with one address are then told apart.
         sequence = self._sequences.get(source, random.randrange(256))
         self._sequences[source] = (sequence + 1) & 0xFF
@@ -336,14 +342,14 @@ class Link:
         frame = encode_frame(
             message.id, payload, sequence=sequence, source=source,
             crc_extra=message.crc_extra, signed=self._signing.signs)
-        if self._signing.signs:
-            frame = self._signing.sign(frame, self._wall_clock())
-        peers = self._routes.towards(message, channel.peers(self.clock()), self.clock())
+        return self._signing.sign(frame, self._wall_clock()) if self._signing.signs else frame
+
+    def _send(self, channel: Channel, frames: list[bytes], peers: Sequence[Peer]) -> None:
         dropped = channel.dropped
-        channel.send(frame, peers)
+        channel.send(frames, peers)
         self._traffic.frames_dropped += channel.dropped - dropped
-        self._traffic.frames_sent += len(peers)
-        self._traffic.bytes_sent += len(frame) * len(peers)
+        self._traffic.frames_sent += len(frames) * len(peers)
+        self._traffic.bytes_sent += sum(map(len, frames)) * len(peers)
 
     def _opened(self, channel: Channel, now: float) -> None:
         if self._stopping.is_set():
