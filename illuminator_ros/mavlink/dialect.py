@@ -221,6 +221,12 @@ LAYOUTS: dict[int, Layout] = {
     for id_, cls in {**_common.mavlink_map, **HANDLED}.items()
 }
 
+# The CRC_EXTRA of those that are not decoded, by the three bytes that hold the id in a frame.
+FOREIGN: dict[bytes, bytes] = {
+    id_.to_bytes(3, 'little'): bytes((layout.crc_extra,))
+    for id_, layout in LAYOUTS.items() if id_ not in HANDLED
+}
+
 
 def encode_payload(message: Any) -> bytes:
     """Return the payload of a message as it goes on the wire, trailing zeros not yet cut."""
