@@ -142,13 +142,14 @@ class Decoder:
         frames: list[Frame] = []
         position = end = 0
         signature_end = self._signature_end
-        if known and not signature_end:
-            position = end = self._pass_over(data, 0, known)
-            if end == len(data):
-                self._rest = b''
-                return frames
         while match := _START.search(data, position):
             start = match.start()
+            if known and start >= signature_end:
+                passed = self._pass_over(data, start, known)
+                if passed > start:
+                    self.counters.skipped_bytes += start - end
+                    position = end = passed
+                    continue
             found = self._read(data, start)
             if found is None:
                 if start < signature_end and self._is_frame(data, signature_end):
@@ -169,8 +170,6 @@ class Decoder:
                 within = data.find(STX_V2, end - SIGNATURE, end)
                 position = within if within >= 0 else end
                 signature_end = end
-            elif known:
-                position = end = self._pass_over(data, end, known)
         else:
             start = len(data)
         self.counters.frames += len(frames)

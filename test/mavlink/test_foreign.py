@@ -54,6 +54,13 @@ def test_what_is_handled_comes_through_between_them() -> None:
     assert ([frame.sequence for frame in found], counted) == ([4], [3, 5])
 
 
+@pytest.mark.parametrize('before', [
+    b'noise', b'\xfd\xfd', raw_v2(12345, b'\1' * 20, crc_extra=0), foreign_frame()[:20]],
+    ids=['noise', 'start bytes', 'unknown message', 'cut frame'])
+def test_they_are_passed_over_behind_anything(before: bytes) -> None:
+    assert pass_over(before + foreign_frame(3) + bytes(300)) == ([], [3])
+
+
 @pytest.mark.parametrize('frame', [
     foreign_frame(source=Source(8, 1)),
     raw_v1(30, bytes(28), source=AUTOPILOT),
