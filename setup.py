@@ -21,6 +21,12 @@ package_name = 'illuminator_ros'
 version = re.search(
     r"__version__ = '(.+)'", Path(package_name, '__init__.py').read_text()).group(1)
 
+
+def files(folder: str) -> list[str]:
+    """Return the files that lie in a folder."""
+    return sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+
+
 setup(
     name=package_name,
     version=version,
@@ -29,7 +35,8 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
-        (f'share/{package_name}/config', [str(path) for path in Path('config').glob('*.yaml')]),
+        *((f'share/{package_name}/{folder}', files(folder))
+          for folder in ('config', 'config/sros2', 'launch')),
     ],
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
