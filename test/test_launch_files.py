@@ -88,6 +88,18 @@ def test_elements_and_attributes_are_known(launch: ET.Element) -> None:
             assert not (child.text or '').strip()
 
 
+@pytest.mark.parametrize('name', FILES)
+def test_launch_itself_reads_the_file(name: str) -> None:
+    frontend = pytest.importorskip('launch.frontend', reason='launch comes with ROS only')
+    for plugin in ('launch_xml', 'launch_ros'):
+        pytest.importorskip(plugin, reason='launch comes with ROS only')
+
+    root, parser = frontend.Parser.load(str(ROOT / 'launch' / name))
+    arguments = parser.parse_description(root).get_launch_arguments()
+
+    assert [argument.name for argument in arguments] == declared(FILES[name])
+
+
 @EVERY
 def test_each_argument_is_described(launch: ET.Element) -> None:
     assert declared(launch)
