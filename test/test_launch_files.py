@@ -79,6 +79,14 @@ def test_there_are_launch_files() -> None:
 
 
 @EVERY
+def test_the_namespace_of_a_group_holds_where_none_is_given(launch: ET.Element) -> None:
+    """One that begins with a slash, such as / itself, would not be put into the group's."""
+    [namespace] = [argument for argument in launch.findall('arg')
+                   if argument.attrib['name'] == 'namespace']
+    assert namespace.attrib['default'] == ''
+
+
+@EVERY
 def test_elements_and_attributes_are_known(launch: ET.Element) -> None:
     assert (launch.tag, launch.attrib) == ('launch', {})
     for parent in launch.iter():
