@@ -41,7 +41,7 @@ def opens(ros: Ros, port: int, *arguments: str) -> None:
     """Run a bridge until it has opened this port."""
     with ended(python('illuminator_ros.bridge', '--ros-args', *arguments,
                       env={'ROS_DOMAIN_ID': str(ros.domain)})) as bridge:
-        bridge.wait_for(f'link open: udp 127.0.0.1:{port}')
+        bridge.wait_for(f'link open: udp 127.0.0.1:{port}', 30.0)
 
 
 @pytest.mark.parametrize('sections', [(ALL,), (FULL,), (SHORT,), (ALL, FULL), (FULL, ALL)],
