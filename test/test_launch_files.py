@@ -79,6 +79,14 @@ def test_there_are_launch_files() -> None:
 
 
 @EVERY
+def test_the_namespace_of_a_group_holds_where_none_is_given(launch: ET.Element) -> None:
+    """One that begins with a slash, such as / itself, would not be put into the group's."""
+    [namespace] = [argument for argument in launch.findall('arg')
+                   if argument.attrib['name'] == 'namespace']
+    assert namespace.attrib['default'] == ''
+
+
+@EVERY
 def test_elements_and_attributes_are_known(launch: ET.Element) -> None:
     assert (launch.tag, launch.attrib) == ('launch', {})
     for parent in launch.iter():
@@ -86,6 +94,18 @@ def test_elements_and_attributes_are_known(launch: ET.Element) -> None:
             needed, possible = ELEMENTS[f'{parent.tag}/{child.tag}']
             assert needed <= child.attrib.keys() <= needed | possible, child.attrib
             assert not (child.text or '').strip()
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_launch_itself_reads_the_file(name: str) -> None:
+    frontend = pytest.importorskip('launch.frontend', reason='launch comes with ROS only')
+    for plugin in ('launch_xml', 'launch_ros'):
+        pytest.importorskip(plugin, reason='launch comes with ROS only')
+
+    root, parser = frontend.Parser.load(str(ROOT / 'launch' / name))
+    arguments = parser.parse_description(root).get_launch_arguments()
+
+    assert [argument.name for argument in arguments] == declared(FILES[name])
 
 
 @EVERY

@@ -56,7 +56,7 @@ def test_all_that_a_bridge_with_two_lights_publishes_is_found(own_ros: Ros) -> N
         for node in ('illuminator', 'illuminator_1_244'):
             array = recorder.wait(lambda array, node=node: [
                 status.name for status in array.status] == [f'{node}: link', f'{node}: lamp'],
-                10.0)
+                30.0)
             names |= {status.name for status in array.status}
 
     assert len(names) == 4

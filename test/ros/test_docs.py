@@ -93,6 +93,13 @@ def test_yaml_mentions_each_parameter_of_the_light() -> None:
 
 
 @pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)
+def test_yaml_tells_the_unit(spec: ParameterSpec) -> None:
+    text = (ROOT / 'config' / 'bridge.yaml').read_text()
+    assert re.search(rf'^    (# )?{spec.name}: .+ # {re.escape(spec.unit)}(,|$)', text,
+                     re.MULTILINE) or not spec.unit
+
+
+@pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)
 def test_help_has_each_parameter(spec: Any) -> None:
     assert re.search(rf'^  {spec.name} +.*{re.escape(spec.description)}', usage(), re.MULTILINE)
 

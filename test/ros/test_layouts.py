@@ -135,7 +135,7 @@ def test_plotjuggler_plots_diagnostics_that_the_demonstration_publishes(
               if name.startswith('/diagnostics/')]
     assert {curve.rpartition('/illuminator: ')[0] for curve in curves} == {url, serial}
     published = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait(
-        lambda array: len(array.status) == 2)
+        lambda array: len(array.status) == 2, 30.0)
     known = {f'{status.name}/{key}' for status in published.status
              for key in ['level', *(value.key for value in status.values)]}
     assert {'illuminator: ' + curve.rpartition('/illuminator: ')[2] for curve in curves} <= known

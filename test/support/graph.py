@@ -59,5 +59,5 @@ def interface(ros: Ros, node: str = 'illuminator', last: Sequence[str] = LAST) -
                       for lookup in lookups]
         return Interface(*parts) if set(last) <= set().union(*parts) else None
 
-    found_interface: Interface = eventually(found, 10.0)
+    found_interface: Interface = eventually(found, 30.0)
     return found_interface
