@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any, TypeVar
 
+from .describe import command_name, describe, status_text
 from ..illuminator.model import Configuration, DIMMING_FLAGS, Mode, NOTHING, Status
 from ..mavlink.dialect import (
     CommandAck,
@@ -44,7 +45,6 @@ from ..mavlink.dialect import (
 )
 from ..mavlink.endpoint import Endpoint
 from ..mavlink.endpoint import Heartbeat as HeartbeatTimer
-from .describe import command_name, describe, status_text
 
 # s. The developer guide's own tests wait 3 s for an acknowledgement.
 ACK_TIMEOUT = 3.0

@@ -22,9 +22,9 @@ import json
 from typing import Any
 from xml.etree import ElementTree
 
-from .. import __version__
 from .requirement import HEARTBEAT, Requirement, Result, Verdict
 from .requirements import REQUIREMENTS
+from .. import __version__
 
 # Lines of the exchange that a table shows; the files have more.
 SHOWN_LINES = 12

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from ..mavlink.dialect import MavResult, MavType
 from .behaviour import Behaviour
 from .model import ErrorFlag
+from ..mavlink.dialect import MavResult, MavType
 
 
 class FaultError(ValueError):

@@ -20,8 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
-from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 from .agreement import Agreement
 from .identification import Identification
 from .model import ErrorFlag, Identity, Limits, Status
@@ -30,6 +28,8 @@ from .operation import Done, Enable, OperationQueue, Result
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
+from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
+from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 
 # s without a status after which the light is asked for one, and between the askings.
 STATUS_TIMEOUT = 2.5

@@ -29,9 +29,9 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any, TYPE_CHECKING
 
+from .model import Configuration, DIMMING_FLAGS, flag_names, Mode, Status
 from ..mavlink.command import Command, Ending, format_seconds, Outcome
 from ..mavlink.dialect import MavCmd, MavResult
-from .model import Configuration, DIMMING_FLAGS, flag_names, Mode, Status
 
 if TYPE_CHECKING:
     from .light import Light

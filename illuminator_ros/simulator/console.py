@@ -19,11 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from .view import glance
 from ..illuminator.device import Device
 from ..illuminator.faults import active, FaultError, FAULTS, with_fault, without_fault
 from ..illuminator.faults import describe as describe_faults
 from ..illuminator.model import InvalidValue
-from .view import glance
 
 
 class _Wrong(ValueError):

@@ -20,13 +20,12 @@ import itertools
 import threading
 from types import SimpleNamespace
 
-import pytest
-
 from illuminator_ros.mavlink import opener
 from illuminator_ros.mavlink.opener import Backoff, Opener
 from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
 from illuminator_ros.mavlink.url import MemoryUrl, Url
+import pytest
 
 
 def pauses(count: int, *, jitter: float = 1.0, spent: float = 0.0) -> list[float]:

@@ -22,10 +22,6 @@ from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-from support.frames import frame_of
-from support.signers import checker, LAST_STAMP, NOW, stamp_at
-
 from illuminator_ros.mavlink.signing import NEW_STREAM_TICKS, Signing, TICKS_PER_SECOND
 from illuminator_ros.mavlink.signing_files import (
     KeyFileError,
@@ -33,6 +29,9 @@ from illuminator_ros.mavlink.signing_files import (
     MAX_KEY_FILE,
     TimestampStore,
 )
+import pytest
+from support.frames import frame_of
+from support.signers import checker, LAST_STAMP, NOW, stamp_at
 
 RAW = bytes(range(100, 132))
 PASSPHRASE = 'correct horse battery staple'

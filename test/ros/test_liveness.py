@@ -19,14 +19,13 @@ import random
 import socket
 import time
 
+from illuminator_ros.mavlink.dialect import heartbeat
 import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 from support.light import ServedLight, Source
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
-
-from illuminator_ros.mavlink.dialect import heartbeat
 
 AUTOPILOT = 2
 # s; DESIGN.md, 3.4.

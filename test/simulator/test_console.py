@@ -14,13 +14,12 @@
 
 """What can be done to simulated lights while they run."""
 
-import pytest
-
 from illuminator_ros.illuminator.device import DeviceProperties, Devices
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.mavlink.dialect import IlluminatorStatus, Source
 from illuminator_ros.simulator.console import COMMANDS, describe_commands, execute
+import pytest
 
 
 class Bench:

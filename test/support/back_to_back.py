@@ -20,9 +20,6 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from support.faulty_wire import Faults, FaultyWire
-from support.records import Answer, Recorder
-
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
 from illuminator_ros.illuminator.light import Light, Settings
@@ -39,6 +36,8 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.mavlink.endpoint import Endpoint
 from illuminator_ros.mavlink.framing import Decoder, encode_frame
+from support.faulty_wire import Faults, FaultyWire
+from support.records import Answer, Recorder
 
 BRIDGE = Source(1, 194)
 ONE_LIGHT = (DeviceProperties(),)

@@ -19,12 +19,11 @@ import re
 import subprocess
 import sys
 
-import pytest
-from support.processes import environment, ROOT, run
-
 from illuminator_ros import __version__
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 from illuminator_ros.simulator.options import parser
+import pytest
+from support.processes import environment, ROOT, run
 
 BRIDGE, SIMULATOR = 'illuminator_ros.bridge', 'illuminator_ros.simulator'
 

@@ -22,11 +22,10 @@ import socket
 import struct
 from typing import Any
 
-import pytest
-from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
-
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel, tcp
 from illuminator_ros.mavlink.url import parse_url
+import pytest
+from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
 
 OpenFunction = Callable[[str], OpenChannel]
 

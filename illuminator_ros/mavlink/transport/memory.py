@@ -22,8 +22,8 @@ import socket
 import threading
 from typing import Any
 
-from ..url import MemoryUrl
 from .base import Channel, Peer
+from ..url import MemoryUrl
 
 _hub: dict[str, list[_MemoryChannel]] = {}
 _lock = threading.Lock()

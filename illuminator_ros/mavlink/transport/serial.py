@@ -24,8 +24,8 @@ import selectors
 import termios
 from typing import Any, TYPE_CHECKING
 
-from ..url import SerialUrl
 from .base import Channel, ChannelLost, FrameQueue, Peer
+from ..url import SerialUrl
 
 if TYPE_CHECKING:
     from serial import Serial
