@@ -54,7 +54,7 @@ class Report:
 
     @property
     def summary(self) -> str:
-        """The last line."""
+        """Return the last line."""
         return (f'{self.count(Verdict.PASS)} passed, {self.count(Verdict.FAIL)} failed, '
                 f'{self.count(Verdict.SKIPPED)} skipped in {self.seconds:.0f} s; '
                 f'{self.restored}')

@@ -182,7 +182,7 @@ class Device:
 
     @property
     def source(self) -> Source:
-        """The address of the light."""
+        """Return the address of the light."""
         return self.properties.source
 
     def addressed(self, message: Any) -> bool:

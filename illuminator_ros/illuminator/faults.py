@@ -97,7 +97,7 @@ class Fault:
 
     @property
     def default_text(self) -> str:
-        """The value where none is given, for people; '' where there is none."""
+        """Return the value where none is given, for people; '' where there is none."""
         if self.read is None:
             return ''
         if isinstance(self.default, MavResult):

@@ -173,12 +173,12 @@ class Light:
 
     @property
     def limits(self) -> Limits:
-        """The strobe periods that the light reports to be possible."""
+        """Return the strobe periods that the light reports to be possible."""
         return self.status.limits if self.status else Limits()
 
     @property
     def temperature(self) -> float | None:
-        """The temperature, degC; None where the light does not measure it, or its sensor fails."""
+        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
         status = self.status
         if (status is None or not self.measures_temperature
                 or status.error_flags & ErrorFlag.THERMISTOR_FAILURE):

@@ -111,7 +111,7 @@ class Operation(ABC):
     @property
     @abstractmethod
     def wish(self) -> str:
-        """What the light is to become, for people."""
+        """Return what the light is to become, for people."""
 
     @abstractmethod
     def found(self, status: Status) -> str:
@@ -352,7 +352,7 @@ class OperationQueue:
 
     @property
     def current(self) -> Operation | None:
-        """The change that is on its way."""
+        """Return the change that is on its way."""
         return self._operations[0] if self._operations else None
 
     def submit(self, operation: Operation, now: float) -> None:

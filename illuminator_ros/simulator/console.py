@@ -33,7 +33,7 @@ class _Wrong(ValueError):
 @dataclass(frozen=True)
 class _Command:
     usage: str
-    help: str
+    help: str  # noqa: A003
     do: Callable[[Device, list[str], float], str]
     counts: tuple[int, ...]
 
@@ -172,5 +172,3 @@ def execute(line: str, devices: Sequence[Device], now: float) -> str:
     except (_Wrong, FaultError, InvalidValue) as error:
         return str(error)
     return '\n'.join(filter(None, answers)) or 'done'
-
-

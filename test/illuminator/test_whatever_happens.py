@@ -91,7 +91,7 @@ class Chaos:
         self.pair.close()
         self.is_open = False
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         if not self.is_open:
             self.pair.open()
             self.is_open = True

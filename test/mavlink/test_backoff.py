@@ -94,6 +94,7 @@ def test_the_time_that_a_try_takes_counts(monkeypatch: pytest.MonkeyPatch) -> No
     now, spent, ended = [0.0], [], threading.Event()
 
     class Recorded(Backoff):
+
         def pause(self, seconds: float) -> float:
             spent.append(seconds)
             if len(spent) > 2:

@@ -139,8 +139,8 @@ def test_impossible_path_is_refused() -> None:
 
 
 @given(st.one_of(
-    st.binary(max_size=80), st.text(max_size=80).map(str.encode), st.binary(min_size=32,
-                                                                           max_size=32)))
+    st.binary(max_size=80), st.text(max_size=80).map(str.encode),
+    st.binary(min_size=32, max_size=32)))
 @settings(derandomize=True, deadline=None, max_examples=200)
 def test_any_content_is_a_key_of_32_bytes_or_refused_without_showing_it(
         tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:

@@ -141,6 +141,7 @@ class TestLink:
 
 
 class TestWhatIsALight:
+
     def test_one_that_sends_only_heartbeats(self, port: int, bridge: Program) -> None:
         light = ServedLight(port, stream=0.0)
         light.fake.pushes = False

@@ -120,17 +120,17 @@ class Pair:
 
     @property
     def light(self) -> Light:
-        """The light that the controller has found first."""
+        """Return the light that the controller has found first."""
         return next(iter(self.controller.lights.values()))
 
     @property
     def recorder(self) -> Recorder:
-        """What the observer of that light was told."""
+        """Return what the observer of that light was told."""
         return self.recorders[self.light.source]
 
     @property
     def device(self) -> Device:
-        """The first simulated light."""
+        """Return the first simulated light."""
         assert isinstance(self.other, Devices)
         return self.other.devices[0]
 
@@ -189,7 +189,7 @@ class Pair:
         for end in (self.near, self.far):
             end.wire.faults = Faults()
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         """Open the line."""
         self._switch(is_open=True)
         self.controller.link_opened(self.now)

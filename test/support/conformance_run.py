@@ -62,7 +62,7 @@ class Run:
 
     @property
     def failed(self) -> set[str]:
-        """The names of the requirements that the light does not meet."""
+        """Return the names of the requirements that the light does not meet."""
         return self.names(Verdict.FAIL)
 
     def result(self, name: str):

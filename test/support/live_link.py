@@ -134,6 +134,7 @@ class Lights(LiveLink):
 
 
 class _Watcher(LightObserver):
+
     def __init__(self, log: Log[tuple[str, Light]]) -> None:
         self._log = log
 

@@ -186,7 +186,7 @@ class BridgeSiege(Siege):
 
     @property
     def controller(self) -> Controller:
-        """What is attacked."""
+        """Return what is attacked."""
         controller: Controller = self.link.endpoint
         return controller
 

@@ -101,7 +101,7 @@ class Request:
 
     @property
     def message(self) -> str:
-        """What the answer says."""
+        """Return what the answer says."""
         return self.answer.result.message
 
 

@@ -139,6 +139,7 @@ def record_pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
     pauses: Log[float] = Log()
 
     class Recorded(opener.Backoff):
+
         def __init__(self) -> None:
             super().__init__(lambda: 1.0)
 

@@ -209,6 +209,7 @@ def test_time_stamps_of_signing_that_cannot_be_stored_do_not_end_the_link(
     run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture, reason: Exception,
 ) -> None:
     class Store:
+
         def store(self, timestamp: int, *, last: bool = False) -> None:
             raise reason
 

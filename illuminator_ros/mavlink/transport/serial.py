@@ -62,6 +62,7 @@ def open_serial(url: SerialUrl) -> Channel:
 
 
 class _SerialChannel(Channel):
+
     def __init__(self, port: Serial, url: SerialUrl) -> None:
         self._port = port
         self._fd: int = port.fileno()
