@@ -36,8 +36,7 @@ setup(
         'serial': ['pyserial>=3.5'],
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
-        'test': ['pytest>=7.4', 'pytest-timeout>=2.2', 'hypothesis>=6.98', 'pyyaml>=5.4',
-                 'pyserial>=3.5'],
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
