@@ -38,6 +38,10 @@ KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
         'serial': 'python3-serial', 'yaml': 'python3-yaml',
         'catkin_pkg': 'python3-catkin-pkg-modules'}
 
+pytestmark = pytest.mark.timeout(300)
+# Extras, which whoever wants them installs.
+OPTIONAL = {'rich', 'textual'}
+
 
 def imported(folder: Path) -> set[str]:
     """Return the modules that the Python files of a folder import, of whatever package."""
@@ -48,12 +52,12 @@ def imported(folder: Path) -> set[str]:
                 names |= {alias.name.partition('.')[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 names.add(str(node.module).partition('.')[0])
-    return names - sys.stdlib_module_names
+    return names - sys.stdlib_module_names - OPTIONAL
 
 
 def output(folder: Path, *arguments: str) -> str:
     """Return what Python prints in a folder."""
-    return subprocess.run([sys.executable, *arguments], cwd=folder, text=True, timeout=50,
+    return subprocess.run([sys.executable, *arguments], cwd=folder, text=True, timeout=120,
                           capture_output=True, check=True).stdout.strip()
 
 

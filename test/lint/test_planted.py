@@ -21,6 +21,7 @@ import sys
 import pytest
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.timeout(300)
 PROPERTY = '''class Light:
     """A light."""
 
@@ -66,7 +67,7 @@ def found(linter: str, folder: Path, sources: dict[str, str]) -> str:
         (folder / f'planted_{code.lower()}.py').write_text(source)
     outcome = subprocess.run(
         [sys.executable, '-m', f'ament_{linter}.main', '.'], cwd=folder, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=50)
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=120)
     assert outcome.returncode == 1, outcome.stdout
     return outcome.stdout
 
@@ -103,6 +104,6 @@ def test_ruff_finds(code: str) -> None:
     outcome = subprocess.run(
         [sys.executable, '-m', 'ruff', 'check', '--no-cache', '--output-format=concise',
          '--stdin-filename', 'planted.py', '-'],
-        cwd=ROOT, input=FLAKE8[code], text=True, capture_output=True, timeout=30)
+        cwd=ROOT, input=FLAKE8[code], text=True, capture_output=True, timeout=120)
 
     assert f' {RUFF[code]} ' in outcome.stdout
