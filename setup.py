@@ -13,13 +13,10 @@
 # limitations under the License.
 
 from pathlib import Path
-import re
 
 from setuptools import find_packages, setup
 
 package_name = 'illuminator_ros'
-version = re.search(
-    r"__version__ = '(.+)'", Path(package_name, '__init__.py').read_text()).group(1)
 
 
 def files(folder: str) -> list[str]:
@@ -29,7 +26,8 @@ def files(folder: str) -> list[str]:
 
 setup(
     name=package_name,
-    version=version,
+    # With package.xml's set by catkin_prepare_release, which wants it written here in full.
+    version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
     package_data={package_name: ['py.typed']},
     data_files=[
@@ -41,7 +39,12 @@ setup(
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
-    extras_require={'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4']},
+    extras_require={
+        'serial': ['pyserial>=3.5'],
+        'yaml': ['pyyaml>=5.4'],
+        # "colcon test" looks here for pytest.
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml'],
+    },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',

@@ -22,12 +22,11 @@ from pathlib import Path
 import re
 import xml.etree.ElementTree as ET
 
-import pytest
-import yaml
-
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 from illuminator_ros.simulator.options import parser
+import pytest
+import yaml
 
 ROOT = Path(__file__).parents[1]
 FILES = {path.name: ET.parse(path).getroot()

@@ -86,7 +86,7 @@ class ThermalModel:
 
     @property
     def reading(self) -> float:
-        """The temperature as the light reports it, degC."""
+        """Return the temperature as the light reports it, degC."""
         return BROKEN_READING if self._sensor_failed else self.temperature
 
     @property

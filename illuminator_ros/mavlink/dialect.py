@@ -100,7 +100,7 @@ def result_name(result: int) -> str:
 
 class _Field(NamedTuple):
     name: str
-    type: str
+    type: str  # noqa: A003
     code: str
     units: str = ''
     enum: str = ''
@@ -205,7 +205,6 @@ HANDLED: dict[int, Any] = {
         Heartbeat, CommandInt, CommandLong, CommandAck, IlluminatorStatus,
         ComponentInformationBasic)
 }
-
 
 
 class Layout(NamedTuple):

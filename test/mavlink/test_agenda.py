@@ -18,7 +18,6 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from illuminator_ros.mavlink.agenda import Agenda
 
 TIMES = st.integers(0, 20)

@@ -16,9 +16,8 @@
 
 from __future__ import annotations
 
-import pytest
-
 from illuminator_ros.mavlink.crowd import COLLECTION, Crowd, HURRY
+import pytest
 
 
 @pytest.fixture

@@ -21,14 +21,13 @@ from collections.abc import Callable
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-from support.frames import AUTOPILOT, foreign_frame, frame_of, LIGHT, raw_v1, raw_v2, spoilt
-from support.heartbeats import heartbeat_frame
-
 from illuminator_ros.mavlink.dialect import FOREIGN, HANDLED, LAYOUTS, Source
 from illuminator_ros.mavlink.framing import Decoder, DecoderCounters, FLAG_SIGNED, Frame
 from illuminator_ros.mavlink.reception import Reception, RENEWAL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
+import pytest
+from support.frames import AUTOPILOT, foreign_frame, frame_of, LIGHT, raw_v1, raw_v2, spoilt
+from support.heartbeats import heartbeat_frame
 
 UNIX = 1.7e9
 

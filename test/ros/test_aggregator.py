@@ -19,12 +19,11 @@ import re
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from support.light import free_port, ServedLight, Source
 from support.ros import Ros, running_bridge, STREAM
 import yaml
-
-from illuminator_ros.ros.parameters import LINK_PARAMETERS
 
 FILE = Path(__file__).parents[2] / 'config' / 'diagnostics_aggregator.yaml'
 LIGHTS = yaml.safe_load(FILE.read_text())['/**']['ros__parameters']['lights']

@@ -19,9 +19,6 @@ from pathlib import Path
 import re
 from typing import Any
 
-import pytest
-import yaml
-
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.ros import beam, beam_output, mounting
@@ -32,6 +29,8 @@ from illuminator_ros.ros.parameters import (
     LINK_PARAMETERS,
     ParameterSpec,
 )
+import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / 'README.md').read_text()

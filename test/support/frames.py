@@ -19,10 +19,9 @@ from __future__ import annotations
 from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
-from support.messages import STATUS
-
 from illuminator_ros.mavlink.dialect import encode_payload, LAYOUTS, Source
 from illuminator_ros.mavlink.framing import Decoder, encode_frame, Frame
+from support.messages import STATUS
 
 LIGHT = Source(1, 243)
 AUTOPILOT = Source(7, 1)

@@ -25,8 +25,6 @@ import time
 from types import TracebackType
 from typing import Any
 
-from support.fake_light import FakeLight
-
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,
@@ -38,6 +36,7 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
+from support.fake_light import FakeLight
 
 LIGHT = Source(1, 243)
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE

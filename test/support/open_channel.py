@@ -21,9 +21,8 @@ import socket
 import time
 from typing import Any
 
-from support.waiting import PATIENCE
-
 from illuminator_ros.mavlink.transport import Channel
+from support.waiting import PATIENCE
 
 
 class OpenChannel:

@@ -18,15 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from illuminator_ros.mavlink.crowd import COLLECTION
+from illuminator_ros.mavlink.dialect import CommandLong
+from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
 from support.frames import AUTOPILOT, foreign_frame, LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Talker
 from support.simulated_link import SimulatedLink
-
-from illuminator_ros.mavlink.crowd import COLLECTION
-from illuminator_ros.mavlink.dialect import CommandLong
-from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 
 PEER = ('127.0.0.1', 14550)
 COMMAND = CommandLong(*LIGHT, 512, 0, 440, 0, 0, 0, 0, 0, 0)

@@ -23,12 +23,11 @@ import socket
 import struct
 from typing import Any
 
+from illuminator_ros.mavlink.transport import ChannelLost
+from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 import pytest
 from support.open_channel import free_port, OpenChannel
 from support.waiting import PATIENCE
-
-from illuminator_ros.mavlink.transport import ChannelLost
-from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 
 
 @pytest.fixture

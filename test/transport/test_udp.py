@@ -21,12 +21,11 @@ import errno
 import socket
 from typing import Any
 
-import pytest
-from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
-
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM
 from illuminator_ros.mavlink.url import Address, UdpUrl
+import pytest
+from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
 
 OpenFunction = Callable[[str | UdpUrl], OpenChannel]
 

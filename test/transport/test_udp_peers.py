@@ -20,16 +20,15 @@ from collections.abc import Callable
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
+from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
+from illuminator_ros.mavlink.url import Address, UdpUrl
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink
 from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
-
-from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
-from illuminator_ros.mavlink.framing import Decoder
-from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
-from illuminator_ros.mavlink.url import Address, UdpUrl
 
 COMMAND = CommandLong(*LIGHT, 512, 0, 440, 0, 0, 0, 0, 0, 0)
 MARK = heartbeat(18)

@@ -24,8 +24,8 @@ import selectors
 import termios
 from typing import Any, TYPE_CHECKING
 
-from ..url import SerialUrl
 from .base import Channel, ChannelLost, FrameQueue, Peer
+from ..url import SerialUrl
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -62,6 +62,7 @@ def open_serial(url: SerialUrl) -> Channel:
 
 
 class _SerialChannel(Channel):
+
     def __init__(self, port: Serial, url: SerialUrl) -> None:
         self._port = port
         self._fd: int = port.fileno()

@@ -24,9 +24,9 @@ import selectors
 import socket
 from typing import Any
 
-from ..url import Address
 from .base import Channel, ChannelLost, FrameQueue, MAX_QUEUED, Peer
 from .resolve import resolve
+from ..url import Address
 
 # s over all addresses of a name; the link must be back within 1 s of the other side.
 CONNECT_TIMEOUT = 0.8

@@ -24,9 +24,9 @@ import selectors
 import socket
 from typing import Any
 
-from ..url import Address, UdpUrl
 from .base import Channel, ChannelLost, Peer
 from .resolve import resolve
+from ..url import Address, UdpUrl
 
 # Peers that a listening socket sends to. A new one is not let in over a live one.
 MAX_PEERS = 32
