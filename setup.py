@@ -18,6 +18,12 @@ from setuptools import find_packages, setup
 
 package_name = 'illuminator_ros'
 
+
+def files(folder: str) -> list[str]:
+    """Return the files that lie in a folder."""
+    return sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+
+
 setup(
     name=package_name,
     # With package.xml's set by catkin_prepare_release, which wants it written here in full.
@@ -27,7 +33,8 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
-        (f'share/{package_name}/config', [str(path) for path in Path('config').glob('*.yaml')]),
+        *((f'share/{package_name}/{folder}', files(folder))
+          for folder in ('config', 'config/sros2', 'launch')),
     ],
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.

@@ -26,6 +26,7 @@ _REMEDIES = {
     'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
     'pymavlink': 'pip install pymavlink',
     'fastcrc': 'pip install fastcrc',
+    'visualization_msgs': 'sudo apt install ros-jazzy-visualization-msgs',
 }
 
 

@@ -27,7 +27,7 @@ PACKAGE = 'illuminator_ros'
 # From the bottom to the top; a module may import from its own layer and from those below.
 LAYERS = ('mavlink', 'illuminator', 'ros', '')
 ROS = {'rclpy', 'rcl_interfaces', 'std_msgs', 'std_srvs', 'sensor_msgs', 'diagnostic_msgs',
-       'ament_index_python'}
+       'geometry_msgs', 'visualization_msgs', 'ament_index_python'}
 IO = {'socket', 'selectors', 'select', 'serial', 'asyncio', 'subprocess', 'os', 'io', 'pathlib'}
 TIME = {'time', 'datetime'}
 THREADS = {'threading', 'queue', 'multiprocessing', 'concurrent'}

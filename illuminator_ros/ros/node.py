@@ -22,6 +22,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from .beam_output import BeamOutput
 from .diagnostics import (
     hardware_id,
     lamp_findings,
@@ -32,6 +33,7 @@ from .diagnostics import (
     why_nothing_is_heard,
 )
 from .inputs import Inputs
+from .mounting import Mounting
 from .outputs import Outputs, STREAM_QOS
 from .parameters import declare_device_parameters, misspelt
 from ..illuminator.controller import Controller
@@ -61,7 +63,7 @@ class IlluminatorNode(Node):
         self._publishing = threading.Lock()
 
     def serve(
-        self, link: Link, controller: Controller, *, url: str, frame_id: str, period: float,
+        self, link: Link, controller: Controller, *, url: str, mounting: Mounting, period: float,
     ) -> None:
         """
         Create what the node offers.
@@ -77,7 +79,8 @@ class IlluminatorNode(Node):
         self._overrides = declare_device_parameters(self)
         for warning in misspelt(self):
             self.get_logger().warning(warning)
-        self.outputs = Outputs(self, frame_id, self._check_lamp)
+        self._beam = BeamOutput(self, mounting, link.clock) if mounting.beam_range else None
+        self.outputs = Outputs(self, mounting.frame_id, self._check_lamp, self._beam)
         self.inputs = Inputs(self, link, lambda: self.light, self.absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._period = period
@@ -91,6 +94,11 @@ class IlluminatorNode(Node):
         self.outputs.catch_up(light)
         if self._overrides:
             light.agreement.want(self._overrides, now)
+
+    def end(self) -> None:
+        """Take back what others would go on to show, after the executor has ended."""
+        if self._beam is not None:
+            self._beam.end()
 
     def absence(self) -> str:
         """Return why there is no light, for people."""

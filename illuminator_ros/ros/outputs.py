@@ -45,10 +45,15 @@ class Outputs(LightObserver):
     Publishes what one light reports, from the link's thread: there is no hop in between.
 
     :param changed: called after anything that diagnostics might have to tell at once.
+    :param beam: who also is told what to show, if anybody is.
     """
 
-    def __init__(self, node: Node, frame_id: str, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, node: Node, frame_id: str, changed: Callable[[], None],
+        beam: LightObserver | None = None,
+    ) -> None:
         self._node = node
+        self._beam = beam or LightObserver()
         self._frame_id = frame_id
         self._changed = changed
         self._publishers = {name: node.create_publisher(type_, f'~/{name}', STATE_QOS)
@@ -86,6 +91,7 @@ class Outputs(LightObserver):
         """See :meth:`LightObserver.lost`."""
         self._node.get_logger().warning(f'light {light.source} lost: {reason}')
         self._connected.publish(Bool(data=False))
+        self._beam.lost(light, reason)
         self._changed()
 
     def restarted(self, light: Light) -> None:
@@ -121,6 +127,7 @@ class Outputs(LightObserver):
         if status.limits != self._limits:
             self._limits = status.limits
             self._fit()
+        self._beam.status(light, status)
         self._changed()
 
     def configured(

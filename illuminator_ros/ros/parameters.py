@@ -124,7 +124,11 @@ LINK_PARAMETERS = (
     ParameterSpec('command_retries', 3, 'resends of an unacknowledged command', low=0, high=20),
     ParameterSpec('status_interval', 0.0, "period of the light's status; 0 = its own", 's', 0.0,
                   3600.0),
-    ParameterSpec('frame_id', 'illuminator', 'frame of the temperature'),
+    ParameterSpec('frame_id', 'illuminator', 'frame of temperature and beam'),
+    ParameterSpec('beam_range', 0.0, 'length of the cone on ~/beam; 0 = no ~/beam', 'm', 0.0,
+                  10_000.0),
+    ParameterSpec('beam_angle', 0.5, 'full opening angle of the cone on ~/beam', 'rad', 0.01,
+                  3.0),
     ParameterSpec('diagnostics_period', 1.0, 'period of /diagnostics', 's', 0.1, 60.0),
     ParameterSpec('off_on_shutdown', False, 'switch the light off when the node ends'),
     ParameterSpec('restore_configuration', True,
@@ -164,6 +168,8 @@ class LinkParameters:
     signing_key_file: str
     connection_url: str
     frame_id: str
+    beam_range: float
+    beam_angle: float
     diagnostics_period: float
 
 
@@ -173,12 +179,7 @@ def declare_link_parameters(node: Node) -> LinkParameters:
 
     :raises ParameterError: if one is wrong.
     """
-    values = {}
-    for spec in LINK_PARAMETERS:
-        override = take_override(node, spec.name)
-        values[spec.name] = value = spec.check(spec.default if override is None else override)
-        node.declare_parameter(
-            spec.name, value, spec.descriptor(read_only=True), ignore_override=True)
+    values = {spec.name: declare_read_only(node, spec, spec.default) for spec in LINK_PARAMETERS}
     try:
         url = parse_url(values['connection_url'])
     except UrlError as error:
@@ -191,7 +192,20 @@ def declare_link_parameters(node: Node) -> LinkParameters:
         **{name: values[name] for name in (
             'only_target', 'heartbeat_timeout', 'command_timeout', 'command_retries',
             'status_interval', 'off_on_shutdown', 'restore_configuration', 'signing_key_file',
-            'connection_url', 'frame_id', 'diagnostics_period')})
+            'connection_url', 'frame_id', 'beam_range', 'beam_angle', 'diagnostics_period')})
+
+
+def declare_read_only(node: Node, spec: ParameterSpec, otherwise: Any) -> Any:
+    """
+    Declare a parameter as it is given, else with another value, and return it.
+
+    :raises ParameterError: if it is wrong.
+    """
+    override = take_override(node, spec.name)
+    value = spec.check(otherwise if override is None else override)
+    node.declare_parameter(
+        spec.name, value, spec.descriptor(read_only=True), ignore_override=True)
+    return value
 
 
 def _parse_names(entries: list[str], first: str) -> dict[Source, str]:

@@ -25,6 +25,7 @@ from typing import Any
 from rclpy.node import Node
 
 from .fleet_inputs import FleetInputs
+from .mounting import Mounting
 from .node import IlluminatorNode
 from .parameters import declare_link_parameters, LinkParameters, ParameterError
 from .spinner import Spinner
@@ -71,7 +72,8 @@ class BridgeProcess:
         self.link = Link(
             parameters.url, self.controller, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
-        self._serve(node)
+        self._mounting = Mounting.of_first(parameters)
+        self._serve(node, self._mounting)
         FleetInputs(node, self.link, self._lights, self._name_of, node.absence)
         _forward_logs(node)
         self._ended = threading.Event()
@@ -100,6 +102,7 @@ class BridgeProcess:
         self._stop()
         # Whoever looks at the ROS graph is to see at once that they are gone.
         for node in self.nodes:
+            node.end()
             node.destroy_node()
 
     def end(self) -> None:
@@ -133,10 +136,10 @@ class BridgeProcess:
         names = [node.get_name() for node in list(self.nodes) if node.light is light]
         return f'{names[0]} ({light.source})' if names else str(light.source)
 
-    def _serve(self, node: IlluminatorNode) -> None:
+    def _serve(self, node: IlluminatorNode, mounting: Mounting) -> None:
         node.serve(
             self.link, self.controller, url=self.parameters.connection_url,
-            frame_id=self.parameters.frame_id, period=self.parameters.diagnostics_period)
+            mounting=mounting, period=self.parameters.diagnostics_period)
 
     def _run_further(self, light: Light) -> None:
         """Make and run the node of a further light, in a thread of its own."""
@@ -160,7 +163,7 @@ class BridgeProcess:
             node = IlluminatorNode(
                 name, namespace=self.node.get_namespace(), context=self.node.context,
                 cli_args=self._arguments, use_global_arguments=False)
-            self._serve(node)
+            self._serve(node, self._mounting.declare(node))
         except Exception as error:
             logger.error(f'light {light.source} gets no node: {error}')
             return None

@@ -118,6 +118,8 @@ def test_it_ends_the_start(outcomes: dict[str, Any], keys: Path, what: str) -> N
     ({'brightness': [1.0, 2.0]}, 'brightness [1.0, 2.0] is not a number'),
     ({'mode': 1}, 'mode 1 is none of internal_control, external_sync'),
     ({'frame_id': 7}, 'frame_id: 7 is no string'),
+    ({'beam_range': -1.0}, 'beam_range: -1.0 m is out of range: 0 to 10000 m'),
+    ({'beam_angle': 30}, 'beam_angle: 30.0 rad is out of range: 0.01 to 3 rad'),
     ({'system_id': 'one'}, "system_id: 'one' is no integer"),
     ({'off_on_shutdown': 1}, 'off_on_shutdown: 1 is no boolean'),
     ({'command_retries': 1.5}, 'command_retries: 1.5 is no integer'),

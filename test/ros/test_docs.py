@@ -21,6 +21,7 @@ from typing import Any
 
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.ros import beam, beam_output, mounting
 from illuminator_ros.ros.conversions import STATUS_TOPICS
 from illuminator_ros.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.ros.parameters import (
@@ -35,6 +36,7 @@ ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / 'README.md').read_text()
 DESIGN = (ROOT / 'doc' / 'design.md').read_text()
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
+BEAM = (ROOT / 'doc' / 'beam.md').read_text()
 LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
 
 
@@ -99,6 +101,19 @@ def test_protocol_page_has_each_flag_with_its_level_and_text() -> None:
     for flag in ErrorFlag:
         level, text = FLAG_LEVELS[flag]
         assert rows[f'{flag.name} ({flag.value})'] == [LEVELS[level], text]
+
+
+def test_beam_page_has_each_parameter_with_its_unit() -> None:
+    rows = {cells[0]: cells[1] for cells in table(BEAM, 'parameter')}
+    assert rows == {f'`{spec.name}`': spec.unit for spec in LINK_PARAMETERS
+                    if spec.name in mounting.NAMES}
+
+
+@pytest.mark.parametrize('text', [
+    f'under {beam.SHORTEST_PERIOD:g} s', f'at least {beam.SHORTEST_FLASH:g} s',
+    f'drop it {beam_output.LIFETIME} s'])
+def test_beam_page_has_the_limits_of_the_code(text: str) -> None:
+    assert text in BEAM
 
 
 def test_design_page_has_the_bounds_of_the_code() -> None:

@@ -32,7 +32,8 @@ LINK = {
     'connection_url': STRING, 'system_id': INTEGER, 'component_id': INTEGER,
     'target_system': INTEGER, 'target_component': INTEGER, 'heartbeat_timeout': DOUBLE,
     'command_timeout': DOUBLE, 'command_retries': INTEGER, 'status_interval': DOUBLE,
-    'frame_id': STRING, 'diagnostics_period': DOUBLE, 'off_on_shutdown': BOOL,
+    'frame_id': STRING, 'beam_range': DOUBLE, 'beam_angle': DOUBLE,
+    'diagnostics_period': DOUBLE, 'off_on_shutdown': BOOL,
     'restore_configuration': BOOL, 'signing_mode': STRING, 'signing_key_file': STRING,
     'names': ParameterType.PARAMETER_STRING_ARRAY,
 }

@@ -151,7 +151,7 @@ class Siege:
                 ('ways', max(map(len, link._routes._ways.values()), default=0), MAX_WAYS),
                 ('streams', len(link._signing._streams), MAX_STREAMS),
                 ('outgoing', len(waiting), 0),
-                ('sequences', len(link._sequences), 8)):
+                ('sequences', len(link._departure.sequences), 8)):
             assert size <= bound, f'{size} {what}, more than {bound}'
 
     def attack(self) -> None:

@@ -77,6 +77,14 @@ def installed(prefix: Path) -> dict[str, str]:
     'share/ament_index/resource_index/packages/illuminator_ros',
     'share/illuminator_ros/package.xml',
     'share/illuminator_ros/config/bridge.yaml',
+    'share/illuminator_ros/config/diagnostics_aggregator.yaml',
+    'share/illuminator_ros/config/foxglove_layout.json',
+    'share/illuminator_ros/config/joystick.yaml',
+    'share/illuminator_ros/config/plotjuggler_layout.xml',
+    'share/illuminator_ros/config/sros2/illuminator.policy.xml',
+    'share/illuminator_ros/launch/bridge.launch.xml',
+    'share/illuminator_ros/launch/demo.launch.xml',
+    'share/illuminator_ros/launch/joystick.launch.xml',
 ])
 def test_what_ros_looks_for_is_installed(prefix: Path, path: str) -> None:
     assert (prefix / path).is_file()

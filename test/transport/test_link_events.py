@@ -221,7 +221,7 @@ def no_way_out(monkeypatch: pytest.MonkeyPatch) -> Log[Any]:
     def opened(url: Any) -> Any:
         channel = open_channel(url)
 
-        def send(frame: bytes, peers: Any) -> None:
+        def send(frames: Any, peers: Any) -> None:
             raise ChannelLost(101, 'Network is unreachable')
 
         monkeypatch.setattr(channel, 'send', send)

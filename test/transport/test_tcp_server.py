@@ -84,7 +84,7 @@ def test_a_broadcast_goes_to_all_clients(ours: OpenChannel, connect: Connect) ->
 def test_what_is_sent_to_one_client_goes_to_no_other(ours: OpenChannel, connect: Connect) -> None:
     one, other = connect(), connect()
     peer = say(ours, one)
-    ours.channel.send(b'to one', [peer])
+    ours.channel.send([b'to one'], [peer])
     ours.broadcast(b'to all')
     assert other.recv(100) == b'to all'
 

@@ -59,14 +59,14 @@ class _MemoryChannel(Channel):
     def peers(self, now: float) -> Sequence[Peer]:
         return (None,)
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         with _lock:
             for other in _hub.get(self._hub_name, []):
                 if other is not self:
                     try:
-                        other._entrance.send(frame)
+                        other._entrance.send(b''.join(frames))
                     except BlockingIOError:
-                        self.dropped += 1
+                        self.dropped += len(frames)
 
     def close(self) -> None:
         with _lock:

@@ -87,8 +87,8 @@ class _SerialChannel(Channel):
     def peers(self, now: float) -> Sequence[Peer]:
         return (None,)
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
-        self.dropped += self._queue.put(frame)
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
+        self.dropped += sum(self._queue.put(frame) for frame in frames)
         self.writable(self._fd)
 
     def writable(self, handle: Any) -> None:
