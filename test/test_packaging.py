@@ -71,11 +71,9 @@ def versions(folder: Path) -> list[str]:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """Return a copy of what a release changes."""
-    for name in ('package.xml', 'setup.py', 'setup.cfg', 'CHANGELOG.rst'):
-        shutil.copy(ROOT / name, tmp_path)
-    shutil.copytree(ROOT / PACKAGE, tmp_path / PACKAGE)
-    return tmp_path
+    """Return a copy of what is released."""
+    return shutil.copytree(ROOT, tmp_path / PACKAGE, ignore=shutil.ignore_patterns(
+        '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'test'))
 
 
 def test_there_is_one_version() -> None:

@@ -145,7 +145,7 @@ class Beam:
 
     @property
     def _lit(self) -> float:
-        """The s of each period in which it is drawn."""
+        """Return the s of each period in which it is drawn."""
         period = self._shine.period
         return min(max(period * self._shine.duty / 100, SHORTEST_FLASH), period - SHORTEST_FLASH)
 

@@ -137,6 +137,7 @@ def foreign(frames: list[Frame]) -> Counter[int]:
 
 
 class TestReception:
+
     @staticmethod
     def knowing(mode: SigningMode = SigningMode.OFF) -> tuple[Reception, list[int]]:
         """Return the way in of a link that knows the autopilot on peer a; and what it counts."""

@@ -162,7 +162,7 @@ def test_it_is_kept_for_who_subscribes_late(ros: Ros, beam: Recorder) -> None:
 
 
 def test_who_keeps_no_state_gets_it_as_well(ros: Ros, beam: Recorder) -> None:
-    """RViz subscribes volatile unless told otherwise."""
+    """Subscribe as RViz does unless told otherwise: volatile."""
     volatile = ros.subscribe(Marker, '/illuminator/beam', STREAM)
 
     assert shown(volatile.wait())
@@ -205,6 +205,7 @@ def test_each_light_may_have_a_frame_and_a_beam_of_its_own(own_ros: Ros) -> None
 
 
 class TestOffByDefault:
+
     def test_there_is_no_such_topic(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port), ServedLight(port, enable=1):
             own_ros.find_publisher('/illuminator/enabled')

@@ -107,6 +107,7 @@ class TestCone:
 
 
 class TestLook:
+
     def test_there_is_none_before_the_first_status(self) -> None:
         assert Beam().look(0.0) == Look(0.0)
 
@@ -171,6 +172,7 @@ class TestLook:
 
 
 class TestStrobe:
+
     def test_it_is_lit_for_the_duty_cycle_of_each_period(self) -> None:
         assert flashes(strobe(2.0, 25.0), 5.0) == [
             (0.0, True), (0.5, False), (2.0, True), (2.5, False), (4.0, True), (4.5, False)]

@@ -125,6 +125,7 @@ def test_a_call_does_not_wait_for_frames_to_collect(
     real = ours.link._calls_only
 
     class Unending:
+
         def poll(self, milliseconds: float) -> None:
             polled.append(real.poll())
 

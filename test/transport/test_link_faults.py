@@ -124,8 +124,8 @@ def test_a_fault_of_who_hears_the_events_does_not_keep_a_link_lost(
             with server.accept()[0] as connection:
                 connection.sendall(heartbeat_frame())
                 link.endpoint.heard.wait_for(lambda heard: True, count=count)
-        link.wait_open(2)
-        assert len(link.endpoint.closings) == 1
+                link.wait_open(count)
+                assert len(link.endpoint.closings) == count - 1
     assert set(faults(caplog)) == {'event'}
 
 
