@@ -1,0 +1,220 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Programs to measure, a client to measure with, and what the kernel knows of a process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import contextlib
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import random
+import socket
+import sys
+import threading
+import time
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from std_srvs.srv import SetBool
+from support.light import free_port
+from support.processes import Program, python, ROOT
+
+__all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory', 'peer',
+           'Program', 'python', 'ROOT', 'running', 'settle', 'simulator', 'udp_queue']
+
+PEERS = Path(__file__).with_name('peers')
+# s; for whatever must come sooner or later.
+PATIENCE = 60.0
+
+
+@dataclass
+class Bench:
+    """
+    What is asked of a run.
+
+    :param quick: measure next to nothing, to see that it works.
+    :param soak: s.
+    :param domain: the ROS domain of its own.
+    """
+
+    quick: bool = False
+    soak: float = 20.0
+    domain: int = 0
+
+    def amount(self, full: Any, quick: Any) -> Any:
+        """Return how much to do."""
+        return quick if self.quick else full
+
+    def say(self, text: str) -> None:
+        """Tell how far it is."""
+        print(f'  {text}', file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """Yield a ROS domain that no test and no other benchmark on this machine uses meanwhile."""
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    with socket.socket(socket.AF_UNIX) as claim:
+        while True:
+            domain = random.randint(1, 101)
+            with contextlib.suppress(OSError):
+                claim.bind(f'\0illuminator_ros_test_domain_{domain}')
+                break
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        yield domain
+
+
+@contextlib.contextmanager
+def running(program: Program) -> Iterator[Program]:
+    """End a program, whatever happens."""
+    try:
+        yield program
+        if program.running:
+            program.end()
+    finally:
+        program.kill()
+
+
+def bridge(url: str, **parameters: Any) -> Any:
+    """Run the bridge, once it has opened its link."""
+    given = {'connection_url': url, **parameters}
+    overrides = [text for name, value in given.items() for text in ('-p', f'{name}:={value}')]
+    return _ready(python('illuminator_ros.bridge', '--ros-args', *overrides), 'link open')
+
+
+def simulator(url: str, *arguments: str) -> Any:
+    """Run simulated lights."""
+    return running(python('illuminator_ros.simulator', url, '--plain', *arguments))
+
+
+def peer(name: str, *arguments: str) -> Any:
+    """Run one of ``peers/``, once it has said that it is ready."""
+    path = PEERS / f'{name}.py'
+    return _ready(Program(sys.executable, str(path), *arguments), 'ready')
+
+
+@contextlib.contextmanager
+def _ready(program: Program, text: str) -> Iterator[Program]:
+    with running(program):
+        program.wait_for(text, PATIENCE)
+        yield program
+
+
+class Client:
+    """
+    A ROS node that is spun in a thread.
+
+    ``spin_until_future_complete`` would poll, and measure that.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node('bench', context=self.context)
+        self._clients: dict[str, Any] = {}
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            self._executor.spin()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        rclpy.try_shutdown(context=self.context)
+        self._thread.join(5.0)
+        self.node.destroy_node()
+
+    def client(self, service: str) -> Any:
+        """Return the client of a SetBool service, there or not."""
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(SetBool, service)
+        return self._clients[service]
+
+    def call(self, service: str, on: bool, patience: float = PATIENCE) -> tuple[float, Any]:
+        """Return the s until the caller has the answer, and the answer; None if none came."""
+        client, answered = self.client(service), threading.Event()
+        began = time.perf_counter()
+        future = client.call_async(SetBool.Request(data=on))
+        future.add_done_callback(lambda future: answered.set())
+        found = answered.wait(patience)
+        return time.perf_counter() - began, future.result() if found else None
+
+    def meet(self, service: str, *, success: bool = True) -> None:
+        """
+        Wait until a service answers, and with success where that is wanted.
+
+        A first call may get lost: the server may hear of it before it knows who asks.
+        """
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            if self.client(service).service_is_ready():
+                _, answer = self.call(service, False, 0.5)
+                if answer is not None and (answer.success or not success):
+                    return
+            time.sleep(0.002)
+        raise RuntimeError(f'{service} does not answer')
+
+    def subscribe(self, type_: Any, topic: str, take: Callable[[Any], None], qos: Any) -> None:
+        """Take what is published, in the client's thread."""
+        self.node.create_subscription(type_, topic, take, qos)
+
+
+def cpu(pid: int) -> float:
+    """Return the CPU time that all threads of a process have taken, s."""
+    # The kernel's number for the CPU clock of a process, in nanoseconds; /proc has ticks of 10 ms.
+    return time.clock_gettime((~pid << 3) | 2)
+
+
+def settle(pid: int) -> None:
+    """Wait until a process has nothing left to do."""
+    until = time.monotonic() + PATIENCE
+    before = cpu(pid)
+    while time.monotonic() < until:
+        time.sleep(0.03)
+        if cpu(pid) - before < 0.001:
+            return
+        before = cpu(pid)
+    raise RuntimeError('a program does not come to rest')
+
+
+def memory(pid: int) -> dict[str, float]:
+    """Return what a process takes, MB: Rss, Pss, and Private_Dirty, which is its own alone."""
+    lines = Path(f'/proc/{pid}/smaps_rollup').read_text().splitlines()[1:]
+    values = {line.split(':')[0]: int(line.split()[1]) * 1024 / 1e6 for line in lines}
+    return {name: values[name] for name in ('Rss', 'Pss', 'Private_Dirty')}
+
+
+def udp_queue(port: int) -> int:
+    """Return the bytes of kernel memory that wait in the socket of a UDP port."""
+    for line in Path('/proc/net/udp').read_text().splitlines()[1:]:
+        fields = line.split()
+        if fields[1].endswith(f':{port:04X}'):
+            return int(fields[4].partition(':')[2], 16)
+    raise RuntimeError(f'nobody has UDP port {port}')
+
+
+def interleaved(names: Sequence[str], rounds: int) -> Iterator[str]:
+    """Yield each name once a round, in alternate order: what drifts is then shared."""
+    for number in range(rounds):
+        yield from names if number % 2 == 0 else reversed(names)
