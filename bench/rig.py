@@ -35,8 +35,9 @@ from std_srvs.srv import SetBool
 from support.light import free_port
 from support.processes import Program, python, ROOT
 
-__all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory', 'peer',
-           'Program', 'python', 'ROOT', 'running', 'settle', 'simulator', 'udp_queue']
+__all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory',
+           'PATIENCE', 'peer', 'PEERS', 'Program', 'python', 'ROOT', 'running', 'settle',
+           'simulator', 'udp_queue']
 
 PEERS = Path(__file__).with_name('peers')
 # s; for whatever must come sooner or later.

@@ -20,6 +20,9 @@ from __future__ import annotations
 SUBJECTS = {
     'enable': 'how long ~/enable takes',
     'status': 'how long a status takes to a subscriber',
+    'foreign': 'CPU for the frames of others on the link',
+    'burst': 'frames lost of a burst',
+    'noise': 'frames recovered from noise',
     'memory': 'what the bridge takes above an empty node',
     'startup': 'how long it takes from the start of the process to service',
     'overhead': 'the bytes that the bridge adds to a link',
