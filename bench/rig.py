@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import dataclass
+import itertools
 import os
 from pathlib import Path
 import random
@@ -42,6 +43,7 @@ __all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memo
 PEERS = Path(__file__).with_name('peers')
 # s; for whatever must come sooner or later.
 PATIENCE = 60.0
+_numbers = itertools.count()
 
 
 @dataclass
@@ -127,7 +129,7 @@ class Client:
     def __init__(self, domain: int) -> None:
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain)
-        self.node = rclpy.create_node('bench', context=self.context)
+        self.node = rclpy.create_node(f'bench_{next(_numbers)}', context=self.context)
         self._clients: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 # In the order in which they are run.
 SUBJECTS = {
     'enable': 'how long ~/enable takes',
@@ -24,6 +26,17 @@ SUBJECTS = {
     'burst': 'frames lost of a burst',
     'noise': 'frames recovered from noise',
     'memory': 'what the bridge takes above an empty node',
+    'soak': 'whether memory stays flat',
     'startup': 'how long it takes from the start of the process to service',
     'overhead': 'the bytes that the bridge adds to a link',
+    'lights': 'CPU for a status with many lights on one link',
+    'nodes': 'many nodes in one process',
+    'rates': 'CPU with a status at 1, 10 and 50 Hz',
+    'serial_line': 'a slow and a fast serial line, used by others too',
+    'reconnection': 'how soon the link is up again',
+    'loss': 'commands through loss',
+    'parallel': 'what a silent light costs the others',
 }
+# What is not there is left out.
+if Path(__file__).parents[1].joinpath('promises.py').exists():
+    SUBJECTS['promises'] = 'whether what is promised in time is done in time'

@@ -63,7 +63,7 @@ def measure(bench: Bench) -> Iterator[Row]:
             sent[name] += size
         programs[RECV_MATCH].end()
         _, _, theirs = programs[RECV_MATCH].log.rpartition('frames ')
-        ours = received(arrays)
+        ours = int(link_values(arrays)['frames_received'])
     lost = {OURS: sent[OURS] - ours, RECV_MATCH: sent[RECV_MATCH] - int(theirs)}
     share = {name: 100 * lost[name] / sent[name] for name in lost}
     yield Row(f'frames lost of bursts of {size:,}, {AT_ONCE:,} per {INTERVAL * 1e3:g} ms', '%',
@@ -72,12 +72,13 @@ def measure(bench: Bench) -> Iterator[Row]:
               f'{lost[OURS]:,} and {lost[RECV_MATCH]:,} of {sent[OURS]:,} each')
 
 
-def received(arrays: list[DiagnosticArray]) -> int:
-    """Return the number of frames in the first diagnostics that come from now on."""
+def link_values(arrays: list[DiagnosticArray]) -> dict[str, str]:
+    """Return what is told of the link in the first diagnostics that come from now on."""
     known, until = len(arrays), time.monotonic() + PATIENCE
     # The second one from now: the first may be under way.
     while len(arrays) < known + 2 and time.monotonic() < until:
-        time.sleep(0.05)
+        time.sleep(0.01)
+    stamp = arrays[-1].header.stamp
     (values,) = (status.values for status in arrays[-1].status if status.name == LINK)
-    (text,) = (value.value for value in values if value.key == 'frames_received')
-    return int(text)
+    return {'at': str(stamp.sec + stamp.nanosec / 1e9),
+            **{value.key: value.value for value in values}}

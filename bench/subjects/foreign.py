@@ -32,7 +32,7 @@ from ..traffic import frames, Line, SerialPort, TcpListener, udp_line
 OURS, RECV_MATCH, BARE = 'bridge', 'recv_match', 'bare receive loop'
 BAUD = 921_600
 # Frames a second, 0 for as many as are taken; and for how many it is measured, in a block.
-RATES = {500: 700, 5000: 4000, 0: 6000}
+RATES = {500: 350, 5000: 2500, 0: 6000}
 TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 8, 'serial': 1 / 8}
 
 
