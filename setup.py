@@ -34,7 +34,9 @@ setup(
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
-    extras_require={'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4']},
+    extras_require={
+        'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4'], 'bench': ['matplotlib>=3.9'],
+    },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',

@@ -37,7 +37,9 @@ VERSIONS = ((3, 12), (3, 11), (3, 10), (3, 13))
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
 PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.5', 'hypothesis>=6.100',
-        'pyyaml>=6', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3']
+        'pyyaml>=6', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
+        # Draws the plots of the benchmark, which would rot untested.
+        'matplotlib>=3.9']
 # A router for the tests, alone: run without a display it needs none of the gigabyte of graphics
 # packages that it asks for.
 ALONE = ['MAVProxy>=1.8.70']

@@ -52,7 +52,7 @@ COUNTS = (1, 10, 100)
 # Frames per second, half of them statuses; the same for any number of lights, so that nothing
 # but the number differs.
 RATE = 800
-WARM_UP, MEASURED = 1.0, 1.5
+WARM_UP, MEASURED = 0.8, 1.2
 FLAT = 1.2
 # s for which lights are listened to once the first is found.
 LISTENING = 3.0

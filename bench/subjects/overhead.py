@@ -27,7 +27,7 @@ from ..rig import Bench, bridge, free_port, simulator
 from ..rows import at_most, one, Row
 
 # s; what is asked of a light that was just found is not counted.
-SETTLING, COUNTED = 6.0, 12.0
+SETTLING, COUNTED = 6.0, 10.0
 LIMIT = 60.0
 
 

@@ -28,7 +28,7 @@ from ..rows import one, Row
 from .status import STATE
 
 RATES = (1.0, 10.0, 50.0)
-MEASURED = 4.0
+MEASURED = 3.0
 
 
 def measure(bench: Bench) -> Iterator[Row]:
@@ -43,7 +43,7 @@ def measure(bench: Bench) -> Iterator[Row]:
         until = time.monotonic() + 20.0
         while not statuses and time.monotonic() < until:
             sender.stream(0.1, 0.02)
-        sender.stream(bench.amount(3.0, 0.1), 0.05)
+        sender.stream(bench.amount(2.0, 0.1), 0.05)
         for rate in RATES:
             before, count, began = cpu(program.pid), len(statuses), time.monotonic()
             sender.stream(bench.amount(MEASURED, 0.1), 1 / rate)

@@ -90,7 +90,7 @@ def measure(bench: Bench) -> Iterator[Row]:
         client.subscribe(Float64, '/illuminator/uptime', came, STATE)
         client.subscribe(Float64, '/publisher/time', came_bare, STATE)
         until = time.monotonic() + 30.0
-        while not all(counts[name] >= bench.amount(200, 2) for name in took):
+        while not all(counts[name] >= bench.amount(100, 2) for name in took):
             for name in took:
                 block(name, 10)
             if time.monotonic() > until:
