@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+import re
 from typing import Any
 
 import matplotlib
@@ -53,7 +54,7 @@ def draw(rows: Iterable[Row], directory: Path) -> list[Path]:
                 axes.plot([x for x, _ in points], [ys[curve] for _, ys in points], marker='o',
                           label=curve)
             axes.set_ylim(bottom=0.0)
-            paths.append(_save(figure, axes, directory / f'cpu {name}.png'))
+            paths.append(_save(figure, axes, directory, f'cpu {name}'))
     return paths
 
 
@@ -66,7 +67,7 @@ def _distribution(row: Row, directory: Path) -> Path:
                   where='post', label=name)
     # The slowest few of some thousand would press all others together.
     axes.set_xscale('log')
-    return _save(figure, axes, directory / f'{row.what.replace("/", " ").strip(" ~")}.png')
+    return _save(figure, axes, directory, row.what)
 
 
 def _axes(title: str, x_label: str, y_label: str) -> tuple[Any, Any]:
@@ -76,10 +77,10 @@ def _axes(title: str, x_label: str, y_label: str) -> tuple[Any, Any]:
     return figure, axes
 
 
-def _save(figure: Any, axes: Any, path: Path) -> Path:
+def _save(figure: Any, axes: Any, directory: Path, name: str) -> Path:
     axes.legend()
     figure.tight_layout()
-    name = path.with_name(path.name.replace(' ', '_').replace(',', ''))
-    figure.savefig(name, dpi=120)
+    path = directory / f'{re.sub("[^a-z0-9]+", "_", name.lower()).strip("_")}.png'
+    figure.savefig(path, dpi=120)
     plt.close(figure)
-    return name
+    return path

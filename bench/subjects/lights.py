@@ -113,10 +113,10 @@ def frames(lights: int, seconds: float) -> list[bytes]:
     return result
 
 
-def cpu_per_status(lights: int, measured: float) -> float:
+def cpu_per_status(lights: int, warm_up: float, measured: float) -> float:
     """Return the CPU time of the link's thread for a status and a heartbeat, s."""
     port = free_port()
-    sending = frames(lights, WARM_UP + measured)
+    sending = frames(lights, warm_up + measured)
     # Nobody answers here: what a light is asked when it is found is soon given up.
     with (listening(port, command_timeout=0.05, command_retries=0) as (link, watcher),
           socket.socket(type=socket.SOCK_DGRAM) as sender):
@@ -130,13 +130,15 @@ def cpu_per_status(lights: int, measured: float) -> float:
         began = time.monotonic()
         before = statuses = 0.0
         for number, frame in enumerate(sending):
-            if number == int(WARM_UP * RATE):
+            if number == int(warm_up * RATE):
                 before, statuses = thread_time(), sum(watcher.statuses.values())
             with contextlib.suppress(ConnectionError):
                 sender.send(frame)
             if not number % 4:
                 time.sleep(max(began + number / RATE - time.monotonic(), 0))
-        time.sleep(0.1)
+        until = time.monotonic() + 5.0
+        while sum(watcher.statuses.values()) < len(sending) // 2 and time.monotonic() < until:
+            time.sleep(0.01)
         return (thread_time() - before) / (sum(watcher.statuses.values()) - statuses)
 
 
@@ -144,7 +146,8 @@ def measure(bench: Bench) -> Iterator[Row]:
     """Compare the numbers of lights in alternate order, then find them."""
     costs: dict[str, list[float]] = {str(count): [] for count in COUNTS}
     for name in interleaved(list(costs), bench.amount(3, 1)):
-        costs[name].append(cpu_per_status(int(name), bench.amount(MEASURED, 0.05)) * 1e6)
+        costs[name].append(1e6 * cpu_per_status(
+            int(name), *bench.amount((WARM_UP, MEASURED), (0.2, 0.1))))
     base = statistics.median(costs['1'])
     for count in COUNTS:
         cost = statistics.median(costs[str(count)])

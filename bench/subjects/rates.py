@@ -23,7 +23,7 @@ import time
 from std_msgs.msg import Float64
 
 from ..light import Sender
-from ..rig import Bench, bridge, Client, cpu, free_port
+from ..rig import Bench, bridge, Client, cpu, free_port, PATIENCE
 from ..rows import one, Row
 from .status import STATE
 
@@ -40,8 +40,10 @@ def measure(bench: Bench) -> Iterator[Row]:
         sender = stack.enter_context(contextlib.closing(Sender(port)))
         statuses: list[Float64] = []
         client.subscribe(Float64, '/illuminator/uptime', statuses.append, STATE)
-        until = time.monotonic() + 20.0
-        while not statuses and time.monotonic() < until:
+        until = time.monotonic() + PATIENCE
+        while not statuses:
+            if time.monotonic() > until:
+                raise RuntimeError('nothing is published')
             sender.stream(0.1, 0.02)
         sender.stream(bench.amount(2.0, 0.1), 0.05)
         for rate in RATES:

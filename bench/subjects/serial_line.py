@@ -81,4 +81,5 @@ def at(bench: Bench, baud: int) -> Iterator[Row]:
               note=f'{rate:,.0f} B/s come in')
     lost, wrong = int(end['frames_lost']), int(end['crc_errors'])
     yield Row(f'frames of the light lost, serial, {speed}', 'frames', one(lost),
-              targets=[at_most(lost, 0, 'frames')], note=f'{wrong} times what looked like a frame was none')
+              targets=[at_most(lost, 0, 'frames')],
+              note=f'{wrong} times something looked like a frame and was none')

@@ -29,8 +29,8 @@ from .status import STATE
 
 INTERVAL = 0.1
 # Looks at the memory, whatever the length.
-LOOKS = 40
-# Share of the time that it may take until all is loaded that ever is.
+LOOKS, FEWEST = 40, 8
+# Share of the looks that it may take until all is loaded that ever is.
 WARM_UP = 0.25
 # MB; what one does not tell from the allocator's own ups and downs.
 LIMIT = 1.0
@@ -49,14 +49,14 @@ def measure(bench: Bench) -> Iterator[Row]:
         client.subscribe(Float64, '/illuminator/uptime', lambda message: None, STATE)
         client.meet('/illuminator/enable')
         began = said = time.monotonic()
-        while (now := time.monotonic()) < began + seconds:
+        while (now := time.monotonic()) < began + seconds or len(looks) < FEWEST:
             looks.append((now - began, memory(program.pid)['Rss']))
             client.call('/illuminator/enable', len(looks) % 2 == 0)
             if now - said > 60.0:
                 said = now
                 bench.say(f'{now - began:.0f} s: {looks[-1][1]:.2f} MB')
             time.sleep(seconds / LOOKS)
-    late = [look for look in looks if look[0] >= WARM_UP * seconds]
+    late = looks[int(WARM_UP * len(looks)):]
     slope, _ = statistics.linear_regression(*zip(*late, strict=True))
     growth = late[-1][1] - late[0][1]
     yield Row(f'memory gained in {seconds:g} s at 10 Hz, after the first quarter', 'MB',

@@ -34,6 +34,7 @@ from ..rig import (
     Client,
     free_port,
     interleaved,
+    PATIENCE,
     PEERS,
     Program,
     python,
@@ -97,7 +98,7 @@ def start(bench: Bench, name: str, node: str, port: int) -> tuple[float, float]:
             answering = time.monotonic() - began
             if name == EMPTY:
                 return answering, 0.0
-            if not first.wait(10.0):
+            if not first.wait(PATIENCE):
                 raise RuntimeError(f'no status was published:\n{program.log}')
             return answering, published[0] - began
 

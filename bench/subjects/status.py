@@ -32,7 +32,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64
 
 from ..light import Sender
-from ..rig import Bench, bridge, Client, free_port, interleaved, peer
+from ..rig import Bench, bridge, Client, free_port, interleaved, PATIENCE, peer
 from ..rows import quantiles, Row, times
 
 STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
@@ -89,7 +89,7 @@ def measure(bench: Bench) -> Iterator[Row]:
 
         client.subscribe(Float64, '/illuminator/uptime', came, STATE)
         client.subscribe(Float64, '/publisher/time', came_bare, STATE)
-        until = time.monotonic() + 30.0
+        until = time.monotonic() + PATIENCE
         while not all(counts[name] >= bench.amount(100, 2) for name in took):
             for name in took:
                 block(name, 10)
