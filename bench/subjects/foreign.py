@@ -26,7 +26,7 @@ import contextlib
 import time
 
 from ..rig import Bench, bridge, cpu, free_port, interleaved, peer, Program, settle
-from ..rows import middle, Row, times
+from ..rows import middle, one, Row, times
 from ..traffic import frames, Line, SerialPort, TcpListener, udp_line
 
 OURS, RECV_MATCH, BARE = 'bridge', 'recv_match', 'bare receive loop'
@@ -49,6 +49,11 @@ class Receiver:
         before, began = cpu(self.program.pid), time.monotonic()
         time.sleep(seconds)
         self._idle = (cpu(self.program.pid) - before) / (time.monotonic() - began)
+
+    @property
+    def at_rest(self) -> float:
+        """What it takes when nothing comes, % of a core."""
+        return 100 * self._idle
 
     def measure(self, prepared: list[bytes], rate: int, count: int) -> None:
         """Feed it and note what a frame takes."""
@@ -99,22 +104,26 @@ def over(bench: Bench, transport: str) -> Iterator[Row]:
     prepared = frames()
     with contextlib.ExitStack() as stack:
         fed = receivers(transport, stack)
-        for one in fed.values():
-            one.line.feed(prepared, 2000, bench.amount(500, 10))
+        for receiver in fed.values():
+            receiver.line.feed(prepared, 2000, bench.amount(500, 10))
         time.sleep(bench.amount(1.0, 0.0))
-        for one in fed.values():
-            settle(one.program.pid)
-        for one in fed.values():
-            one.rest(bench.amount(1.0, 0.05))
+        for receiver in fed.values():
+            settle(receiver.program.pid)
+        for receiver in fed.values():
+            receiver.rest(bench.amount(1.0, 0.05))
         for rate, count in RATES.items():
             for name in interleaved(list(fed), bench.amount(3, 1)):
                 fed[name].measure(prepared, rate, bench.amount(count, 20))
+    rest = {name: receiver.at_rest for name, receiver in fed.items()}
+    yield Row(f'CPU with nothing coming in, {transport}', '%', one(rest[OURS]),
+              {RECV_MATCH: one(rest[RECV_MATCH]), BARE: one(rest[BARE])},
+              curves={f'foreign {transport}': (0.0, rest)})
     for rate in RATES:
-        ours, *others = (middle(one.costs[rate]) for one in fed.values())
+        ours, *others = (middle(receiver.costs[rate]) for receiver in fed.values())
         peers = dict(zip((RECV_MATCH, BARE), others, strict=True))
         speed = f'{rate:,} frames/s' if rate else 'saturated'
         curves = {f'foreign {transport}': (float(rate), {
-            name: cost['value'] * rate / 1e4
+            name: fed[name].at_rest + cost['value'] * rate / 1e4
             for name, cost in ((OURS, ours), *peers.items())})} if rate else {}
         yield Row(f'CPU for a foreign frame, {transport}, {speed}', 'us', ours, peers,
                   [times(ours, peers[RECV_MATCH], TARGETS[transport])], curves=curves)

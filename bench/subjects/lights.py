@@ -45,7 +45,7 @@ from illuminator_ros.mavlink.framing import encode_frame
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
 
-from ..rig import Bench, free_port, interleaved, simulator
+from ..rig import Bench, free_port, interleaved, PATIENCE, simulator
 from ..rows import at_most, middle, one, Row, Target
 
 COUNTS = (1, 10, 100)
@@ -87,6 +87,9 @@ def listening(port: int, **options: Any) -> Iterator[tuple[Link, Watcher]]:
     link = Link(parse_url(f'udpin://127.0.0.1:{port}'),
                 Controller(Source(1, 194), Settings(), on_light=found, **options), label='')
     link.start()
+    until = time.monotonic() + PATIENCE
+    while not link.state().is_open and time.monotonic() < until:
+        time.sleep(0.001)
     try:
         yield link, watcher
     finally:

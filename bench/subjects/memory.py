@@ -41,7 +41,7 @@ def measure(bench: Bench) -> Iterator[Row]:
             with Client(bench.domain) as client:
                 for name in ('/illuminator/enable', '/empty/enable'):
                     client.meet(name)
-                    for number in range(CALLS):
+                    for number in range(bench.amount(CALLS, 2)):
                         client.call(name, number % 2 == 0)
                 time.sleep(bench.amount(SERVED, 0.1))
                 took.append((memory(ours.pid), memory(empty.pid)))

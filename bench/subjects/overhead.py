@@ -83,9 +83,9 @@ def measure(bench: Bench) -> Iterator[Row]:
             stack.enter_context(simulator(f'udpout://127.0.0.1:{meter.port}',
                                           '--status-interval', interval))
             meters.append(meter)
-        time.sleep(bench.amount(SETTLING, 1.5))
+        time.sleep(bench.amount(SETTLING, 0.2))
         before = [(meter.from_bridge, meter.from_light) for meter in meters]
-        seconds = bench.amount(COUNTED, 1.0)
+        seconds = bench.amount(COUNTED, 0.2)
         time.sleep(seconds)
         for kind, meter, (added, sent) in zip(kinds, meters, before, strict=True):
             ours = (meter.from_bridge - added) / seconds

@@ -39,10 +39,12 @@ from ..rows import at_most, quantiles, Row
 LIMIT_MS = 1000.0
 # s that it is away; the longer, the rarer the attempts may have become.
 ABSENCES = (0.2, 1.0, 3.0, 6.0)
+# s that it is there; longer than a connection has to last to be taken for a good one.
+LASTING = 1.2
 HELLO = frame_of(heartbeat(MavType.ILLUMINATOR), 0)
 
 
-def tcp(absences: tuple[float, ...]) -> list[float]:
+def tcp(absences: tuple[float, ...], lasting: float) -> list[float]:
     """Restart a TCP server."""
     took = []
     server = socket.create_server(('127.0.0.1', 0))
@@ -51,8 +53,7 @@ def tcp(absences: tuple[float, ...]) -> list[float]:
         for absence in absences:
             connection, _ = server.accept()
             connection.recv(4096)
-            # Longer than a connection has to last to be taken for a good one.
-            time.sleep(1.2)
+            time.sleep(lasting)
             server.close()
             connection.close()
             time.sleep(absence)
@@ -71,7 +72,7 @@ def _tcp_return(server: socket.socket, began: float) -> float:
         return time.monotonic() - began
 
 
-def serial(absences: tuple[float, ...]) -> list[float]:
+def serial(absences: tuple[float, ...], lasting: float) -> list[float]:
     """Pull a serial device out, and plug it in again."""
     took = []
     with tempfile.TemporaryDirectory() as directory:
@@ -79,7 +80,7 @@ def serial(absences: tuple[float, ...]) -> list[float]:
         with bridge(f'serial://{device.path}:57600'):
             for absence in absences:
                 device.read(PATIENCE)
-                time.sleep(1.2)
+                time.sleep(lasting)
                 device.pull_out()
                 time.sleep(absence)
                 device.plug_in()
@@ -92,12 +93,12 @@ def serial(absences: tuple[float, ...]) -> list[float]:
     return took
 
 
-def udp(absences: tuple[float, ...]) -> list[float]:
+def udp(absences: tuple[float, ...], lasting: float) -> list[float]:
     """Have a UDP light come back on another port."""
     took = []
     port = free_port()
     with bridge(f'udpin://127.0.0.1:{port}'):
-        for absence in (0.0, *absences):
+        for absence in (0.0, *(lasting + absence for absence in absences)):
             time.sleep(absence)
             with socket.socket(type=socket.SOCK_DGRAM) as light:
                 light.settimeout(PATIENCE)
@@ -111,12 +112,13 @@ def udp(absences: tuple[float, ...]) -> list[float]:
 
 def measure(bench: Bench) -> Iterator[Row]:
     """Try all three at once: almost all of it is waiting."""
-    kinds: dict[str, Callable[[tuple[float, ...]], list[float]]] = {
+    kinds: dict[str, Callable[[tuple[float, ...], float], list[float]]] = {
         'TCP server restarted': tcp, 'serial device plugged in again': serial,
         'UDP light on another port': udp}
-    absences = bench.amount(ABSENCES, (0.1,))
+    absences, lasting = bench.amount((ABSENCES, LASTING), ((0.1,), 0.1))
     with ThreadPoolExecutor() as pool:
-        running = {kind: pool.submit(function, absences) for kind, function in kinds.items()}
+        running = {kind: pool.submit(function, absences, lasting)
+                   for kind, function in kinds.items()}
     for kind, future in running.items():
         took = [seconds * 1e3 for seconds in future.result()]
         yield Row(f'link up again, {kind}', 'ms', {**quantiles(took), 'max': max(took)},

@@ -38,7 +38,7 @@ LIMIT = 1.0
 
 def measure(bench: Bench) -> Iterator[Row]:
     """Look at the memory of the bridge while it serves."""
-    seconds = bench.amount(bench.soak, 1.0)
+    seconds = bench.amount(bench.soak, 0.4)
     port = free_port()
     looks: list[tuple[float, float]] = []
     with contextlib.ExitStack() as stack:
