@@ -53,11 +53,13 @@ class Bench:
 
     :param quick: measure next to nothing, to see that it works.
     :param soak: s.
+    :param lights: numbers of lights that get a node each.
     :param domain: the ROS domain of its own.
     """
 
     quick: bool = False
     soak: float = 20.0
+    lights: Sequence[int] = (1, 10, 100)
     domain: int = 0
 
     def amount(self, full: Any, quick: Any) -> Any:

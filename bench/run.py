@@ -48,9 +48,13 @@ from bench.subjects import SUBJECTS  # noqa: E402
 
 
 def measure(
-    names: Sequence[str], *, quick: bool, soak: float,
+    names: Sequence[str], **wanted: Any,
 ) -> tuple[list[Row], dict[str, float], list[str]]:
-    """Return the rows of some subjects, the s that each took, and those that failed."""
+    """
+    Return the rows of some subjects, the s that each took, and those that failed.
+
+    :param wanted: see :class:`bench.rig.Bench`.
+    """
     # Slow, and not needed to show a run that was kept.
     from bench.rig import Bench, own_domain
 
@@ -59,7 +63,7 @@ def measure(
     failed = []
     with tempfile.TemporaryDirectory() as home, own_domain() as domain:
         os.environ['ROS_HOME'] = home
-        bench = Bench(quick, soak, domain)
+        bench = Bench(domain=domain, **wanted)
         for number, name in enumerate(names, 1):
             bench.say(f'{number}/{len(names)} {name}: {SUBJECTS[name]}')
             began = time.monotonic()
@@ -71,7 +75,7 @@ def measure(
                 # The others are worth having all the same.
                 failed.append(name)
                 print(f'{name} FAILED: {error!r}', file=sys.stderr, flush=True)
-                if quick:
+                if bench.quick:
                     raise
             took[name] = round(time.monotonic() - began, 1)
     return rows, took, failed
@@ -89,6 +93,8 @@ def parser() -> argparse.ArgumentParser:
                         help='measure next to nothing: it shows that the benchmark works')
     result.add_argument('--soak', type=float, default=20.0, metavar='SECONDS',
                         help='length of the soak (default: %(default)g)')
+    result.add_argument('--lights', type=int, nargs='+', default=[1, 10, 100], metavar='N',
+                        help='numbers of lights for the subject nodes (default: 1 10 100)')
     result.add_argument('--json', type=Path, metavar='FILE', help='write all figures here')
     result.add_argument('--plot', type=Path, metavar='DIR',
                         help='draw PNGs here; needs matplotlib (pip install .[bench])')
@@ -114,7 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         about = machine()
         names = options.only or list(SUBJECTS)
-        rows, took, failed = measure(names, quick=options.quick, soak=options.soak)
+        rows, took, failed = measure(
+            names, quick=options.quick, soak=options.soak, lights=options.lights)
     if options.json:
         options.json.write_text(json.dumps(as_json(rows, about, took), indent=1) + '\n')
     if options.markdown:

@@ -22,7 +22,6 @@ import time
 from ..rig import Bench, bridge, Client, cpu, free_port, memory, PATIENCE, simulator
 from ..rows import one, quantiles, Row
 
-COUNTS = (1, 10, 100)
 CALLS = 150
 MEASURED = 3.0
 
@@ -40,7 +39,7 @@ def seen(client: Client, names: list[str]) -> float:
 
 def measure(bench: Bench) -> Iterator[Row]:
     """Start the bridge anew for each number of lights."""
-    for count in bench.amount(COUNTS, (2,)):
+    for count in bench.amount(bench.lights, (2,)):
         port = free_port()
         names = ['illuminator', *(f'illuminator_2_{n}' for n in range(2, count + 1))]
         arguments = ('--count', str(count), '--system-id', '2', '--component-id', '1')

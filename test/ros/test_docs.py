@@ -22,6 +22,7 @@ from typing import Any
 import pytest
 import yaml
 
+from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.ros.conversions import STATUS_TOPICS
@@ -34,6 +35,7 @@ from illuminator_ros.ros.parameters import (
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / 'README.md').read_text()
+PERFORMANCE = (ROOT / 'doc' / 'performance.md').read_text()
 DESIGN = (ROOT / 'doc' / 'design.md').read_text()
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
@@ -126,3 +128,8 @@ def _module(name: str) -> Any:
         except ModuleNotFoundError:
             continue
     raise AssertionError(f'no module {name}')
+
+
+def test_performance_has_each_subject_of_the_benchmark() -> None:
+    assert [cells[0] for cells in table(PERFORMANCE, 'subject')] == [
+        f'`{subject}`' for subject in SUBJECTS]

@@ -28,8 +28,8 @@ SLOW = Row('~/thing', 'ms', {'p50': 3.0, 'p99': 9.0}, {'peer': {'p50': 2.0, 'p99
            [times({'p50': 3.0}, {'p50': 2.0}, 1.6, 'p50'),
             times({'p99': 9.0}, {'p99': 3.0}, 2.0, 'p99')],
            'a note', {'bridge': [3.0, 9.0], 'peer': [2.0, 3.0]})
-CURVE = [Row(f'CPU, {count}', '%', one(count), targets=[], curves={'lights': (float(count), {'bridge': 1.0})})
-         for count in (1, 10)]
+CURVE = [Row(f'CPU, {count}', '%', one(count), targets=[],
+             curves={'lights': (float(count), {'bridge': 1.0})}) for count in (1, 10)]
 
 
 @pytest.fixture
