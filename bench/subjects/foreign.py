@@ -112,7 +112,7 @@ def over(bench: Bench, transport: str) -> Iterator[Row]:
         for receiver in fed.values():
             receiver.rest(bench.amount(1.0, 0.05))
         for rate, count in RATES.items():
-            for name in interleaved(list(fed), bench.amount(3, 1)):
+            for name in interleaved(list(fed), bench.amount(2, 1)):
                 fed[name].measure(prepared, rate, bench.amount(count, 20))
     rest = {name: receiver.at_rest for name, receiver in fed.items()}
     yield Row(f'CPU with nothing coming in, {transport}', '%', one(rest[OURS]),

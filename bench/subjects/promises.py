@@ -12,17 +12,31 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether what is promised in time is done in time; see ``bench/promises.py``."""
+"""Whether what is promised in time is done in time; ``bench/promises.py`` has the promises."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import importlib
+import os
 
 from ..rig import Bench
-from ..rows import Row
+from ..rows import at_most, Row
+
+TRIES = 3
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Yield the rows of that file, if it is there."""
-    yield from importlib.import_module('bench.promises').measure(bench)
+    """Yield its rows as ours."""
+    promises = importlib.import_module('bench.promises')
+    before = dict(os.environ)
+    try:
+        measured = promises.measure(bench.amount(TRIES, 1))
+    finally:
+        # It has a ROS domain of its own, and its own settings of the middleware.
+        os.environ.clear()
+        os.environ.update(before)
+    for row in measured:
+        yield Row(row.promise, 's', {'p50': row.p50, 'max': row.max},
+                  targets=[at_most(row.max, row.limit, 's')],
+                  note=f'DESIGN.md, {row.section}; {row.tries} tries')
