@@ -33,7 +33,6 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from std_srvs.srv import SetBool
-from support.light import free_port
 from support.processes import Program, python, ROOT
 
 __all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory',
@@ -44,6 +43,7 @@ PEERS = Path(__file__).with_name('peers')
 # s; for whatever must come sooner or later.
 PATIENCE = 60.0
 _numbers = itertools.count()
+_ports: Iterator[int] = iter(())
 
 
 @dataclass
@@ -74,15 +74,29 @@ class Bench:
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
     """Yield a ROS domain that no test and no other benchmark on this machine uses meanwhile."""
+    global _ports
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with socket.socket(socket.AF_UNIX) as claim:
         while True:
-            domain = random.randint(1, 101)
+            domain = random.randint(1, 100)
             with contextlib.suppress(OSError):
                 claim.bind(f'\0illuminator_ros_test_domain_{domain}')
                 break
         os.environ['ROS_DOMAIN_ID'] = str(domain)
+        # Ports of the domain (DDSI-RTPS, 9.6.1.1), which nobody else claims; they are those of
+        # its participants 70 and up, whom nobody has seen.
+        first = 7400 + 250 * domain
+        _ports = itertools.cycle(range(first + 150, first + 250))
         yield domain
+
+
+def free_port() -> int:
+    """Return a UDP port that nobody uses, nor will be given by the system."""
+    for port in itertools.islice(_ports, 100):
+        with contextlib.suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
+            probe.bind(('127.0.0.1', port))
+            return port
+    raise RuntimeError('no UDP port is free')
 
 
 @contextlib.contextmanager

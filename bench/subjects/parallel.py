@@ -21,14 +21,49 @@ import contextlib
 import itertools
 import threading
 import time
+from typing import Any
 
-from support.light import ON_OFF, ServedLight, Source
+from support.fake_light import FakeLight
 
-from ..rig import Bench, bridge, Client, free_port
+from illuminator_ros.mavlink.dialect import CommandLong, MavCmd, Source
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.url import parse_url
+
+from ..rig import Bench, bridge, Client, free_port, PATIENCE
 from ..rows import quantiles, Row
 
 LIGHTS, CALLS, ROUNDS = 4, 100, 3
 BESIDE, ALONE = 'beside a silent light', 'undisturbed'
+
+
+class Light(FakeLight):
+    """
+    A light that can be silent about being switched.
+
+    :ivar switched: set when it is asked to.
+    """
+
+    def __init__(self, source: Source) -> None:
+        super().__init__(source)
+        self.pushes = True
+        self.switched = threading.Event()
+
+    def receive(self, source: Source, message: Any, now: float) -> None:
+        super().receive(source, message, now)
+        if isinstance(message, CommandLong) and message.command == MavCmd.ILLUMINATOR_ON_OFF:
+            self.switched.set()
+
+
+@contextlib.contextmanager
+def served(port: int, source: Source) -> Iterator[Light]:
+    """Serve a light by a thread of this process."""
+    light = Light(source)
+    link = Link(parse_url(f'udpout://127.0.0.1:{port}'), light, label='')
+    link.start()
+    try:
+        yield light
+    finally:
+        link.stop()
 
 
 def measure(bench: Bench) -> Iterator[Row]:
@@ -40,7 +75,7 @@ def measure(bench: Bench) -> Iterator[Row]:
     took: dict[str, list[float]] = {BESIDE: [], ALONE: []}
     with contextlib.ExitStack() as stack:
         stack.enter_context(bridge(f'udpin://127.0.0.1:{port}', target_component=243))
-        lights = [stack.enter_context(ServedLight(port, Source(1, 243 + number), stream=1.0))
+        lights = [stack.enter_context(served(port, Source(1, 243 + number)))
                   for number in range(LIGHTS)]
         client = stack.enter_context(Client(bench.domain))
         nagging = stack.enter_context(Client(bench.domain))
@@ -49,13 +84,13 @@ def measure(bench: Bench) -> Iterator[Row]:
         nagging.meet(silent)
         for _ in range(bench.amount(ROUNDS, 1)):
             for kind in (ALONE, BESIDE):
-                lights[-1].fake.results[ON_OFF] = None if kind == BESIDE else 0
+                lights[-1].results[MavCmd.ILLUMINATOR_ON_OFF] = None if kind == BESIDE else 0
                 ended = threading.Event()
                 thread = threading.Thread(target=nag, args=(nagging, silent, ended))
                 if kind == BESIDE:
-                    known = len(lights[-1].commands(ON_OFF))
+                    lights[-1].switched.clear()
                     thread.start()
-                    lights[-1].wait_for(ON_OFF, known + 1)
+                    lights[-1].switched.wait(PATIENCE)
                 calls = zip(range(bench.amount(CALLS, 3)), itertools.cycle(others), strict=False)
                 for number, service in calls:
                     seconds, answer = client.call(service, bool(number // len(others) % 2))
