@@ -58,7 +58,7 @@ class Bench:
     """
 
     quick: bool = False
-    soak: float = 20.0
+    soak: float = 15.0
     lights: Sequence[int] = (1, 10, 100)
     domain: int = 0
 
@@ -224,12 +224,12 @@ def memory(pid: int) -> dict[str, float]:
     return {name: values[name] for name in ('Rss', 'Pss', 'Private_Dirty')}
 
 
-def udp_queue(port: int) -> int:
-    """Return the bytes of kernel memory that wait in the socket of a UDP port."""
+def udp_queue(port: int) -> tuple[int, int]:
+    """Return the bytes that wait in the socket of a UDP port, and the datagrams it had to drop."""
     for line in Path('/proc/net/udp').read_text().splitlines()[1:]:
         fields = line.split()
         if fields[1].endswith(f':{port:04X}'):
-            return int(fields[4].partition(':')[2], 16)
+            return int(fields[4].partition(':')[2], 16), int(fields[-1])
     raise RuntimeError(f'nobody has UDP port {port}')
 
 

@@ -91,7 +91,7 @@ def parser() -> argparse.ArgumentParser:
                         help='measure these only')
     result.add_argument('--quick', action='store_true',
                         help='measure next to nothing: it shows that the benchmark works')
-    result.add_argument('--soak', type=float, default=20.0, metavar='SECONDS',
+    result.add_argument('--soak', type=float, default=15.0, metavar='SECONDS',
                         help='length of the soak (default: %(default)g)')
     result.add_argument('--lights', type=int, nargs='+', default=[1, 10, 100], metavar='N',
                         help='numbers of lights for the subject nodes (default: 1 10 100)')

@@ -119,7 +119,7 @@ def udp_line(port: int) -> Line:
             with contextlib.suppress(ConnectionError):
                 sender.send(frame)
 
-    return Line(send, lambda: udp_queue(port) > FULL, sender.close)
+    return Line(send, lambda: udp_queue(port)[0] > FULL, sender.close)
 
 
 class TcpListener:

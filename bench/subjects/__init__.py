@@ -23,6 +23,7 @@ SUBJECTS = {
     'enable': 'how long ~/enable takes',
     'status': 'how long a status takes to a subscriber',
     'foreign': 'CPU for the frames of others on the link',
+    'busy': '~/enable beside the frames of others',
     'burst': 'frames lost of a burst',
     'noise': 'frames recovered from noise',
     'memory': 'what the bridge takes above an empty node',

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""CPU of the whole bridge with a light's status at 1, 10 and 50 Hz, with a subscriber."""
+"""CPU of the whole bridge, and latency, with a light's status at 1, 10 and 50 Hz."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from std_msgs.msg import Float64
 
 from ..light import Sender
 from ..rig import Bench, bridge, Client, cpu, free_port, PATIENCE
-from ..rows import one, Row
+from ..rows import one, quantiles, Row
 from .status import STATE
 
 RATES = (1.0, 10.0, 50.0)
@@ -38,8 +38,13 @@ def measure(bench: Bench) -> Iterator[Row]:
         program = stack.enter_context(bridge(f'udpin://127.0.0.1:{port}'))
         client = stack.enter_context(Client(bench.domain))
         sender = stack.enter_context(contextlib.closing(Sender(port)))
-        statuses: list[Float64] = []
-        client.subscribe(Float64, '/illuminator/uptime', statuses.append, STATE)
+        statuses: list[float] = []
+
+        def came(message: Float64) -> None:
+            at = time.monotonic()
+            statuses.append((at - sender.sent[round(message.data * 1000)]) * 1e3)
+
+        client.subscribe(Float64, '/illuminator/uptime', came, STATE)
         until = time.monotonic() + PATIENCE
         while not statuses:
             if time.monotonic() > until:
@@ -54,3 +59,6 @@ def measure(bench: Bench) -> Iterator[Row]:
             yield Row(f'CPU of the bridge, one light at {rate:g} Hz', '%',
                       one(100 * used / seconds),
                       note=f'{len(statuses) - count} statuses in {seconds:.1f} s')
+            time.sleep(0.1)
+            yield Row(f'status to a subscriber at {rate:g} Hz', 'ms',
+                      quantiles(statuses[count:]))

@@ -131,5 +131,6 @@ def _module(name: str) -> Any:
 
 
 def test_performance_has_each_subject_of_the_benchmark() -> None:
-    assert [cells[0] for cells in table(PERFORMANCE, 'subject')] == [
-        f'`{subject}`' for subject in SUBJECTS]
+    # The last one is there only where bench/promises.py is.
+    rows = table(PERFORMANCE, 'subject')[:len(SUBJECTS)]
+    assert [cells[0] for cells in rows] == [f'`{subject}`' for subject in SUBJECTS]
