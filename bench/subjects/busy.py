@@ -20,39 +20,40 @@ from collections.abc import Iterator
 import contextlib
 import time
 
-from ..rig import Bench, bridge, Client, free_port, peer, simulator, udp_queue
-from ..rows import at_most, Figures, quantiles, Row
+from ..rig import Bench, bridge, Client, free_port, interleaved, peer, simulator, udp_queue
+from ..rows import at_most, quantiles, Row
 
 RATES = (0, 500, 5000)
-CALLS = 300
+CALLS = 150
 
 
 def measure(bench: Bench) -> Iterator[Row]:
     """Call at each rate of frames."""
     port = free_port()
-    quiet: Figures = {}
+    took: dict[str, list[float]] = {str(rate): [] for rate in RATES}
+    sent, lost = dict.fromkeys(took, 0), dict.fromkeys(took, 0)
     with contextlib.ExitStack() as stack:
         stack.enter_context(simulator(f'udpout://127.0.0.1:{port}'))
         stack.enter_context(bridge(f'udpin://127.0.0.1:{port}'))
         client = stack.enter_context(Client(bench.domain))
         client.meet('/illuminator/enable')
-        for rate in RATES:
+        for rate in interleaved(list(took), bench.amount(2, 1)):
             _, before = udp_queue(port)
-            took = []
             with contextlib.ExitStack() as beside:
                 autopilot = beside.enter_context(
-                    peer('autopilot', str(port), str(rate))) if rate else None
-                time.sleep(bench.amount(0.5, 0.0))
+                    peer('autopilot', str(port), rate)) if rate != '0' else None
+                time.sleep(bench.amount(0.3, 0.0))
                 for number in range(bench.amount(CALLS, 4)):
                     seconds, answer = client.call('/illuminator/enable', number % 2 == 0)
                     if answer is None or not answer.success:
                         raise RuntimeError(f'~/enable: {answer}')
-                    took.append(seconds * 1e3)
-            lost = udp_queue(port)[1] - before
-            sent = int(autopilot.log.rpartition('frames ')[2]) if autopilot else 0
-            found = quantiles(took)
-            quiet = quiet or found
-            yield Row(f'~/enable beside {rate:,} frames/s of others', 'ms', found,
-                      {'beside none': quiet} if rate else {},
-                      [at_most(lost, 0, 'frames lost')],
-                      f'{sent:,} frames' if rate else '')
+                    took[rate].append(seconds * 1e3)
+            lost[rate] += udp_queue(port)[1] - before
+            sent[rate] += int(autopilot.log.rpartition('frames ')[2]) if autopilot else 0
+    quiet, *others = (quantiles(values) for values in took.values())
+    yield Row('~/enable beside no frames of others', 'ms', quiet)
+    for rate, found in zip(RATES[1:], others, strict=True):
+        name = str(rate)
+        yield Row(f'~/enable beside {rate:,} frames/s of others', 'ms', found,
+                  {'beside none': quiet}, [at_most(lost[name], 0, 'frames lost')],
+                  f'{sent[name]:,} frames')
