@@ -23,7 +23,7 @@ import os
 from ..rig import Bench
 from ..rows import at_most, Row
 
-TRIES = 3
+TRIES = 2
 
 
 def measure(bench: Bench) -> Iterator[Row]:
