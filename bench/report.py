@@ -22,6 +22,7 @@ from importlib import metadata
 import os
 from pathlib import Path
 import platform
+import re
 import subprocess
 import time
 from typing import Any
@@ -99,9 +100,13 @@ def markdown(rows: Iterable[Row], about: dict[str, Any]) -> str:
     for row in rows:
         beside = '<br>'.join(f'{name}: {figures(values, row.unit)}'
                              for name, values in row.peers.items())
-        what = row.what + (f' ({row.note})' if row.note else '')
+        about_row = [', '.join(row.ours)] if 'max' in row.ours else []
+        about_row += [row.note] if row.note else []
+        what = row.what + (f' ({"; ".join(about_row)})' if about_row else '')
         result.append(f'| {what} | {figures(row.ours, row.unit)} | {beside} | '
                       f'{figures(row.ratios)} | {"<br>".join(map(promise, row.targets))} |')
+    # Two tildes would strike out what is between them.
+    result = [re.sub(r'~/\w+', r'`\g<0>`', line) for line in result]
     return '\n'.join(result).replace(' |  |', ' | |').replace('|  |', '| |')
 
 
