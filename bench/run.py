@@ -37,7 +37,7 @@ from pathlib import Path
 import sys
 import tempfile
 import time
-from typing import Any
+from typing import Any, TextIO
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
@@ -48,11 +48,12 @@ from bench.subjects import SUBJECTS  # noqa: E402
 
 
 def measure(
-    names: Sequence[str], **wanted: Any,
+    names: Sequence[str], to: TextIO, **wanted: Any,
 ) -> tuple[list[Row], dict[str, float], list[str]]:
     """
     Return the rows of some subjects, the s that each took, and those that failed.
 
+    :param to: where they are shown as they come.
     :param wanted: see :class:`bench.rig.Bench`.
     """
     # Slow, and not needed to show a run that was kept.
@@ -70,7 +71,7 @@ def measure(
             try:
                 for row in importlib.import_module(f'bench.subjects.{name}').measure(bench):
                     rows.append(row)
-                    print('\n'.join(lines(row)), flush=True)
+                    print('\n'.join(lines(row)), file=to, flush=True)
             except Exception as error:
                 # The others are worth having all the same.
                 failed.append(name)
@@ -110,6 +111,8 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run it; return the exit status."""
     options = parser().parse_args(arguments)
+    # What is printed with --markdown is the table and nothing else.
+    to = sys.stderr if options.markdown else sys.stdout
     about: dict[str, Any]
     failed: list[str] = []
     if options.stored:
@@ -121,7 +124,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         about = machine()
         names = options.only or list(SUBJECTS)
         rows, took, failed = measure(
-            names, quick=options.quick, soak=options.soak, lights=options.lights)
+            names, to, quick=options.quick, soak=options.soak, lights=options.lights)
     if options.json:
         options.json.write_text(json.dumps(as_json(rows, about, took), indent=1) + '\n')
     if options.markdown:
@@ -133,10 +136,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     targets = [(row, target) for row in rows for target in row.targets]
     missed = [(row, target) for row, target in targets if not target.met]
     print(f'{len(targets) - len(missed)} of {len(targets)} targets met, {len(rows)} rows, '
-          f'{sum(took.values()):.0f} s', *(f'FAILED: {name}' for name in failed), sep='; ')
+          f'{sum(took.values()):.0f} s', *(f'FAILED: {name}' for name in failed), sep='; ',
+          file=to)
     for row, target in missed:
         print(f'  missed: {row.what}: {target.text} ({target.value:.3g}, limit '
-              f'{target.limit:.3g})')
+              f'{target.limit:.3g})', file=to)
     return 1 if failed or (options.check and missed) else 0
 
 

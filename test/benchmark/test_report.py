@@ -69,8 +69,8 @@ def test_the_table_names_the_machine_and_what_is_missed():
     text = markdown([SLOW, Row('bytes', 'B/s', one(21.0)),
                      Row('back', 's', {'p50': 0.1, 'max': 0.2})], about)
     assert 'A fast one' in text
-    assert ('| `~/thing` (a note) | 3 / 9 ms | peer: 2 / 3 ms | 1.5 / 3 | p50 at most 1.6 times the '
-            'peer: met<br>p99 at most 2 times the peer: MISSED |') in text
+    assert ('| `~/thing` (a note) | 3 / 9 ms | peer: 2 / 3 ms | 1.5 / 3 | '
+            'p50 at most 1.6 times the peer: met<br>p99 at most 2 times the peer: MISSED |') in text
     assert '| bytes | 21 B/s | | | |' in text
     assert '| back (p50, max) | 0.1 / 0.2 s | | | |' in text
 
@@ -85,6 +85,12 @@ def test_a_run_that_was_kept_is_the_same_afterwards(stored):
 def test_a_missed_target_is_told_and_is_no_failure(stored, capsys):
     assert main(['--from', str(stored)]) == 0
     assert '1 of 2 targets met' in capsys.readouterr().out
+
+
+def test_the_table_is_all_that_is_printed_where_it_is_asked_for(stored, capsys):
+    assert main(['--from', str(stored), '--markdown']) == 0
+    values = json.loads(stored.read_text())
+    assert capsys.readouterr().out == markdown(from_json(values), values['machine']) + '\n'
 
 
 def test_a_missed_target_is_a_failure_where_that_is_asked_for(stored):
