@@ -70,7 +70,8 @@ def test_the_table_names_the_machine_and_what_is_missed():
                      Row('back', 's', {'p50': 0.1, 'max': 0.2})], about)
     assert 'A fast one' in text
     assert ('| `~/thing` (a note) | 3 / 9 ms | peer: 2 / 3 ms | 1.5 / 3 | '
-            'p50 at most 1.6 times the peer: met<br>p99 at most 2 times the peer: MISSED |') in text
+            'p50 at most 1.6 times the peer: met<br>'
+            'p99 at most 2 times the peer: MISSED |') in text
     assert '| bytes | 21 B/s | | | |' in text
     assert '| back (p50, max) | 0.1 / 0.2 s | | | |' in text
 
