@@ -3,8 +3,10 @@ PYTHON_IN_VENV := .venv/bin/python
 TESTS ?= test
 
 SECONDS ?= 60
+# Options of bench/run.py, such as '--json run.json --plot DIR'.
+BENCH ?=
 
-.PHONY: help demo test check lint unit fuzz soak clean environment
+.PHONY: help demo test check lint unit fuzz soak bench clean environment
 
 help:
 	@echo 'make demo    a simulated light and the bridge: the main job, shown'
@@ -13,6 +15,7 @@ help:
 	@echo 'make lint    ruff, mypy and the linters of ROS'
 	@echo 'make fuzz    hostile input to both sides of the link for SECONDS=60'
 	@echo 'make soak    simulator and bridge with random faults for SECONDS=60'
+	@echo 'make bench   every target measured beside its peers, 5 minutes'
 	@echo 'make clean   remove .venv and what was built'
 
 environment:
@@ -40,6 +43,9 @@ fuzz: environment
 
 soak: environment
 	@$(PYTHON_IN_VENV) test/soak/run.py --seconds $(SECONDS)
+
+bench: environment
+	@$(PYTHON_IN_VENV) bench/run.py $(BENCH)
 
 clean:
 	rm -rf .venv build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis

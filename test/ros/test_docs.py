@@ -19,6 +19,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.ros import beam, beam_output, mounting
@@ -34,6 +35,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / 'README.md').read_text()
+PERFORMANCE = (ROOT / 'doc' / 'performance.md').read_text()
 DESIGN = (ROOT / 'doc' / 'design.md').read_text()
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 BEAM = (ROOT / 'doc' / 'beam.md').read_text()
@@ -147,3 +149,9 @@ def _module(name: str) -> Any:
         except ModuleNotFoundError:
             continue
     raise AssertionError(f'no module {name}')
+
+
+def test_performance_has_each_subject_of_the_benchmark() -> None:
+    # The last one is there only where bench/promises.py is.
+    rows = table(PERFORMANCE, 'subject')[:len(SUBJECTS)]
+    assert [cells[0] for cells in rows] == [f'`{subject}`' for subject in SUBJECTS]

@@ -1,0 +1,66 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The script that a user would write: pymavlink's recv_match in an rclpy node.
+
+It sends the command and waits for its acknowledgement, and takes that for the light being on; it
+neither looks at the status nor resends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from typing import Any
+
+os.environ['MAVLINK20'] = '1'
+
+from pymavlink import mavutil  # noqa: E402
+import rclpy  # noqa: E402
+from rclpy.executors import ExternalShutdownException  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
+
+ON_OFF = 405
+
+
+def main() -> None:
+    """Serve a light at the URL given until SIGINT."""
+    connection = mavutil.mavlink_connection(sys.argv[1], source_system=1, source_component=191)
+    rclpy.init()
+    node = rclpy.create_node('straightforward')
+
+    def answer(request: Any, response: Any) -> Any:
+        connection.mav.command_long_send(1, 243, ON_OFF, 0, float(request.data), 0, 0, 0, 0, 0, 0)
+        while True:
+            ack = connection.recv_match(type='COMMAND_ACK', blocking=True, timeout=1.0)
+            if ack is None or ack.command == ON_OFF:
+                break
+        response.success = ack is not None and ack.result == 0
+        return response
+
+    def beat() -> None:
+        connection.mav.heartbeat_send(18, 8, 0, 0, 4)
+
+    connection.wait_heartbeat()
+    node.create_timer(1.0, beat)
+    node.create_service(SetBool, '~/enable', answer)
+    print('ready', flush=True)
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(node)
+
+
+if __name__ == '__main__':
+    main()

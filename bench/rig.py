@@ -1,0 +1,239 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Programs to measure, a client to measure with, and what the kernel knows of a process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+import contextlib
+from dataclasses import dataclass
+import itertools
+import os
+from pathlib import Path
+import random
+import socket
+import sys
+import threading
+import time
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from std_srvs.srv import SetBool
+from support.processes import Program, python, ROOT
+
+__all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory',
+           'PATIENCE', 'peer', 'PEERS', 'Program', 'python', 'ROOT', 'running', 'settle',
+           'simulator', 'udp_queue']
+
+PEERS = Path(__file__).with_name('peers')
+# s; for whatever must come sooner or later.
+PATIENCE = 60.0
+_numbers = itertools.count()
+_ports: Iterator[int] = iter(())
+
+
+@dataclass
+class Bench:
+    """
+    What is asked of a run.
+
+    :param quick: measure next to nothing, to see that it works.
+    :param soak: s.
+    :param lights: numbers of lights that get a node each.
+    :param domain: the ROS domain of its own.
+    """
+
+    quick: bool = False
+    soak: float = 15.0
+    lights: Sequence[int] = (1, 10, 100)
+    domain: int = 0
+
+    def amount(self, full: Any, quick: Any) -> Any:
+        """Return how much to do."""
+        return quick if self.quick else full
+
+    def say(self, text: str) -> None:
+        """Tell how far it is."""
+        print(f'  {text}', file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """Yield a ROS domain that no test and no other benchmark on this machine uses meanwhile."""
+    global _ports
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    with socket.socket(socket.AF_UNIX) as claim:
+        while True:
+            domain = random.randint(1, 100)
+            with contextlib.suppress(OSError):
+                claim.bind(f'\0illuminator_ros_test_domain_{domain}')
+                break
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        # Ports of the domain (DDSI-RTPS, 9.6.1.1), which nobody else claims; they are those of
+        # its participants 70 and up, whom nobody has seen.
+        first = 7400 + 250 * domain
+        _ports = itertools.cycle(range(first + 150, first + 250))
+        yield domain
+
+
+def free_port() -> int:
+    """Return a UDP port that nobody uses, nor will be given by the system."""
+    for port in itertools.islice(_ports, 100):
+        with contextlib.suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
+            probe.bind(('127.0.0.1', port))
+            return port
+    raise RuntimeError('no UDP port is free')
+
+
+@contextlib.contextmanager
+def running(program: Program) -> Iterator[Program]:
+    """End a program, whatever happens."""
+    try:
+        yield program
+        if program.running:
+            program.end()
+    finally:
+        program.kill()
+
+
+def bridge(url: str, **parameters: Any) -> Any:
+    """Run the bridge, once it has opened its link."""
+    given = {'connection_url': url, **parameters}
+    overrides = [text for name, value in given.items() for text in ('-p', f'{name}:={value}')]
+    return _ready(python('illuminator_ros.bridge', '--ros-args', *overrides), 'link open')
+
+
+def simulator(url: str, *arguments: str) -> Any:
+    """Run simulated lights."""
+    return running(python('illuminator_ros.simulator', url, '--plain', *arguments))
+
+
+def peer(name: str, *arguments: str) -> Any:
+    """Run one of ``peers/``, once it has said that it is ready."""
+    path = PEERS / f'{name}.py'
+    return _ready(Program(sys.executable, str(path), *arguments), 'ready')
+
+
+@contextlib.contextmanager
+def _ready(program: Program, text: str) -> Iterator[Program]:
+    with running(program):
+        program.wait_for(text, PATIENCE)
+        yield program
+
+
+class Client:
+    """
+    A ROS node that is spun in a thread.
+
+    ``spin_until_future_complete`` would poll, and measure that.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node(f'bench_{next(_numbers)}', context=self.context)
+        self._clients: dict[str, Any] = {}
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            self._executor.spin()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        rclpy.try_shutdown(context=self.context)
+        self._thread.join(5.0)
+        self.node.destroy_node()
+
+    def client(self, service: str) -> Any:
+        """Return the client of a SetBool service, there or not."""
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(SetBool, service)
+        return self._clients[service]
+
+    def call(self, service: str, on: bool, patience: float = PATIENCE) -> tuple[float, Any]:
+        """Return the s until the caller has the answer, and the answer; None if none came."""
+        client, answered = self.client(service), threading.Event()
+        began = time.perf_counter()
+        future = client.call_async(SetBool.Request(data=on))
+        future.add_done_callback(lambda future: answered.set())
+        found = answered.wait(patience)
+        return time.perf_counter() - began, future.result() if found else None
+
+    def meet(self, service: str, *, success: bool = True) -> None:
+        """
+        Wait until a service answers, and with success where that is wanted.
+
+        A first call may get lost: the server may hear of it before it knows who asks.
+        """
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            if self.client(service).service_is_ready():
+                _, answer = self.call(service, False, 0.5)
+                if answer is not None and (answer.success or not success):
+                    return
+            time.sleep(0.002)
+        raise RuntimeError(f'{service} does not answer')
+
+    def subscribe(self, type_: Any, topic: str, take: Callable[[Any], None], qos: Any) -> None:
+        """Take what is published, in the client's thread."""
+        self.node.create_subscription(type_, topic, take, qos)
+
+
+def cpu(pid: int) -> float:
+    """Return the CPU time that all threads of a process have taken, s."""
+    # The kernel's number for the CPU clock of a process, in nanoseconds; /proc has ticks of 10 ms.
+    return time.clock_gettime((~pid << 3) | 2)
+
+
+def settle(pid: int) -> None:
+    """Wait until a process has nothing left to do."""
+    until = time.monotonic() + PATIENCE
+    before = cpu(pid)
+    while time.monotonic() < until:
+        time.sleep(0.03)
+        if cpu(pid) - before < 0.001:
+            return
+        before = cpu(pid)
+    raise RuntimeError('a program does not come to rest')
+
+
+def memory(pid: int) -> dict[str, float]:
+    """Return what a process takes, MB: Rss, Pss, and Private_Dirty, which is its own alone."""
+    lines = Path(f'/proc/{pid}/smaps_rollup').read_text().splitlines()[1:]
+    values = {line.split(':')[0]: int(line.split()[1]) * 1024 / 1e6 for line in lines}
+    return {name: values[name] for name in ('Rss', 'Pss', 'Private_Dirty')}
+
+
+def udp_queue(port: int) -> tuple[int, int]:
+    """Return the bytes that wait in the socket of a UDP port, and the datagrams it had to drop."""
+    for line in Path('/proc/net/udp').read_text().splitlines()[1:]:
+        fields = line.split()
+        if fields[1].endswith(f':{port:04X}'):
+            return int(fields[4].partition(':')[2], 16), int(fields[-1])
+    raise RuntimeError(f'nobody has UDP port {port}')
+
+
+def interleaved(names: Sequence[str], rounds: int) -> Iterator[str]:
+    """Yield each name once a round, in alternate order: what drifts is then shared."""
+    for number in range(rounds):
+        yield from names if number % 2 == 0 else reversed(names)

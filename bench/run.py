@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Measures the bridge beside its peers, and prints each figure with its target.
+
+    make bench                                  all of it, 5 minutes; needs ROS (rclpy)
+    python3 bench/run.py --only enable status   these subjects
+    python3 bench/run.py --json run.json        and keep every figure
+    python3 bench/run.py --from run.json --markdown --plot DIR    show a run that was kept
+
+Exit status: 0; 1 if a measurement fails, or with --check if a target is missed; 2 if an argument
+is wrong. Figures are worth something on a machine that does nothing else: so a missed target is
+told but is no failure unless that is asked for.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import importlib
+import json
+import os
+from pathlib import Path
+import sys
+import tempfile
+import time
+from typing import Any, TextIO
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
+
+from bench.report import as_json, from_json, lines, machine, markdown  # noqa: E402
+from bench.rows import Row  # noqa: E402
+from bench.subjects import SUBJECTS  # noqa: E402
+
+
+def measure(
+    names: Sequence[str], to: TextIO, **wanted: Any,
+) -> tuple[list[Row], dict[str, float], list[str]]:
+    """
+    Return the rows of some subjects, the s that each took, and those that failed.
+
+    :param to: where they are shown as they come.
+    :param wanted: see :class:`bench.rig.Bench`.
+    """
+    # Slow, and not needed to show a run that was kept.
+    from bench.rig import Bench, own_domain
+
+    rows: list[Row] = []
+    took: dict[str, float] = {}
+    failed = []
+    with tempfile.TemporaryDirectory() as home, own_domain() as domain:
+        os.environ['ROS_HOME'] = home
+        bench = Bench(domain=domain, **wanted)
+        for number, name in enumerate(names, 1):
+            bench.say(f'{number}/{len(names)} {name}: {SUBJECTS[name]}')
+            began = time.monotonic()
+            try:
+                for row in importlib.import_module(f'bench.subjects.{name}').measure(bench):
+                    rows.append(row)
+                    print('\n'.join(lines(row)), file=to, flush=True)
+            except Exception as error:
+                # The others are worth having all the same.
+                failed.append(name)
+                print(f'{name} FAILED: {error!r}', file=sys.stderr, flush=True)
+                if bench.quick:
+                    raise
+            took[name] = round(time.monotonic() - began, 1)
+    return rows, took, failed
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    subjects = '\n'.join(f'  {name:14} {text}' for name, text in SUBJECTS.items())
+    result = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog=f'subjects:\n{subjects}')
+    result.add_argument('--only', nargs='+', choices=SUBJECTS, metavar='SUBJECT',
+                        help='measure these only')
+    result.add_argument('--quick', action='store_true',
+                        help='measure next to nothing: it shows that the benchmark works')
+    result.add_argument('--soak', type=float, default=15.0, metavar='SECONDS',
+                        help='length of the soak (default: %(default)g)')
+    result.add_argument('--lights', type=int, nargs='+', default=[1, 10, 100], metavar='N',
+                        help='numbers of lights for the subject nodes (default: 1 10 100)')
+    result.add_argument('--json', type=Path, metavar='FILE', help='write all figures here')
+    result.add_argument('--plot', type=Path, metavar='DIR',
+                        help='draw PNGs here; needs matplotlib (pip install .[bench])')
+    result.add_argument('--markdown', action='store_true',
+                        help='print the table of doc/performance.md')
+    result.add_argument('--from', dest='stored', type=Path, metavar='FILE',
+                        help='measure nothing, show what --json has written')
+    result.add_argument('--check', action='store_true',
+                        help='exit with 1 if a target is missed')
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run it; return the exit status."""
+    options = parser().parse_args(arguments)
+    # What is printed with --markdown is the table and nothing else.
+    to = sys.stderr if options.markdown else sys.stdout
+    about: dict[str, Any]
+    failed: list[str] = []
+    if options.stored:
+        values = json.loads(options.stored.read_text())
+        rows, about, took = from_json(values), values['machine'], values['took']
+        if not options.markdown:
+            print('\n'.join(line for row in rows for line in lines(row)))
+    else:
+        about = machine()
+        names = options.only or list(SUBJECTS)
+        rows, took, failed = measure(
+            names, to, quick=options.quick, soak=options.soak, lights=options.lights)
+    if options.json:
+        options.json.write_text(json.dumps(as_json(rows, about, took), indent=1) + '\n')
+    if options.markdown:
+        print(markdown(rows, about))
+    if options.plot:
+        from bench.plot import draw
+        for path in draw(rows, options.plot):
+            print(path)
+    targets = [(row, target) for row in rows for target in row.targets]
+    missed = [(row, target) for row, target in targets if not target.met]
+    print(f'{len(targets) - len(missed)} of {len(targets)} targets met, {len(rows)} rows, '
+          f'{sum(took.values()):.0f} s', *(f'FAILED: {name}' for name in failed), sep='; ',
+          file=to)
+    for row, target in missed:
+        print(f'  missed: {row.what}: {target.text} ({target.value:.3g}, limit '
+              f'{target.limit:.3g})', file=to)
+    return 1 if failed or (options.check and missed) else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

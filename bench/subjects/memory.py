@@ -1,0 +1,55 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the bridge takes in memory above an empty node, each with a service that was used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import time
+
+from ..rig import Bench, bridge, Client, free_port, memory, peer, simulator
+from ..rows import at_most, middle, Row
+
+CALLS = 20
+# s of a light's statuses before it is looked.
+SERVED = 4.0
+LIMIT_MB = 15.0
+
+
+def measure(bench: Bench) -> Iterator[Row]:
+    """Compare processes that have been started, used, and left in peace for a moment."""
+    took: list[tuple[dict[str, float], dict[str, float]]] = []
+    for _ in range(bench.amount(3, 1)):
+        port = free_port()
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(simulator(f'udpout://127.0.0.1:{port}'))
+            ours = stack.enter_context(bridge(f'udpin://127.0.0.1:{port}'))
+            empty = stack.enter_context(peer('empty_server'))
+            with Client(bench.domain) as client:
+                for name in ('/illuminator/enable', '/empty/enable'):
+                    client.meet(name)
+                    for number in range(bench.amount(CALLS, 2)):
+                        client.call(name, number % 2 == 0)
+                time.sleep(bench.amount(SERVED, 0.1))
+                took.append((memory(ours.pid), memory(empty.pid)))
+    for name, what in (('Rss', 'resident (RSS)'), ('Pss', 'shared pages divided (PSS)'),
+                       ('Private_Dirty', 'its own alone (private dirty)')):
+        above = middle([ours[name] - empty[name] for ours, empty in took])
+        yield Row(
+            f'memory, {what}', 'MB', middle([ours[name] for ours, _ in took]),
+            {'empty node': middle([empty[name] for _, empty in took])},
+            [at_most(above['value'], LIMIT_MB, 'MB above the peer')] if name == 'Rss' else [],
+            f'{above["value"]:.1f} MB above; median of {len(took)} starts')

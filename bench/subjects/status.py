@@ -1,0 +1,112 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From an ILLUMINATOR_STATUS on the wire to a subscriber of ``~/uptime``.
+
+Against a bare publisher and subscriber: from before the call of ``publish`` to the subscriber.
+All times are of CLOCK_MONOTONIC, which the processes of a machine share. ``~/uptime`` names the
+status by itself, and is the last of the seven topics of one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import socket
+import time
+from typing import Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float64
+
+from ..light import Sender
+from ..rig import Bench, bridge, Client, free_port, interleaved, PATIENCE, peer
+from ..rows import quantiles, Row, times
+
+STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                   durability=DurabilityPolicy.TRANSIENT_LOCAL)
+OURS, BARE, RELAY = 'bridge', 'bare publisher', 'bare relay'
+# s between two; more than any of it takes.
+INTERVAL = 0.008
+BLOCK = 50
+
+
+def measure(bench: Bench) -> Iterator[Row]:
+    """Publish each in blocks, in alternate order."""
+    port, control_port = free_port(), free_port()
+    took: dict[str, list[float]] = {name: [] for name in (OURS, BARE, RELAY)}
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(bridge(f'udpin://127.0.0.1:{port}'))
+        stack.enter_context(peer('publisher', str(control_port)))
+        client = stack.enter_context(Client(bench.domain))
+        sender = stack.enter_context(contextlib.closing(Sender(port)))
+        control = stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
+        control.connect(('127.0.0.1', control_port))
+        now = OURS
+        counts = dict.fromkeys(took, 0)
+
+        def came(message: Any) -> None:
+            at = time.monotonic()
+            counts[OURS] += 1
+            # The value that a late subscriber gets first was sent before it was there.
+            took[OURS].append((at - sender.sent[round(message.data * 1000)]) * 1e3)
+
+        def came_bare(message: Any) -> None:
+            at = time.monotonic()
+            counts[now] += 1
+            took[now].append((at - message.data) * 1e3)
+
+        def wait(name: str, count: int) -> None:
+            until = time.monotonic() + 0.5
+            while counts[name] < count and time.monotonic() < until:
+                time.sleep(INTERVAL)
+
+        def block(name: str, size: int) -> None:
+            nonlocal now
+            now, before = name, counts[name]
+            if name == OURS:
+                sender.stream(size * INTERVAL - INTERVAL / 2, INTERVAL)
+            elif name == BARE:
+                control.send(f'publish {size} {INTERVAL}'.encode())
+                time.sleep(size * INTERVAL)
+            else:
+                for _ in range(size):
+                    control.send(f'relay {time.monotonic()!r}'.encode())
+                    time.sleep(INTERVAL)
+            wait(name, before + size)
+
+        client.subscribe(Float64, '/illuminator/uptime', came, STATE)
+        client.subscribe(Float64, '/publisher/time', came_bare, STATE)
+        until = time.monotonic() + PATIENCE
+        while not all(counts[name] >= bench.amount(100, 2) for name in took):
+            for name in took:
+                block(name, 10)
+            if time.monotonic() > until:
+                raise RuntimeError(f'not all is published: {counts}')
+        for values in took.values():
+            values.clear()
+        size = bench.amount(BLOCK, 5)
+        rounds = bench.amount(12, 1)
+        for name in interleaved(list(took), rounds):
+            block(name, size)
+    found = {name: quantiles(values) for name, values in took.items()}
+    lost = {name: size * rounds - len(values) for name, values in took.items()}
+    yield Row(
+        'status on the wire to a subscriber', 'ms', found[OURS],
+        {'bare publisher and subscriber': found[BARE],
+         'a datagram in, a message out': found[RELAY]},
+        [times(found[OURS], found[BARE], 1.3, 'p50')],
+        f'{size * rounds} of each; never came: {lost[OURS]} and {lost[BARE]}',
+        {'bridge': took[OURS], 'bare publisher': took[BARE], 'bare relay': took[RELAY]})
