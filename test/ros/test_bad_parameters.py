@@ -23,7 +23,7 @@ from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
-from support.light import free_port
+from support.ports import free_port
 from support.processes import run
 from support.ros import own_domain, Ros, running_bridge
 

@@ -20,7 +20,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from std_msgs.msg import Bool
 from support.fake_light import FakeLight
-from support.light import free_port, Source
+from support.light import Source
+from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.shared_address import SharedAddress

@@ -20,7 +20,8 @@ import contextlib
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
-from support.light import eventually, free_port, ON_OFF, ServedLight, Source
+from support.light import eventually, ON_OFF, ServedLight, Source
+from support.ports import free_port
 from support.processes import Program
 from support.ros import Ros, running_bridge
 

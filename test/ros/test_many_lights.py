@@ -20,7 +20,8 @@ import contextlib
 import pytest
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
-from support.light import eventually, free_port, ON_OFF, ServedLight, Source
+from support.light import eventually, ON_OFF, ServedLight, Source
+from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 

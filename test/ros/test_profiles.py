@@ -23,7 +23,7 @@ import pytest
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
-from support.light import free_port
+from support.ports import free_port
 from support.processes import ended, Program, python
 from support.ros import own_domain, Parameters, Ros, running_bridge, STREAM
 

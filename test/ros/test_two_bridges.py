@@ -20,7 +20,7 @@ import contextlib
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from std_srvs.srv import SetBool
-from support.light import free_port
+from support.ports import free_port
 from support.processes import ended, Program, python
 from support.relay import Relay
 from support.ros import Parameters, Recorder, Ros, running_bridge, STREAM

@@ -48,7 +48,7 @@ from std_msgs.msg import Float32  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.fault_proxy import FaultProxy, NO_FAULTS  # noqa: E402
 from support.faulty_wire import Faults  # noqa: E402
-from support.light import free_port  # noqa: E402
+from support.ports import free_port  # noqa: E402
 from support.processes import Program, python  # noqa: E402
 from support.ros import own_domain, Parameters, Ros, start_bridge  # noqa: E402
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 import queue
-import socket
 import threading
 import time
 from types import TracebackType
@@ -41,13 +40,6 @@ from illuminator_ros.mavlink.url import parse_url
 
 LIGHT = Source(1, 243)
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
-
-
-def free_port() -> int:
-    """Return a UDP port that nobody uses just now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return int(probe.getsockname()[1])
 
 
 class _Recorder(FakeLight):
@@ -213,5 +205,5 @@ def eventually(condition: Callable[[], Any], timeout: float = 5.0) -> Any:
     return value
 
 
-__all__ = ['CONFIGURE', 'eventually', 'free_port', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
+__all__ = ['CONFIGURE', 'eventually', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
            'ServedLight', 'Source']

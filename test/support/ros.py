@@ -20,8 +20,6 @@ from collections.abc import Iterator, Mapping
 import contextlib
 import os
 from pathlib import Path
-import random
-import socket
 import threading
 from typing import Any
 
@@ -40,6 +38,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from support.light import eventually
+from support.ports import claimed_domain
 from support.processes import ended, Program, python
 from support.recording import Call, Recorder
 
@@ -51,26 +50,12 @@ STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
     """Yield a ROS domain that nobody else on this machine uses meanwhile."""
-    with socket.socket(socket.AF_UNIX) as claim:
-        while True:
-            # Domains up to 101 have ports below the ephemeral ones.
-            domain = random.randint(1, 101)
-            with contextlib.suppress(OSError):
-                _look_for_participants(domain)
-                claim.bind(f'\0illuminator_ros_test_domain_{domain}')
-                break
+    with claimed_domain() as domain:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         # The first name is that of Fast DDS 2, which Jazzy has, the second that of Fast DDS 3.
         for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
             os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
-
-
-def _look_for_participants(domain: int) -> None:
-    """Raise OSError if somebody listens where participants do (DDSI-RTPS, 9.6.1.1)."""
-    for participant in range(10):
-        with socket.socket(type=socket.SOCK_DGRAM) as probe:
-            probe.bind(('', 7410 + 250 * domain + 2 * participant))
 
 
 class Ros:

@@ -21,7 +21,7 @@ import subprocess
 import sys
 
 import pytest
-from support.light import free_port
+from support.ports import free_port
 from support.processes import ended, environment, Program, ROOT
 from support.ros import Parameters, Ros
 

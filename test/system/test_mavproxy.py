@@ -22,8 +22,8 @@ import sys
 from typing import Any
 
 import pytest
-from support.light import free_port
 from support.live_link import Bridge
+from support.ports import free_port
 from support.processes import ended, Program, python
 
 pytestmark = pytest.mark.skipif(

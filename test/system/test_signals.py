@@ -26,7 +26,8 @@ import time
 
 import pytest
 from std_srvs.srv import SetBool
-from support.light import eventually, free_port, ON_OFF, ServedLight
+from support.light import eventually, ON_OFF, ServedLight
+from support.ports import free_port
 from support.processes import environment, Program, python, STOP_LIMIT
 from support.ros import Ros, start_bridge
 

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from support.light import free_port
+from support.ports import free_port
 from support.processes import ended, Program, python
 from support.ros import Parameters, Ros, running_bridge, STREAM
 

@@ -18,12 +18,12 @@ import json
 import os
 import pty
 import signal
-import socket
 import subprocess
 import sys
 from xml.etree import ElementTree
 
 import pytest
+from support.ports import free_port
 from support.processes import environment, Program, ROOT, run
 
 from illuminator_ros.conformance.requirements import REQUIREMENTS
@@ -47,9 +47,7 @@ def start(module, *arguments):
 
 @pytest.fixture
 def url():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return f'127.0.0.1:{probe.getsockname()[1]}'
+    return f'127.0.0.1:{free_port()}'
 
 
 @pytest.fixture

@@ -25,7 +25,8 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import LiveLink
-from support.open_channel import bound_socket, free_port, listening_socket
+from support.open_channel import bound_socket, listening_socket
+from support.ports import free_port
 from support.waiting import Log
 
 from illuminator_ros.mavlink import link as link_module

@@ -26,7 +26,7 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import LiveLink, Talker
-from support.open_channel import free_port
+from support.ports import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
 

@@ -24,7 +24,7 @@ from typing import Any, Protocol
 
 import pytest
 from support.live_link import Bridge, Jump, Lights, LiveLink
-from support.open_channel import free_port
+from support.ports import free_port
 from support.ptys import PtyDevice
 from support.relay import Relay
 

@@ -23,7 +23,8 @@ import struct
 from typing import Any
 
 import pytest
-from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
+from support.open_channel import bound_socket, listening_socket, OpenChannel
+from support.ports import free_port
 
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel, tcp
 from illuminator_ros.mavlink.url import parse_url

@@ -24,7 +24,8 @@ import struct
 from typing import Any
 
 import pytest
-from support.open_channel import free_port, OpenChannel
+from support.open_channel import OpenChannel
+from support.ports import free_port
 from support.waiting import PATIENCE
 
 from illuminator_ros.mavlink.transport import ChannelLost

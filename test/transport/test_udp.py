@@ -22,7 +22,8 @@ import socket
 from typing import Any
 
 import pytest
-from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
+from support.open_channel import bound_socket, has_nothing, OpenChannel
+from support.ports import free_port
 
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 from illuminator_ros.mavlink.url import Address, UdpUrl

@@ -24,7 +24,8 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink
-from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
+from support.open_channel import bound_socket, has_nothing, OpenChannel
+from support.ports import free_port
 
 from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
 from illuminator_ros.mavlink.framing import Decoder
