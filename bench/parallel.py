@@ -46,6 +46,8 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 from support.light import ON_OFF, ServedLight, Source  # noqa: E402
 
+from illuminator_ros.mavlink.link import Link  # noqa: E402
+
 
 def quantile(times: list[float], share: float) -> float:
     """Return the time that this share of them does not exceed."""
@@ -84,7 +86,8 @@ def main() -> int:
         stack.enter_context(program(
             'illuminator_ros.bridge', '--ros-args', '-p',
             f'connection_url:=udpin://127.0.0.1:{port}', '-p', 'target_component:=243'))
-        lights = [stack.enter_context(ServedLight(port, Source(1, 243 + number), stream=1.0))
+        lights = [stack.enter_context(ServedLight(
+                      port, Source(1, 243 + number), link=Link, stream=1.0))
                   for number in range(LIGHTS)]
         rclpy.init()
         client, nagging = Client(names), Client([silent_name])

@@ -131,7 +131,7 @@ class Soak:
                               (self.restarted, 'simulator')):
             if not program.running:
                 self.problems.append(f'{name} has ended by itself')
-            elif program.end()[0] != 0:
+            elif program.end() != 0:
                 self.problems.append(f'{name} did not end with 0')
             program.kill()
             if 'Traceback' in program.log or 'internal error' in program.log:
