@@ -247,19 +247,19 @@ def start_bridge(domain: int, port: int, *arguments: str, **parameters: Any) -> 
                   env={'ROS_DOMAIN_ID': str(domain)})
 
 
+def start_slow_bridge(domain: int, port: int, *arguments: str, **parameters: Any) -> Program:
+    """Start the bridge, by the tests' slow clock, see :mod:`support.slow`."""
+    return slow_python(
+        'illuminator_ros.bridge', *bridge_arguments(port, *arguments, **parameters),
+        env={'ROS_DOMAIN_ID': str(domain)})
+
+
 @contextlib.contextmanager
 def running_bridge(
     domain: int, port: int, *arguments: str, until: str = 'link open', **parameters: Any,
 ) -> Iterator[Program]:
-    """
-    Run the bridge by the tests' slow clock, see :mod:`support.slow`.
-
-    At its end it must end as it promises, and have had no traceback.
-    """
-    bridge = slow_python(
-        'illuminator_ros.bridge', *bridge_arguments(port, *arguments, **parameters),
-        env={'ROS_DOMAIN_ID': str(domain)})
-    with ended(bridge):
+    """Run the bridge, by the slow clock; it must end as it promises, and have no traceback."""
+    with ended(start_slow_bridge(domain, port, *arguments, **parameters)) as bridge:
         bridge.wait_for(until)
         yield bridge
 

@@ -20,21 +20,32 @@ import signal
 
 import pytest
 from std_srvs.srv import SetBool
-from support.light import CONFIGURE, MavResult, ON_OFF, ServedLight
+from support.embedded import embedded_bridge
+from support.light import CONFIGURE, eventually, MavResult, ON_OFF, ServedLight
 from support.processes import Program
-from support.ros import Parameters, Ros, start_bridge
+from support.ros import Parameters, Ros, start_slow_bridge
+from support.slow import CLOCK, pass_time_until
+from support.waiting import PATIENCE
+
+from illuminator_ros.ros import process as process_module
 
 
 @contextlib.contextmanager
 def lit(ros: Ros, port: int, **parameters: object) -> Iterator[tuple[Program, ServedLight]]:
     """Run a bridge with a light that is on."""
     with ServedLight(port, enable=1) as light:
-        program = start_bridge(ros.domain, port, **{'off_on_shutdown': True, **parameters})
+        program = start_slow_bridge(
+            ros.domain, port, **{'off_on_shutdown': True, **parameters})
         try:
             Parameters(ros).wait(brightness=100.0)
             yield program, light
         finally:
             program.kill()
+
+
+def goes_off(light: ServedLight) -> None:
+    # The bridge does not wait for it beyond its end.
+    eventually(lambda: light.fake.fields['enable'] == 0)
 
 
 def ends(program: Program, number: int = signal.SIGTERM) -> bool:
@@ -46,7 +57,7 @@ def test_the_light_is_switched_off(own_ros: Ros, port: int, number: int) -> None
     with lit(own_ros, port) as (program, light):
         assert ends(program, number)
 
-        assert light.fake.fields['enable'] == 0
+        goes_off(light)
 
 
 def test_without_it_the_light_is_left_as_it_is(own_ros: Ros, port: int) -> None:
@@ -56,13 +67,20 @@ def test_without_it_the_light_is_left_as_it_is(own_ros: Ros, port: int) -> None:
         assert light.commands(ON_OFF) == []
 
 
-def test_a_lost_command_is_sent_again(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port) as (program, light):
+def test_a_lost_command_is_sent_again(
+    own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(process_module, 'OFF_LIMIT', PATIENCE)
+    with (ServedLight(port, enable=1) as light,
+          embedded_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge):
+        Parameters(own_ros).wait(brightness=100.0)
         light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
 
-        assert ends(program)
+        bridge.end()
+        light.wait_for(ON_OFF)
+        CLOCK.forward(0.5)
 
-        assert light.fake.fields['enable'] == 0
+        goes_off(light)
 
 
 def test_a_light_that_says_nothing_does_not_hold_the_node(own_ros: Ros, port: int) -> None:
@@ -88,14 +106,14 @@ def test_requests_that_the_light_takes_long_for_do_not_hold_it_up(
 
         assert ends(program)
 
+        goes_off(light)
         assert [command.param1 for command in light.commands(ON_OFF)] == [1.0, 0.0]
-        assert light.fake.fields['enable'] == 0
 
 
 def test_a_lost_light_is_not_waited_for(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port, heartbeat_timeout=1.1) as (program, light):
+    with lit(own_ros, port) as (program, light):
         light.fake.silent = True
-        program.wait_for('lost')
+        pass_time_until(lambda: program.count('lost'))
 
         assert ends(program)
 

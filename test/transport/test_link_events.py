@@ -106,6 +106,12 @@ def test_tries_after_a_loss_are_not_reported(
 
 
 @pytest.fixture
+def endless_probation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no channel count as one that leads somewhere for the time alone that it was open."""
+    monkeypatch.setattr(link_module, 'PROBATION', 3600.0)
+
+
+@pytest.fixture
 def door(port: int) -> Iterator[socket.socket]:
     """Return a server that takes connections, for who drops them at once."""
     with listening_socket(port=port) as server:
@@ -119,7 +125,7 @@ def slam(door: socket.socket, times: int) -> None:
 
 
 def test_a_server_that_drops_every_connection_is_reported_once(
-    run: Run, port: int, door: socket.socket,
+    run: Run, port: int, door: socket.socket, endless_probation: None,
 ) -> None:
     link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
     slam(door, 5)
@@ -129,6 +135,7 @@ def test_a_server_that_drops_every_connection_is_reported_once(
 
 def test_a_server_that_drops_every_connection_is_asked_more_and_more_rarely(
     run: Run, port: int, door: socket.socket, monkeypatch: pytest.MonkeyPatch,
+    endless_probation: None,
 ) -> None:
     pauses = record_pauses(monkeypatch)
     run(LiveLink(f'tcp://127.0.0.1:{port}'))
@@ -153,7 +160,7 @@ def record_pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
 
 
 def test_a_server_that_has_dropped_connections_is_open_once_it_says_something(
-    run: Run, port: int, door: socket.socket,
+    run: Run, port: int, door: socket.socket, endless_probation: None,
 ) -> None:
     link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
     slam(door, 2)
@@ -190,7 +197,7 @@ def test_a_link_that_has_worked_is_tried_again_at_once(
 
 
 def test_a_server_that_speaks_and_closes_is_given_a_pause(
-    run: Run, port: int, monkeypatch: pytest.MonkeyPatch,
+    run: Run, port: int, monkeypatch: pytest.MonkeyPatch, endless_probation: None,
 ) -> None:
     pauses = record_pauses(monkeypatch)
     with listening_socket(port=port) as server:

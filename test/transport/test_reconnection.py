@@ -28,6 +28,11 @@ from support.ports import free_port
 from support.ptys import PtyDevice
 from support.relay import Relay
 
+from illuminator_ros.illuminator.light import Settings
+
+# s after which a light is lost; a machine that stands still for a while loses none.
+SILENCE = 30.0
+
 
 class Other(Protocol):
     """The other side of a bridge's link, which can go and come back."""
@@ -138,7 +143,7 @@ def other(
 @pytest.fixture
 def bridge(run: Callable[..., Any], other: Other, clock: Jump) -> Any:
     """Return the drone's side, to whom nobody has spoken yet."""
-    return run(Bridge(other.url, clock=clock))
+    return run(Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
 
 
 def lose(bridge: Any, other: Other, clock: Jump, count: int = 1) -> None:
@@ -147,7 +152,7 @@ def lose(bridge: Any, other: Other, clock: Jump, count: int = 1) -> None:
     # What it has still sent is taken first.
     bridge.ask(lambda now: None)
     # On UDP nothing but silence tells.
-    clock.ahead += 4.0
+    clock.ahead += SILENCE
     bridge.link.call(lambda now: None)
     bridge.lights.wait_for(lambda entry: entry[0] == 'lost', count=count)
 
