@@ -76,6 +76,10 @@ WRONG: dict[str, tuple[tuple[str, ...], str]] = {
 }
 
 
+# s; the first test waits for a program to be started for each of them.
+pytestmark = pytest.mark.timeout(300)
+
+
 @pytest.fixture(scope='module')
 def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with files that cannot be used."""
