@@ -27,7 +27,9 @@ from support.live_link import Bridge, Jump, Lights, LiveLink
 from support.ports import free_port
 from support.ptys import PtyDevice
 from support.relay import Relay
+from support.waiting import PATIENCE
 
+from illuminator_ros.illuminator import operation
 from illuminator_ros.illuminator.light import Settings
 
 # s after which a light is lost; a machine that stands still for a while loses none.
@@ -115,6 +117,12 @@ class _Router:
     def close(self) -> None:
         self._relay.stop()
         self._lights.stop()
+
+
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no change fail because the machine stood still behind its acknowledgement."""
+    monkeypatch.setattr(operation, 'CONFIRMATION_TIMEOUT', PATIENCE)
 
 
 @pytest.fixture
