@@ -24,6 +24,7 @@ from support.light import eventually, MavResult, ON_OFF, ServedLight, Source
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import pass_time_until
 
 # s; the default.
 HEARTBEAT_TIMEOUT = 3.0
@@ -159,5 +160,8 @@ def test_a_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
     lights[node].serve()
     connected.wait_value(True)
     assert enable(node, ros).success
-    assert ros.call(Trigger, f'{node}/refresh', Trigger.Request()).success
+    refreshed = ros.start(Trigger, f'{node}/refresh', Trigger.Request())
+    # A status that was asked for when it had gone already is first asked for once more.
+    pass_time_until(lambda: refreshed.answered, step=0.1)
+    assert refreshed.result().success
     assert fleet[0].count('is served by') == served
