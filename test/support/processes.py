@@ -126,7 +126,8 @@ def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = No
     from support.slow import CLOCK
     return Program(
         sys.executable, '-m', 'support.slow_program', module, *arguments,
-        env={'PYTHONPATH': os.pathsep.join((str(ROOT), str(ROOT / 'test'))),
+        env={'PYTHONPATH': os.pathsep.join(filter(None, (
+            str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
              **CLOCK.environment, **(env or {})})
 
 

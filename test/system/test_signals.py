@@ -31,13 +31,25 @@ from support.ports import free_port
 from support.processes import environment, Program, python
 from support.ros import Ros, start_bridge
 
+from illuminator_ros import termination
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.ros import process
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 # Programs at a time; more would only measure how they wait for each other.
 AT_ONCE = 3
 # s; what Fast DDS has by default.
 LEASE = 20.0
+
+HANGING = """
+import threading
+from illuminator_ros.entry import enter
+def hang(termination):
+    termination.calls(threading.Event().wait)
+    print('hanging', flush=True)
+    threading.Event().wait()
+enter('program', hang)
+"""
 
 # Exit status, and what was printed.
 Ending = tuple[int, str]
@@ -162,6 +174,18 @@ def test_the_node_is_gone_from_the_graph_at_once(ros: Ros) -> None:
 
         # A participant that only fell silent would be listed for as long as its lease runs.
         eventually(lambda: case.node not in ros.node.get_node_names(), LEASE / 2)
+
+
+def test_a_program_that_hangs_ends_all_the_same() -> None:
+    program = Program(sys.executable, '-c', HANGING)
+    program.wait_for('hanging')
+
+    assert program.end(signal.SIGTERM) == 0
+
+
+def test_the_parts_of_an_end_have_time_before_it_is_forced_and_that_is_within_a_second() -> None:
+    assert (process.OFF_LIMIT + process.STOP_LIMIT + process.THREADS_LIMIT
+            < termination.LIMIT < 1.0)
 
 
 def test_impatience_changes_nothing(ros: Ros) -> None:
