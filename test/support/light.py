@@ -25,6 +25,7 @@ from types import TracebackType
 from typing import Any
 
 from support.fake_light import FakeLight
+from support.ports import free_port
 from support.slow import SlowLink, SPEED
 from support.waiting import PATIENCE
 
@@ -225,5 +226,5 @@ def eventually(condition: Callable[[], Any], timeout: float = PATIENCE) -> Any:
     return value
 
 
-__all__ = ['CONFIGURE', 'eventually', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
+__all__ = ['CONFIGURE', 'eventually', 'free_port', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
            'ServedLight', 'Source']
