@@ -21,13 +21,11 @@ for a second makes nothing time out; a test that wants something to time out set
 
 from __future__ import annotations
 
-import atexit
 from collections.abc import Callable, Mapping
 import mmap
 import os
 from pathlib import Path
 import selectors
-import tempfile
 import time
 from typing import Any
 
@@ -72,11 +70,10 @@ class SlowClock:
 def _open_clock() -> SlowClock:
     if path := os.environ.get(VARIABLE):
         return SlowClock(Path(path))
-    descriptor, name = tempfile.mkstemp(prefix='illuminator_ros_test_clock_')
+    # A file in memory: it goes with the last process that has it, however that ends.
+    descriptor = os.memfd_create('clock of tests')
     os.write(descriptor, bytes(8))
-    os.close(descriptor)
-    atexit.register(Path(name).unlink, missing_ok=True)
-    return SlowClock(Path(name))
+    return SlowClock(Path(f'/proc/{os.getpid()}/fd/{descriptor}'))
 
 
 CLOCK = _open_clock()
