@@ -26,7 +26,7 @@ from typing import Any
 
 from support.fake_light import FakeLight
 from support.ports import free_port
-from support.slow import SlowLink, SPEED
+from support.slow import CLOCK, SlowLink, SPEED
 from support.waiting import PATIENCE
 
 from illuminator_ros.mavlink.dialect import (
@@ -159,12 +159,19 @@ class ServedLight:
         self._link.call(lambda now: answer.put(action(now)))
         return answer.get(timeout=PATIENCE)
 
-    def report(self, **fields: Any) -> None:
-        """Send one status, some fields of which have changed without anybody asking."""
-        def act(now: float) -> None:
+    def report(self, **fields: Any) -> float:
+        """
+        Send one status, some fields of which have changed without anybody asking.
+
+        Return its uptime, s; that of no status before is the same.
+        """
+        def act(now: float) -> float:
             self.fake.fields |= fields
             self.fake.send(self.fake.status(now))
-        self.do(act)
+            return self.fake.uptime_ms(now) / 1000
+
+        CLOCK.forward(0.002)
+        return float(self.do(act))
 
     def restart(self, **fields: Any) -> None:
         """Lose power and come back with the default settings, or others."""

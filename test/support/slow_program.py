@@ -19,6 +19,7 @@ from __future__ import annotations
 from importlib import import_module
 import signal
 import sys
+from typing import Any
 
 # Where each of them has the link that it makes.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.process',
@@ -31,7 +32,13 @@ def main(module: str) -> int:
     # is to take a signal.
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     from support.slow import SlowLink
-    import_module(PLACES[module]).Link = SlowLink  # type: ignore[attr-defined]
+    from support.waiting import PATIENCE
+    place: Any = import_module(PLACES[module])
+    place.Link = SlowLink
+    # What it takes to end in order on a busy machine it is to have.
+    import_module('illuminator_ros.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
+    if hasattr(place, 'OFF_LIMIT'):
+        place.OFF_LIMIT = PATIENCE / 2
     return int(import_module(module).main())
 
 

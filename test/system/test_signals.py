@@ -29,7 +29,7 @@ from std_srvs.srv import SetBool
 from support.light import eventually, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import environment, Program, python
-from support.ros import Ros, start_bridge
+from support.ros import Ros, start_bridge, start_slow_bridge
 
 from illuminator_ros import termination
 from illuminator_ros.mavlink.link import Link
@@ -84,9 +84,9 @@ class Case:
         """Let a random time pass: the moment of the signal is what is tested."""
         time.sleep(self.random.uniform(0.0, longest))
 
-    def bridge(self) -> Program:
+    def bridge(self, start: Callable[..., Program] = start_bridge) -> Program:
         self._programs.append(
-            start_bridge(self.ros.domain, self.port, '-r', f'__node:={self.node}'))
+            start(self.ros.domain, self.port, '-r', f'__node:={self.node}'))
         return self._programs[-1]
 
     def simulator(self) -> Program:
@@ -167,7 +167,8 @@ def test_a_program_ends(
 
 def test_the_node_is_gone_from_the_graph_at_once(ros: Ros) -> None:
     with Case(ros, 'graph') as case:
-        program = case.bridge()
+        # By the slow clock, so that it is not forced to end before it has left.
+        program = case.bridge(start_slow_bridge)
         eventually(lambda: case.node in ros.node.get_node_names())
 
         program.end(signal.SIGTERM)
