@@ -21,6 +21,7 @@ import contextlib
 import ctypes
 import os
 from pathlib import Path
+import select
 import signal
 import subprocess
 import sys
@@ -36,16 +37,18 @@ PR_SET_PDEATHSIG = 1
 
 
 class Program:
-    """A process whose output (standard output and error together) can be waited for."""
+    """A process whose output, standard output and error together, can be waited for."""
 
     def __init__(self, *command: str, env: Mapping[str, str] | None = None,
                  cwd: Path | None = None) -> None:
         self._process = subprocess.Popen(
-            command, text=True, env=environment(env), cwd=cwd or ROOT, errors='replace',
+            command, env=environment(env), cwd=cwd or ROOT, bufsize=0,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             preexec_fn=_end_with_parent)
-        self.lines: list[str] = []
-        self._grown = threading.Condition()
+        self._lines: list[str] = []
+        self._rest = b''
+        self._ended = False
+        self._grown = threading.Condition(threading.RLock())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -55,16 +58,42 @@ class Program:
         return self._process.pid
 
     @property
+    def lines(self) -> list[str]:
+        """All whole lines that were printed until now, not only those that were read by now."""
+        with self._grown:
+            while self._take():
+                # The thread that reads gets none of it.
+                self._grown.notify_all()
+            return list(self._lines)
+
+    @property
     def log(self) -> str:
-        """All that was printed so far."""
+        """All that was printed until now."""
         return ''.join(self.lines)
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
+        going = True
+        while going:
+            # Without the lock, which others want meanwhile.
+            select.select([self._process.stdout], [], [])
             with self._grown:
-                self.lines.append(line)
+                going = self._take() or not self._ended
                 self._grown.notify_all()
+
+    def _take(self) -> bool:
+        """Take what has been printed; return whether there was anything."""
+        output = self._process.stdout
+        assert output is not None
+        if self._ended or not select.select([output], [], [], 0.0)[0]:
+            return False
+        data = os.read(output.fileno(), 65536)
+        self._ended = not data
+        *whole, self._rest = (self._rest + data).split(b'\n')
+        if self._ended and self._rest:
+            whole, self._rest = [*whole, self._rest], b''
+        self._lines += [line.decode(errors='replace') + '\n' for line in whole]
+        return bool(data)
 
     def wait_for(self, text: str, timeout: float = PATIENCE, count: int = 1) -> None:
         """Wait until ``count`` lines with this text have been printed."""
