@@ -76,7 +76,8 @@ class Termination:
             end = self._end
         # Before that nothing has been begun that would have to be ended.
         if end is not None:
-            end()
+            # Not here: whatever it may wait for, the time runs.
+            threading.Thread(target=end, name='end', daemon=True).start()
             time.sleep(LIMIT)
         _exit()
 

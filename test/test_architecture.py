@@ -17,6 +17,7 @@
 import ast
 from collections.abc import Iterator
 from pathlib import Path
+import re
 import subprocess
 import warnings
 
@@ -140,6 +141,16 @@ def tracked() -> list[Path]:
     if listed:
         return [ROOT / name for name in listed if (ROOT / name).exists()]
     return [*MODULES.values(), *sorted((ROOT / 'test').rglob('*.py'))]
+
+
+# The rest of what is here measures, or is a clock itself.
+CLOCKS = re.compile(r'\btime\.(monotonic|perf_counter|process_time|clock_gettime|time)(_ns)?\(')
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'test').rglob('test_*.py')),
+                         ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_test_looks_at_a_clock_of_the_machine(path: Path) -> None:
+    assert not CLOCKS.search(path.read_text())
 
 
 def test_files_are_of_a_size_to_be_read_at_once() -> None:

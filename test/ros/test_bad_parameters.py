@@ -26,7 +26,7 @@ from illuminator_ros.ros.parameters import ParameterError
 from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from rclpy.parameter import Parameter
-from support.light import free_port
+from support.ports import free_port
 from support.processes import run
 from support.ros import own_domain, Ros, running_bridge
 
@@ -73,6 +73,10 @@ WRONG: dict[str, tuple[tuple[str, ...], str]] = {
     'a clock setting of the wrong type': (
         ('-p', 'use_sim_time:=maybe'), "Trying to set parameter 'use_sim_time' to 'maybe'"),
 }
+
+
+# s; the first test waits for a program to be started for each of them.
+pytestmark = pytest.mark.timeout(300)
 
 
 @pytest.fixture(scope='module')

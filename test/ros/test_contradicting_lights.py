@@ -17,15 +17,16 @@
 from collections.abc import Iterator
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
 import pytest
 from std_msgs.msg import Bool
 from support.fake_light import FakeLight
-from support.light import free_port, Source
+from support.light import Source
+from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.shared_address import SharedAddress
+from support.slow import CLOCK, SlowLink, SPEED
 
 SHARED = 'several lights answer as 1/1: their statuses contradict one another'
 
@@ -36,10 +37,11 @@ def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
     port = free_port()
     url = f'udpout://127.0.0.1:{port}'
     lights = SharedAddress(
-        FakeLight(Source(1, 1), heartbeat_type=None, stream=0.1, brightness=100.0),
-        FakeLight(Source(1, 1), heartbeat_type=None, stream=0.1, enable=1, brightness=40.0))
+        FakeLight(Source(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=100.0),
+        FakeLight(Source(1, 1), heartbeat_type=None, stream=0.1 * SPEED, enable=1,
+                  brightness=40.0))
     with running_bridge(domain, port) as bridge:
-        link = Link(parse_url(url), lights, label=url)
+        link = SlowLink(parse_url(url), lights, label=url)
         link.start()
         bridge.wait_for('several lights answer as 1/1: parameters stay as they are')
         yield bridge, lights
@@ -53,7 +55,9 @@ def test_diagnostics_warn_of_it(
         return any(status.name == 'illuminator: lamp' and status.level == DiagnosticStatus.WARN
                    and SHARED in status.message for status in array.status)
 
-    ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait(warned)
+    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+    CLOCK.forward(1.0)
+    recorder.wait(warned)
 
 
 def test_topics_go_on_to_show_each_status(

@@ -21,9 +21,11 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
+from support.embedded import resting_bridge
 from support.light import ServedLight
 from support.recording import Recorder
 from support.ros import Ros, running_bridge, STREAM
+from support.slow import CLOCK
 
 INFORMATION = 396
 # What is text by nature; all other values are one number or true or false.
@@ -68,6 +70,7 @@ def wait_for(
     """Wait until the values of the link or the lamp are as wanted, and return them."""
     index = ('link', 'lamp').index(part)
     recorder.clear()
+    CLOCK.forward(0.1)
     return values(recorder.wait(
         lambda array: len(array.status) == 2 and wanted(values(array.status[index]))
     ).status[index])
@@ -83,23 +86,28 @@ class TestArray:
     def test_it_comes_once_a_second(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
             recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-            recorder.wait()
-            recorder.clear()
+            for _ in range(3):
+                recorder.clear()
+                CLOCK.forward(1.0)
+                recorder.wait()
 
-            arrays = [recorder.wait(count=n) for n in (1, 2)]
+    @pytest.mark.parametrize('period', [0.1, 0.3, 1.0, 1.1, 60.0])
+    @pytest.mark.parametrize('late', [0.0, 0.1], ids=['looks in time', 'some looks late'])
+    def test_its_period_is_a_parameter(
+        self, domain: int, monkeypatch: pytest.MonkeyPatch, period: float, late: float,
+    ) -> None:
+        now, published = 1000.0, []
+        with resting_bridge(domain, lambda: now, diagnostics_period=period) as process:
+            node, tick = process.node, process._tick
+            monkeypatch.setattr(node, 'publish_diagnostics', lambda: published.append(now))
+            monkeypatch.setattr(node, '_worst', lambda now: node._levels)
 
-        stamps = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9 for array in arrays]
-        assert stamps[1] - stamps[0] == pytest.approx(1.0, abs=0.2)
+            for look in range(10 * round(period / tick) + 1):
+                now = 1000.0 + tick * (look + late * (look % 2))
+                node.poll(tick / 2)
 
-    def test_its_period_is_a_parameter(self, own_ros: Ros, port: int) -> None:
-        with running_bridge(own_ros.domain, port, diagnostics_period=0.1):
-            recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-            recorder.wait(count=2)
-            first, last = recorder.messages[0], recorder.wait(count=11)
-
-        stamps = [array.header.stamp.sec + array.header.stamp.nanosec / 1e9
-                  for array in (first, last)]
-        assert stamps[1] - stamps[0] == pytest.approx(1.0, abs=0.3)
+        assert published == pytest.approx(
+            [1000.0 + number * period for number in range(11)], abs=late * tick + 1e-6)
 
 
 class TestHardwareId:
@@ -119,9 +127,11 @@ class TestHardwareId:
     ) -> None:
         light = ServedLight(port)
         light.fake.identity = type(light.fake.identity)('maker', 'torch', '', '', '')
-        with running_bridge(own_ros.domain, port), light:
+        with running_bridge(own_ros.domain, port) as bridge, light:
             recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+            bridge.wait_for('is maker torch')
 
+            CLOCK.forward(1.0)
             array = recorder.wait(lambda array: len(array.status) == 2)
 
             assert array.status[1].hardware_id == 'mavlink:1/243'
@@ -131,13 +141,17 @@ class TestHardwareId:
     ) -> None:
         light = ServedLight(port)
         light.fake.answers.discard(INFORMATION)
-        with running_bridge(own_ros.domain, port, diagnostics_period=0.1), light:
+        with running_bridge(own_ros.domain, port, diagnostics_period=0.1) as bridge, light:
             recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+            bridge.wait_for('connected')
+            # As long as it is waited for who the light is.
+            CLOCK.forward(2.0)
             array = recorder.wait(lambda array: len(array.status) == 2)
             assert array.status[1].hardware_id == 'mavlink:1/243'
 
             light.send(light.fake.information())
 
+            CLOCK.forward(0.1)
             told = recorder.wait(lambda array: 'serial_number' in values(array.status[-1]))
             assert told.status[1].hardware_id == 'mavlink:1/243'
 

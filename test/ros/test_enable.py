@@ -18,11 +18,14 @@ import re
 
 import pytest
 from std_srvs.srv import SetBool
-from support.light import MavResult, ON_OFF, ServedLight, Source
+from support.light import MavCmd, MavResult, ON_OFF, ServedLight, Source
 from support.recording import Call
 from support.ros import Ros
+from support.slow import CLOCK, SPEED
 
 MS = r'\d+ ms'
+# s for which each try is waited for at most.
+A_TRY = 0.5
 
 
 def start(ros: Ros, on: bool = True) -> Call:
@@ -31,11 +34,6 @@ def start(ros: Ros, on: bool = True) -> Call:
 
 def enable(ros: Ros, on: bool = True) -> SetBool.Response:
     return start(ros, on).result()
-
-
-@pytest.fixture(scope='module')
-def settings() -> dict[str, float]:
-    return {'command_timeout': 0.2}
 
 
 @pytest.fixture(autouse=True)
@@ -98,54 +96,69 @@ def test_a_result_that_mavlink_does_not_know_is_a_refusal(
 
 def test_a_light_that_rejects_for_a_moment_is_asked_again(ros: Ros, light: ServedLight) -> None:
     light.fake.results[ON_OFF] = [MavResult.TEMPORARILY_REJECTED, MavResult.ACCEPTED]
+    call = start(ros)
+    light.wait_for(ON_OFF)
+    ros.catch_up()
 
-    response = enable(ros)
+    CLOCK.forward(A_TRY)
 
-    assert response.success
-    assert '(2 tries, ' in response.message
+    assert call.result().success
+    assert '(2 tries, ' in call.result().message
 
 
 def test_a_light_that_accepts_and_stays_dark_has_failed(ros: Ros, light: ServedLight) -> None:
     light.fake.applies = False
+    call = start(ros)
+    light.wait_for(ON_OFF)
+    ros.catch_up()
 
-    response = enable(ros)
+    CLOCK.forward(1.0)
 
-    assert not response.success
+    assert not call.result().success
     assert re.fullmatch(
         r'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off '
-        r'\(1 try, 1\.\d\d s\)', response.message)
+        r'\(1 try, 1\.\d\d s\)', call.result().message)
 
 
 def test_a_light_that_changes_a_little_later_has_succeeded(
     ros: Ros, light: ServedLight,
 ) -> None:
-    light.fake.apply_after = 0.4
+    light.fake.apply_after = 0.9
+    call = start(ros)
+    light.wait_for(ON_OFF)
+    ros.catch_up()
+    assert not call.answered
 
-    response = enable(ros)
+    CLOCK.forward(0.9)
 
-    light.fake.apply_after = 0.0
-    assert response.success
-    assert 'confirmed by' in response.message
+    assert call.result().success
+    assert 'confirmed by' in call.result().message
 
 
 def test_a_light_whose_status_stays_away_has_failed(ros: Ros, light: ServedLight) -> None:
     light.fake.stream = 0.0
     light.fake.pushes = False
     light.fake.answers.discard(440)
+    call = start(ros)
+    # What has accepted is asked for its status.
+    light.wait_for(MavCmd.REQUEST_MESSAGE)
 
-    response = enable(ros)
+    CLOCK.forward(1.0)
 
-    assert not response.success
-    assert 'but no ILLUMINATOR_STATUS came within 1.0' in response.message
+    assert not call.result().success
+    assert re.search(
+        r'but no ILLUMINATOR_STATUS came within 1\.\d\d s', call.result().message)
 
 
 def test_a_silent_light_is_tried_again_and_has_failed(ros: Ros, light: ServedLight) -> None:
     light.fake.results[ON_OFF] = None
+    call = start(ros)
+    for tries in range(1, 5):
+        light.wait_for(ON_OFF, tries)
+        CLOCK.forward(A_TRY)
 
-    response = enable(ros)
-
-    assert not response.success
-    assert response.message.startswith('no acknowledgement (4 tries, ')
+    assert not call.result().success
+    assert call.result().message.startswith('no acknowledgement (4 tries, ')
     assert [command.confirmation for command in light.commands(ON_OFF)] == [0, 1, 2, 3]
 
 
@@ -153,11 +166,13 @@ def test_a_light_that_misses_the_first_try_is_switched_by_the_second(
     ros: Ros, light: ServedLight,
 ) -> None:
     light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
+    call = start(ros)
+    light.wait_for(ON_OFF)
 
-    response = enable(ros)
+    CLOCK.forward(A_TRY)
 
-    assert response.success
-    assert 'MAV_RESULT_ACCEPTED (2 tries, ' in response.message
+    assert call.result().success
+    assert 'MAV_RESULT_ACCEPTED (2 tries, ' in call.result().message
 
 
 def test_a_slow_light_is_waited_for_and_not_asked_again(ros: Ros, light: ServedLight) -> None:
@@ -165,10 +180,12 @@ def test_a_slow_light_is_waited_for_and_not_asked_again(ros: Ros, light: ServedL
     call = start(ros)
     light.wait_for(ON_OFF)
     light.acknowledge(ON_OFF, MavResult.IN_PROGRESS, progress=50)
+    ros.catch_up()
     light.forget()
 
-    # Longer than four tries of 0.2 s.
-    assert not call.answers_within(0.9)
+    CLOCK.forward(5 * A_TRY)
+    ros.catch_up()
+    assert not call.answered
     light.report(enable=1)
     light.acknowledge(ON_OFF, MavResult.ACCEPTED)
 
@@ -205,7 +222,7 @@ def test_an_acknowledgement_from_somebody_else_does_not_count(
 def test_two_callers_each_get_the_answer_to_their_own_request(
     ros: Ros, light: ServedLight,
 ) -> None:
-    light.fake.delays[ON_OFF] = 0.1
+    light.fake.delays[ON_OFF] = 0.1 * SPEED
 
     on, off = start(ros, True), start(ros, False)
 

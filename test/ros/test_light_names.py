@@ -21,7 +21,8 @@ from pathlib import Path
 import pytest
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
-from support.light import CONFIGURE, eventually, free_port, ServedLight, Source
+from support.light import CONFIGURE, eventually, ServedLight, Source
+from support.ports import free_port
 from support.processes import Program, run
 from support.ros import Parameters, Ros, running_bridge
 

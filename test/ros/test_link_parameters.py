@@ -14,10 +14,13 @@
 
 """What the parameters of the link do (DESIGN.md, 2)."""
 
+import re
+
 import pytest
 from std_srvs.srv import SetBool
 from support.light import MavCmd, ON_OFF, params, ServedLight, Source
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import CLOCK, pass_time_until
 
 INTERVAL = MavCmd.SET_MESSAGE_INTERVAL
 STATUS = 440.0
@@ -76,19 +79,26 @@ def test_command_retries_and_command_timeout_bound_the_wait(
         Parameters(own_ros).wait(brightness=100.0)
         light.fake.results[ON_OFF] = None
         call = own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+        for tries in range(1, retries + 2):
+            light.wait_for(ON_OFF, tries)
+            CLOCK.forward(0.1)
 
         response = call.result()
 
         assert not response.success
         assert text in response.message
-        assert call.elapsed < 0.1 * (retries + 1) + 0.2
 
 
 def test_heartbeat_timeout_is_the_silence_after_which_a_light_is_lost(
     own_ros: Ros, port: int,
 ) -> None:
-    with running_bridge(own_ros.domain, port, heartbeat_timeout=1.6) as bridge:
+    with running_bridge(own_ros.domain, port, heartbeat_timeout=20) as bridge:
         with ServedLight(port):
             bridge.wait_for('connected')
 
-        bridge.wait_for('light 1/243 lost: no heartbeat for 1.6')
+        pass_time_until(lambda: bridge.count('lost'))
+
+        [line] = [line for line in bridge.lines if 'light 1/243 lost' in line]
+        match = re.search(r'no heartbeat for (\d+)(\.\d+)? s', line)
+        assert match is not None
+        assert int(match[1]) >= 20

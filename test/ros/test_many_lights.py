@@ -20,10 +20,14 @@ import contextlib
 import pytest
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
-from support.light import eventually, free_port, ON_OFF, ServedLight, Source
+from support.light import eventually, MavResult, ON_OFF, ServedLight, Source
+from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import pass_time_until
 
+# s; the default.
+HEARTBEAT_TIMEOUT = 3.0
 # The first one is that which the target selects, whoever is heard first.
 NODES = {'/illuminator': Source(1, 244), '/illuminator_1_243': Source(1, 243),
          '/belly': Source(7, 243)}
@@ -39,7 +43,7 @@ def fleet(domain: int) -> Iterator[tuple[Program, Fleet]]:
     port = free_port()
     with contextlib.ExitStack() as stack:
         bridge = stack.enter_context(running_bridge(
-            domain, port, target_component=244, names='["7/243=belly"]', command_timeout=0.2))
+            domain, port, target_component=244, names='["7/243=belly"]'))
         lights = {node: stack.enter_context(ServedLight(port, source))
                   for node, source in sorted(NODES.items(), key=lambda item: item[1])}
         bridge.wait_for('connected', count=3)
@@ -117,7 +121,8 @@ def test_while_one_light_is_silent_the_others_answer(
         assert node == silent or enable(node, ros).success
 
     assert not waiting.answered
-    assert 'no acknowledgement' in waiting.result().message
+    lights[silent].acknowledge(ON_OFF, MavResult.FAILED, source=NODES[silent])
+    assert 'MAV_RESULT_FAILED' in waiting.result().message
 
 
 def test_while_one_light_is_silent_parameters_and_topics_of_another_go_on(
@@ -133,6 +138,7 @@ def test_while_one_light_is_silent_parameters_and_topics_of_another_go_on(
     enabled.wait_value(False)
 
     assert not waiting.answered
+    lights['/illuminator'].acknowledge(ON_OFF, MavResult.FAILED, source=NODES['/illuminator'])
     waiting.result()
 
 
@@ -146,6 +152,7 @@ def test_a_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
     served = fleet[0].count('is served by')
 
     lights[node].vanish()
+    ros.outlast(HEARTBEAT_TIMEOUT, [other for other in NODES if other != node])
     connected.wait_value(False)
     assert f'light {NODES[node]} is lost' in enable(node, ros).message
     assert all(enable(other, ros).success for other in NODES if other != node)
@@ -153,5 +160,8 @@ def test_a_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
     lights[node].serve()
     connected.wait_value(True)
     assert enable(node, ros).success
-    assert ros.call(Trigger, f'{node}/refresh', Trigger.Request()).success
+    refreshed = ros.start(Trigger, f'{node}/refresh', Trigger.Request())
+    # A status that was asked for when it had gone already is first asked for once more.
+    pass_time_until(lambda: refreshed.answered, step=0.1)
+    assert refreshed.result().success
     assert fleet[0].count('is served by') == served

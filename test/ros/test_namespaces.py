@@ -18,7 +18,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
-from support.light import free_port, ON_OFF, ServedLight
+from support.light import ON_OFF, ServedLight
+from support.ports import free_port
 from support.ros import Parameters, Ros, running_bridge, STREAM
 
 NAMESPACE = ('-r', '__ns:=/uav1')

@@ -20,6 +20,7 @@ from pathlib import Path
 import pytest
 from support.light import CONFIGURE, MavResult, ON_OFF, params, ServedLight
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import CLOCK
 
 # What the light is configured to be before anybody asks: mode, brightness, period, duty cycle.
 OWN = {'mode': 2, 'brightness': 90.0, 'strobe_period': 2.0, 'strobe_duty_cycle': 10.0}
@@ -188,5 +189,6 @@ class TestNotTaken:
         with running_bridge(ros.domain, port, brightness=60, command_retries=0) as bridge, light:
             light.wait_for(CONFIGURE)
             light.fake.results[CONFIGURE] = MavResult.ACCEPTED
+            CLOCK.forward(2.0)
 
             bridge.wait_for('light 1/243 configured: brightness 60 %')

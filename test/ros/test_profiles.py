@@ -23,9 +23,10 @@ import pytest
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool, Trigger
-from support.light import free_port
-from support.processes import ended, Program, python
-from support.ros import own_domain, Parameters, Ros, running_bridge, STREAM
+from support.ports import free_port
+from support.processes import Program
+from support.ros import own_domain, Parameters, Ros, running_bridge, running_simulator, STREAM
+from support.slow import CLOCK
 
 ENABLED = 'confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'
 
@@ -71,8 +72,7 @@ def kind(kind_name: str, domain: int) -> Iterator[tuple[Kind, Program]]:
     url = f'udpout://127.0.0.1:{port}'
     with contextlib.ExitStack() as stack:
         bridge = stack.enter_context(running_bridge(domain, port))
-        stack.enter_context(ended(python(
-            'illuminator_ros.simulator', url, '--plain', *kind.options)))
+        stack.enter_context(running_simulator(url, '--plain', *kind.options))
         bridge.wait_for(f'light {kind.address} connected')
         yield kind, bridge
 
@@ -97,7 +97,9 @@ def enable(ros: Ros, on: bool) -> SetBool.Response:
 
 def lamp(ros: Ros) -> dict[str, str]:
     """Return the values of the lamp's status."""
-    array = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait(
+    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+    CLOCK.forward(1.0)
+    array = recorder.wait(
         lambda array: any(status.name == 'illuminator: lamp' for status in array.status))
     return {value.key: value.value for value in array.status[1].values}
 

@@ -22,6 +22,7 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 from support.light import MavCmd, MavResult, ServedLight
 from support.ros import Ros
+from support.slow import CLOCK, pass_time_until
 
 STATUS, INFORMATION = 440, 396
 REQUEST = MavCmd.REQUEST_MESSAGE
@@ -30,11 +31,6 @@ MS = r'\d+ ms'
 
 def refresh(ros: Ros) -> Any:
     return ros.call(Trigger, '/illuminator/refresh', Trigger.Request())
-
-
-@pytest.fixture(scope='module')
-def settings() -> dict[str, float]:
-    return {'command_timeout': 0.1}
 
 
 @pytest.fixture(autouse=True)
@@ -73,8 +69,9 @@ def test_a_new_identity_is_logged(ros: Ros, light: ServedLight, bridge: Any) -> 
 
 def test_a_light_without_identity_is_a_success(ros: Ros, light: ServedLight) -> None:
     light.fake.answers.discard(INFORMATION)
-
-    response = refresh(ros)
+    call = ros.start(Trigger, '/illuminator/refresh', Trigger.Request())
+    pass_time_until(lambda: call.answered, step=0.1)
+    response = call.result()
 
     light.fake.answers.add(INFORMATION)
     assert response.success
@@ -90,8 +87,12 @@ def test_a_light_that_sends_no_status_has_failed(
     ros: Ros, light: ServedLight, result: MavResult | None, reason: str,
 ) -> None:
     light.fake.results[REQUEST] = result
+    call = ros.start(Trigger, '/illuminator/refresh', Trigger.Request())
+    for tries in range(1, 9) if result is None else ():
+        light.wait_for(REQUEST, tries)
+        CLOCK.forward(0.5)
 
-    response = refresh(ros)
+    response = call.result()
 
     assert not response.success
     assert f'COMPONENT_INFORMATION_BASIC: {reason}' in response.message

@@ -30,9 +30,10 @@ THERMISTOR_FAILURE = 4
 def temperature(ros: Ros, light: ServedLight) -> Recorder:
     """Return the topic of a light that measures, and sends a status only when told."""
     recorder = ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
-    light.report(temp_c=25.0, error_status=0)
-    recorder.wait()
     light.fake.stream = 0.0
+    light.report(temp_c=26.5, error_status=0)
+    # Nothing that was sent before comes behind it.
+    recorder.wait(lambda message: message.temperature == 26.5)
     return recorder
 
 

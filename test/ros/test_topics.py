@@ -20,7 +20,9 @@ import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from support.light import ServedLight
+from support.recording import Recorder
 from support.ros import Ros, running_bridge
+from support.slow import pass_time_until
 
 STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
@@ -56,12 +58,19 @@ def test_type_and_quality_of_service(
     assert profile.depth in (0, quality[2])
 
 
+@pytest.fixture(scope='module')
+def uptimes(ros: Ros, shared_bridge: object) -> Recorder:
+    """Return the topic that is published last of each status."""
+    return ros.subscribe(Float64, '/illuminator/uptime')
+
+
 @pytest.fixture
-def quiet(light: ServedLight) -> ServedLight:
+def quiet(light: ServedLight, uptimes: Recorder) -> ServedLight:
     """Return the light, which sends a status only when a test says so."""
     light.fake.stream = 0.0
-    light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0, strobe_duty_cycle=0.0,
-                 error_status=0)
+    last = light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0,
+                        strobe_duty_cycle=0.0, error_status=0)
+    uptimes.wait(lambda message: message.data >= last)
     return light
 
 
@@ -163,14 +172,14 @@ class TestConnected:
             assert recorder.wait().data is False
 
     def test_it_is_published_on_change_only(self, own_ros: Ros, port: int) -> None:
-        with running_bridge(own_ros.domain, port, heartbeat_timeout=1.1):
+        with running_bridge(own_ros.domain, port):
             recorder = own_ros.subscribe(Bool, '/illuminator/connected')
             uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
             recorder.wait()
             with ServedLight(port) as light:
                 uptime.wait(count=3)
                 light.fake.silent = True
-                recorder.wait(lambda message: not message.data, count=2)
+                pass_time_until(lambda: recorder.values.count(False) == 2)
                 light.fake.silent = False
                 uptime.wait(count=6)
 

@@ -20,10 +20,11 @@ import contextlib
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from std_srvs.srv import SetBool
-from support.light import free_port
-from support.processes import ended, Program, python
+from support.ports import free_port
+from support.processes import Program
 from support.relay import Relay
-from support.ros import Parameters, Recorder, Ros, running_bridge, STREAM
+from support.ros import Parameters, Recorder, Ros, running_bridge, running_simulator, STREAM
+from support.slow import CLOCK, pass_time_until
 
 ADDRESS = 'another sender uses our address 1/194'
 
@@ -34,7 +35,7 @@ def two(own_ros: Ros) -> Iterator[Program]:
     port = free_port()
     url = f'udpin://127.0.0.1:{port}'
     with contextlib.ExitStack() as stack:
-        stack.enter_context(ended(python('illuminator_ros.simulator', url, '--count', '2')))
+        stack.enter_context(running_simulator(url, '--count', '2'))
         for name, component in (('first', 194), ('second', 195)):
             bridge = stack.enter_context(running_bridge(
                 own_ros.domain, port, '-r', f'__node:={name}', component_id=component,
@@ -72,8 +73,11 @@ def test_the_lights_do_not_mix_up_two_bridges(own_ros: Ros, two: Program) -> Non
 
 def test_two_bridges_of_different_addresses_do_not_clash(own_ros: Ros, two: Program) -> None:
     arrays = faults(own_ros)
-    for name in ('first', 'second'):
-        arrays.wait(lambda array, name=name: array.status[0].name == f'{name}: link', count=3)
+    for count in (1, 2, 3):
+        CLOCK.forward(1.0)
+        for name in ('first', 'second'):
+            arrays.wait(lambda array, name=name: array.status[0].name == f'{name}: link',
+                        count=count)
     assert not any(ADDRESS in array.status[0].message for array in arrays.messages)
 
 
@@ -88,4 +92,5 @@ def test_two_bridges_of_one_address_both_say_so(own_ros: Ros) -> None:
                 connection_url=f'udpout://127.0.0.1:{port}'))
         arrays = faults(own_ros)
         for name in ('first', 'second'):
-            arrays.wait(says(ADDRESS, f'{name}: link', DiagnosticStatus.ERROR))
+            clash = says(ADDRESS, f'{name}: link', DiagnosticStatus.ERROR)
+            pass_time_until(lambda clash=clash: any(map(clash, list(arrays.messages))))

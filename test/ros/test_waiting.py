@@ -23,8 +23,6 @@ from support.light import CONFIGURE, MavResult, ON_OFF, ServedLight
 from support.recording import Call
 from support.ros import Parameters, Ros
 
-AT_ONCE = 0.2
-
 
 @pytest.fixture(params=['enable', 'set_parameters'])
 def waiting(

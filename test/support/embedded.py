@@ -16,32 +16,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
+import functools
 import threading
 from typing import Any
+from unittest import mock
 
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.ros import process as process_module
 from illuminator_ros.ros.node import IlluminatorNode
 from illuminator_ros.ros.process import BridgeProcess
 import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
+from support.slow import SlowLink
+from support.waiting import PATIENCE
+
+
+def _make(
+    context: Context, link: Callable[..., Link], **parameters: Any,
+) -> BridgeProcess:
+    with mock.patch.object(process_module, 'Link', link):
+        return BridgeProcess(IlluminatorNode(context=context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in parameters.items()]), [])
 
 
 @contextlib.contextmanager
 def embedded_bridge(domain: int, port: int, **parameters: Any) -> Iterator[BridgeProcess]:
-    """Run the bridge in a thread, listening on a UDP port of loopback."""
+    """Run the bridge in a thread, by the slow clock, listening on a UDP port of loopback."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)
-    given = {'connection_url': f'udpin://127.0.0.1:{port}', **parameters}
-    process = BridgeProcess(IlluminatorNode(context=context, parameter_overrides=[
-        Parameter(name, value=value) for name, value in given.items()]), [])
+    process = _make(context, SlowLink, **{
+        'connection_url': f'udpin://127.0.0.1:{port}', **parameters})
     thread = threading.Thread(target=process.run)
     thread.start()
     try:
         yield process
     finally:
         process.end()
-        thread.join(5.0)
+        thread.join(PATIENCE)
         rclpy.try_shutdown(context=context)
         assert not thread.is_alive()
+
+
+@contextlib.contextmanager
+def resting_bridge(
+    domain: int, clock: Callable[[], float], **parameters: Any,
+) -> Iterator[BridgeProcess]:
+    """Make the bridge and do not run it: what it would do is done by the test, at its times."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    process = _make(context, functools.partial(Link, clock=clock),
+                    connection_url='memory://rest', **parameters)
+    try:
+        yield process
+    finally:
+        process.link.stop()
+        process.node.destroy_node()
+        rclpy.try_shutdown(context=context)

@@ -22,7 +22,8 @@ import os
 from typing import Any
 
 import pytest
-from support.light import free_port, ServedLight
+from support.light import ServedLight
+from support.ports import free_port
 from support.processes import Program
 from support.ros import own_domain, Parameters, Ros, running_bridge
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 import queue
-import socket
 import threading
 import time
 from types import TracebackType
@@ -37,23 +36,21 @@ from illuminator_ros.mavlink.dialect import (
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
 from support.fake_light import FakeLight
+from support.ports import free_port
+from support.slow import CLOCK, SlowLink, SPEED
+from support.waiting import PATIENCE
 
 LIGHT = Source(1, 243)
+# s of the slow clock between statuses: ten in a real second.
+STREAM = 0.1 * SPEED
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
-
-
-def free_port() -> int:
-    """Return a UDP port that nobody uses just now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        return int(probe.getsockname()[1])
 
 
 class _Recorder(FakeLight):
     """
     A fake light that keeps what it got, and can answer late.
 
-    :ivar delays: s from each command to its being taken, by MAV_CMD.
+    :ivar delays: s from each command to its being taken, by MAV_CMD; infinity is until released.
     :ivar steps: what it rounds brightness to, 0 for nothing.
     :ivar heard_from: the addresses that commands have come from.
     :ivar most_at_once: how many commands, resends not counted, it ever had to take at a time.
@@ -90,6 +87,10 @@ class _Recorder(FakeLight):
                 round(self.fields['brightness'] / self.steps) * self.steps)
         return super().status(now)
 
+    def hurry(self, command: int, now: float) -> None:
+        self._late = [(now if late.command == command else due, source, late)
+                      for due, source, late in self._late]
+
     def poll(self, now: float) -> None:
         while self._late and self._late[0][0] <= now:
             _, source, message = self._late.pop(0)
@@ -102,14 +103,18 @@ class _Recorder(FakeLight):
 
 class ServedLight:
     """
-    A light that does what a test says, over real UDP.
+    A light that does what a test says, over real UDP, by the slow clock of :mod:`support.slow`.
 
     The attributes of ``fake`` (see :class:`~.fake_light.FakeLight`) may be set at any time.
+
+    :param link: what it is served by, a plain Link for a light that lives by the usual clock.
     """
 
-    def __init__(self, port: int, source: Source = LIGHT, **how: Any) -> None:
+    def __init__(self, port: int, source: Source = LIGHT, *, link: type[Link] = SlowLink,
+                 **how: Any) -> None:
         self.port = port
-        self.fake = _Recorder(source, **{'stream': 0.1, **how})
+        self._kind = link
+        self.fake = _Recorder(source, **{'stream': STREAM, **how})
         self._link: Link | None = None
 
     def __enter__(self) -> ServedLight:
@@ -126,7 +131,7 @@ class ServedLight:
         """Come within hearing."""
         if self._link is None:
             url = f'udpout://127.0.0.1:{self.port}'
-            self._link = Link(parse_url(url), self.fake, label=url)
+            self._link = self._kind(parse_url(url), self.fake, label=url)
             self._link.start()
 
     def vanish(self) -> None:
@@ -140,24 +145,32 @@ class ServedLight:
         self.fake.results.clear()
         self.fake.delays.clear()
         self.fake.applies = True
+        self.fake.apply_after = 0.0
         self.fake.silent = False
         self.fake.pushes = True
         self.fake.answers.add(STATUS_ID)
-        self.fake.stream = 0.1
+        self.fake.stream = STREAM
 
     def do(self, action: Callable[[float], Any]) -> Any:
         """Have ``action(now)`` called in the light's thread and return what it returns."""
         assert self._link is not None
         answer: queue.Queue[Any] = queue.Queue()
         self._link.call(lambda now: answer.put(action(now)))
-        return answer.get(timeout=5.0)
+        return answer.get(timeout=PATIENCE)
 
-    def report(self, **fields: Any) -> None:
-        """Send one status, some fields of which have changed without anybody asking."""
-        def act(now: float) -> None:
+    def report(self, **fields: Any) -> float:
+        """
+        Send one status, some fields of which have changed without anybody asking.
+
+        Return its uptime, s; that of no status before is the same.
+        """
+        def act(now: float) -> float:
             self.fake.fields |= fields
             self.fake.send(self.fake.status(now))
-        self.do(act)
+            return self.fake.uptime_ms(now) / 1000
+
+        CLOCK.forward(0.002)
+        return float(self.do(act))
 
     def restart(self, **fields: Any) -> None:
         """Lose power and come back with the default settings, or others."""
@@ -181,6 +194,13 @@ class ServedLight:
             sequences[self.fake.source] = (sequences.get(self.fake.source, 0) + count) & 0xFF
         self.do(act)
 
+    def release(self, command: int) -> None:
+        """Take now what ``delays`` has held back, and hold back no more."""
+        def act(now: float) -> None:
+            self.fake.delays.pop(command, None)
+            self.fake.hurry(command, now)
+        self.do(act)
+
     def forget(self) -> None:
         """Forget the commands received so far."""
         self.fake.received.clear()
@@ -189,7 +209,7 @@ class ServedLight:
         """Return those of the received commands that are of one kind."""
         return [message for message in list(self.fake.received) if message.command == command]
 
-    def wait_for(self, command: int, count: int = 1, timeout: float = 5.0) -> list[Any]:
+    def wait_for(self, command: int, count: int = 1, timeout: float = PATIENCE) -> list[Any]:
         """Wait until a command has come ``count`` times, and return those that have."""
         with self.fake.changed:
             assert self.fake.changed.wait_for(
@@ -203,7 +223,7 @@ def params(message: Any) -> tuple[float, float, float, float]:
     return message.param1, message.param2, message.param3, message.param4
 
 
-def eventually(condition: Callable[[], Any], timeout: float = 5.0) -> Any:
+def eventually(condition: Callable[[], Any], timeout: float = PATIENCE) -> Any:
     """Wait for what announces itself by no event, and return it."""
     until = time.monotonic() + timeout
     while not (value := condition()):

@@ -149,12 +149,15 @@ class Bridge(LiveLink):
     """
     The drone's side on a link, without ROS.
 
+    :param settings: such as how long a light is waited for.
     :ivar lights: what happened to lights: ``connected`` or ``lost``, and the light.
     """
 
-    def __init__(self, url: str, **options: Any) -> None:
+    def __init__(self, url: str, settings: Settings | None = None, **options: Any) -> None:
         self.lights: Log[tuple[str, Light]] = Log()
-        super().__init__(url, Controller(BRIDGE, Settings(), on_light=self._found), **options)
+        super().__init__(url, Controller(
+            BRIDGE, settings or Settings(), command_timeout=PATIENCE / 10, command_retries=9,
+            on_light=self._found), **options)
 
     def _found(self, light: Light) -> None:
         light.observer = _Watcher(self.lights)

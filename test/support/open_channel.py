@@ -22,6 +22,7 @@ import time
 from typing import Any
 
 from illuminator_ros.mavlink.transport import Channel
+from support.ports import free_port
 from support.waiting import PATIENCE
 
 
@@ -69,12 +70,6 @@ class OpenChannel:
         self.selector.close()
 
 
-def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = '127.0.0.1') -> int:
-    """Return a port that nobody uses."""
-    with bound_socket(host, kind) as probe:
-        return int(probe.getsockname()[1])
-
-
 def bound_socket(
     host: str = '127.0.0.1', kind: socket.SocketKind = socket.SOCK_DGRAM, port: int = 0,
 ) -> socket.socket:
@@ -88,13 +83,14 @@ def bound_socket(
 
 
 def listening_socket(host: str = '127.0.0.1', port: int = 0) -> socket.socket:
-    """Return a TCP socket that listens."""
+    """Return a TCP socket that listens, if not said otherwise on a port of these tests' own."""
     host = host.strip('[]')
     family = socket.AF_INET6 if ':' in host else socket.AF_INET
     one = socket.socket(family, socket.SOCK_STREAM)
     one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     one.settimeout(PATIENCE)
-    one.bind((host, port))
+    # Whoever closes it and listens again wants the same port, which nobody is to have meanwhile.
+    one.bind((host, port or free_port(socket.SOCK_STREAM, host)))
     one.listen()
     return one
 

@@ -21,32 +21,34 @@ import contextlib
 import ctypes
 import os
 from pathlib import Path
+import select
 import signal
 import subprocess
 import sys
 import threading
-import time
 from typing import Any
 
+from support.waiting import PATIENCE
+
 ROOT = Path(__file__).parents[2]
-# s; DESIGN.md, 3.4.
-STOP_LIMIT = 1.0
 # Looked up here: after a fork as little as possible is to happen.
 PRCTL = ctypes.CDLL(None).prctl
 PR_SET_PDEATHSIG = 1
 
 
 class Program:
-    """A process whose output (standard output and error together) can be waited for."""
+    """A process whose output, standard output and error together, can be waited for."""
 
     def __init__(self, *command: str, env: Mapping[str, str] | None = None,
                  cwd: Path | None = None) -> None:
         self._process = subprocess.Popen(
-            command, text=True, env=environment(env), cwd=cwd or ROOT, errors='replace',
+            command, env=environment(env), cwd=cwd or ROOT, bufsize=0,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             preexec_fn=_end_with_parent)
-        self.lines: list[str] = []
-        self._grown = threading.Condition()
+        self._lines: list[str] = []
+        self._rest = b''
+        self._ended = False
+        self._grown = threading.Condition(threading.RLock())
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -56,18 +58,44 @@ class Program:
         return self._process.pid
 
     @property
+    def lines(self) -> list[str]:
+        """All whole lines that were printed until now, not only those that were read by now."""
+        with self._grown:
+            while self._take():
+                # The thread that reads gets none of it.
+                self._grown.notify_all()
+            return list(self._lines)
+
+    @property
     def log(self) -> str:
-        """All that was printed so far."""
+        """All that was printed until now."""
         return ''.join(self.lines)
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
+        going = True
+        while going:
+            # Without the lock, which others want meanwhile.
+            select.select([self._process.stdout], [], [])
             with self._grown:
-                self.lines.append(line)
+                going = self._take() or not self._ended
                 self._grown.notify_all()
 
-    def wait_for(self, text: str, timeout: float = 10.0, count: int = 1) -> None:
+    def _take(self) -> bool:
+        """Take what has been printed; return whether there was anything."""
+        output = self._process.stdout
+        assert output is not None
+        if self._ended or not select.select([output], [], [], 0.0)[0]:
+            return False
+        data = os.read(output.fileno(), 65536)
+        self._ended = not data
+        *whole, self._rest = (self._rest + data).split(b'\n')
+        if self._ended and self._rest:
+            whole, self._rest = [*whole, self._rest], b''
+        self._lines += [line.decode(errors='replace') + '\n' for line in whole]
+        return bool(data)
+
+    def wait_for(self, text: str, timeout: float = PATIENCE, count: int = 1) -> None:
         """Wait until ``count`` lines with this text have been printed."""
         with self._grown:
             found = self._grown.wait_for(lambda: self.count(text) >= count, timeout)
@@ -81,20 +109,16 @@ class Program:
         """Send a signal."""
         self._process.send_signal(number)
 
-    def wait(self, timeout: float = 10.0) -> int:
+    def wait(self, timeout: float = PATIENCE) -> int:
         """Wait for the end and return the exit status."""
         status = self._process.wait(timeout)
         self._reader.join(timeout)
         return status
 
-    def end(self, number: int = signal.SIGINT) -> tuple[int, float]:
-        """Send a signal; return the exit status and the s that it took to the exit."""
-        sent = time.monotonic()
+    def end(self, number: int = signal.SIGINT) -> int:
+        """Send a signal, and return the exit status."""
         self.send(number)
-        status = self._process.wait(10.0)
-        taken = time.monotonic() - sent
-        self._reader.join(10.0)
-        return status, taken
+        return self.wait()
 
     def kill(self) -> None:
         """End it if it still runs, whatever it does."""
@@ -126,11 +150,21 @@ def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -
     return Program(sys.executable, '-m', module, *arguments, env=env)
 
 
+def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
+    """Start a module of ours that lives by the tests' slow clock, see :mod:`support.slow`."""
+    from support.slow import CLOCK
+    return Program(
+        sys.executable, '-m', 'support.slow_program', module, *arguments,
+        env={'PYTHONPATH': os.pathsep.join(filter(None, (
+            str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
+             **CLOCK.environment, **(env or {})})
+
+
 def run(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Any:
     """Run a module of ours to its end; return what :func:`subprocess.run` does."""
     return subprocess.run(
         [sys.executable, '-m', module, *arguments], env=environment(env), cwd=ROOT, text=True,
-        stdin=subprocess.DEVNULL, capture_output=True, timeout=30)
+        stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
 
 
 @contextlib.contextmanager
@@ -139,7 +173,7 @@ def ended(program: Program) -> Iterator[Program]:
     try:
         yield program
         if program.running:
-            status, _ = program.end()
+            status = program.end()
             assert (status, 'Traceback' in program.log) == (0, False), program.log
     finally:
         program.kill()

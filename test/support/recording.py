@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import threading
-import time
 from typing import Any
+
+from support.waiting import PATIENCE
 
 
 class Recorder:
@@ -45,7 +46,7 @@ class Recorder:
         with self._grown:
             self.messages.clear()
 
-    def wait(self, wanted: Callable[[Any], Any] = lambda message: True, timeout: float = 5.0,
+    def wait(self, wanted: Callable[[Any], Any] = lambda message: True, timeout: float = PATIENCE,
              count: int = 1) -> Any:
         """Wait until ``count`` messages are as wanted, and return the last of them."""
         def found() -> list[Any]:
@@ -56,7 +57,7 @@ class Recorder:
                 f'no such message among {self.messages[-3:]}')
             return found()[count - 1]
 
-    def wait_value(self, value: Any, timeout: float = 5.0) -> None:
+    def wait_value(self, value: Any, timeout: float = PATIENCE) -> None:
         """Wait until a message has this ``data``."""
         self.wait(lambda message: message.data == value, timeout)
 
@@ -67,13 +68,7 @@ class Call:
     def __init__(self, future: Any) -> None:
         self._future = future
         self._answered = threading.Event()
-        self._started = time.monotonic()
-        self.elapsed = 0.0
-        future.add_done_callback(self._note)
-
-    def _note(self, future: Any) -> None:
-        self.elapsed = time.monotonic() - self._started
-        self._answered.set()
+        future.add_done_callback(lambda future: self._answered.set())
 
     @property
     def answered(self) -> bool:
@@ -84,7 +79,7 @@ class Call:
         """Wait for the answer, and return whether it came in time."""
         return self._answered.wait(timeout)
 
-    def result(self, timeout: float = 10.0) -> Any:
+    def result(self, timeout: float = PATIENCE) -> Any:
         """Wait for the answer and return it."""
         assert self._answered.wait(timeout), f'no answer within {timeout} s'
         return self._future.result()

@@ -22,7 +22,8 @@ import socket
 import threading
 from typing import Any
 
-from support.open_channel import bound_socket, free_port
+from support.open_channel import bound_socket
+from support.ports import free_port
 from support.waiting import PATIENCE
 
 

@@ -16,12 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 import contextlib
 import os
 from pathlib import Path
-import random
-import socket
 import threading
 from typing import Any
 
@@ -39,38 +37,29 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_srvs.srv import Trigger
 from support.light import eventually
-from support.processes import ended, Program, python
+from support.ports import claimed_domain
+from support.processes import ended, Program, python, slow_python
 from support.recording import Call, Recorder
+from support.slow import CLOCK
+from support.waiting import PATIENCE
 
 STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                    durability=DurabilityPolicy.TRANSIENT_LOCAL)
-STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE,
+                    durability=DurabilityPolicy.VOLATILE)
 
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
     """Yield a ROS domain that nobody else on this machine uses meanwhile."""
-    with socket.socket(socket.AF_UNIX) as claim:
-        while True:
-            # Domains up to 101 have ports below the ephemeral ones.
-            domain = random.randint(1, 101)
-            with contextlib.suppress(OSError):
-                _look_for_participants(domain)
-                claim.bind(f'\0illuminator_ros_test_domain_{domain}')
-                break
+    with claimed_domain() as domain:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         # The first name is that of Fast DDS 2, which Jazzy has, the second that of Fast DDS 3.
         for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
             os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
-
-
-def _look_for_participants(domain: int) -> None:
-    """Raise OSError if somebody listens where participants do (DDSI-RTPS, 9.6.1.1)."""
-    for participant in range(10):
-        with socket.socket(type=socket.SOCK_DGRAM) as probe:
-            probe.bind(('', 7410 + 250 * domain + 2 * participant))
 
 
 class Ros:
@@ -95,7 +84,7 @@ class Ros:
     def close(self) -> None:
         """Leave the graph."""
         rclpy.try_shutdown(context=self.context)
-        self._thread.join(5.0)
+        self._thread.join(PATIENCE)
         self.node.destroy_node()
 
     def find_publisher(self, topic: str) -> None:
@@ -103,11 +92,21 @@ class Ros:
         eventually(lambda: self.node.count_publishers(topic))
 
     def subscribe(self, type_: Any, topic: str, qos: QoSProfile = STATE) -> Recorder:
-        """Record a topic, once its publisher is there."""
+        """Record a topic: all that is published from now on, or from the last value on."""
         recorder = Recorder()
         self.node.create_subscription(type_, topic, recorder.take, qos)
         self.find_publisher(topic)
+        if qos.durability is DurabilityPolicy.VOLATILE:
+            for node in eventually(lambda: self._publishing_nodes(topic)):
+                self._meet(node)
         return recorder
+
+    def _publishing_nodes(self, topic: str) -> list[str]:
+        """Return the full names of those who publish a topic; none while one is not known yet."""
+        found = self.node.get_publishers_info_by_topic(topic)
+        if any('UNKNOWN' in info.node_name for info in found):
+            return []
+        return [f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in found]
 
     def publisher(self, type_: Any, topic: str) -> Any:
         """Return a publisher that has been found by a subscriber in the bridge."""
@@ -128,19 +127,21 @@ class Ros:
         """
         Make sure that a node knows what we have just created.
 
-        That we know its side says nothing of that; but news of ours that it gets later does.
+        That we know its side says nothing of that. News of what we create get to it in order, so
+        it knows all that was there before a client whose question it answers.
         """
-        client = self._client(GetParameters, f'{node}/get_parameters')
-        for _ in range(2):
-            # The first question may get lost: it may come before it is known where it is from.
-            while not Call(client.call_async(GetParameters.Request())).answers_within(0.5):
-                pass
+        client = self.node.create_client(GetParameters, f'{node}/get_parameters')
+        eventually(client.service_is_ready)
+        # The first questions may get lost: they may come before it is known where from.
+        while not Call(client.call_async(GetParameters.Request())).answers_within(0.5):
+            pass
+        self.node.destroy_client(client)
 
     def _client(self, type_: Any, service: str) -> Any:
         client = self._clients.get(service)
         if client is None:
             client = self._clients[service] = self.node.create_client(type_, service)
-            eventually(client.service_is_ready, 10.0)
+            eventually(client.service_is_ready)
             self._meet(service.rpartition('/')[0])
         return client
 
@@ -148,7 +149,20 @@ class Ros:
         """Call a service, once it is there, without waiting for the answer."""
         return Call(self._client(type_, service).call_async(request))
 
-    def call(self, type_: Any, service: str, request: Any, timeout: float = 10.0) -> Any:
+    def catch_up(self, node: str = '/illuminator') -> None:
+        """Wait until a node has taken all that its light has sent until now."""
+        answer = self.call(Trigger, f'{node}/refresh', Trigger.Request())
+        assert 'ILLUMINATOR_STATUS: received' in answer.message, answer.message
+
+    def outlast(self, seconds: float, others: Iterable[str]) -> None:
+        """Let time pass so slowly that the lights of all these nodes are heard meanwhile."""
+        while seconds > 0:
+            CLOCK.forward(min(seconds, 0.5))
+            seconds -= 0.5
+            for node in others:
+                self.catch_up(node)
+
+    def call(self, type_: Any, service: str, request: Any, timeout: float = PATIENCE) -> Any:
         """Call a service and return its answer."""
         return self.start(type_, service, request).result(timeout)
 
@@ -220,22 +234,38 @@ class Parameters:
         eventually(lambda: ends() == high)
 
 
-def start_bridge(
-    domain: int, port: int, *arguments: str, env: Mapping[str, str] | None = None,
-    **parameters: Any,
-) -> Program:
-    """Start the bridge, listening on a UDP port of loopback."""
+def bridge_arguments(port: int, *arguments: str, **parameters: Any) -> list[str]:
+    """Return the command line of a bridge that listens on a UDP port of loopback."""
     given = {'connection_url': f'udpin://127.0.0.1:{port}', **parameters}
     overrides = [text for name, value in given.items() for text in ('-p', f'{name}:={value}')]
-    return python('illuminator_ros.bridge', '--ros-args', *overrides, *arguments,
-                  env={'ROS_DOMAIN_ID': str(domain), **(env or {})})
+    return ['--ros-args', *overrides, *arguments]
+
+
+def start_bridge(domain: int, port: int, *arguments: str, **parameters: Any) -> Program:
+    """Start the bridge, by the clock of this machine."""
+    return python('illuminator_ros.bridge', *bridge_arguments(port, *arguments, **parameters),
+                  env={'ROS_DOMAIN_ID': str(domain)})
+
+
+def start_slow_bridge(domain: int, port: int, *arguments: str, **parameters: Any) -> Program:
+    """Start the bridge, by the tests' slow clock, see :mod:`support.slow`."""
+    return slow_python(
+        'illuminator_ros.bridge', *bridge_arguments(port, *arguments, **parameters),
+        env={'ROS_DOMAIN_ID': str(domain)})
 
 
 @contextlib.contextmanager
 def running_bridge(
     domain: int, port: int, *arguments: str, until: str = 'link open', **parameters: Any,
 ) -> Iterator[Program]:
-    """Run the bridge; at its end it must end as it promises, and have had no traceback."""
-    with ended(start_bridge(domain, port, *arguments, **parameters)) as bridge:
+    """Run the bridge, by the slow clock; it must end as it promises, and have no traceback."""
+    with ended(start_slow_bridge(domain, port, *arguments, **parameters)) as bridge:
         bridge.wait_for(until)
         yield bridge
+
+
+@contextlib.contextmanager
+def running_simulator(*arguments: str) -> Iterator[Program]:
+    """Run the simulator by the same clock, with the same promises for its end."""
+    with ended(slow_python('illuminator_ros.simulator', *arguments)) as simulator:
+        yield simulator

@@ -24,7 +24,7 @@ from typing import Generic, TypeVar
 T = TypeVar('T')
 
 # s; only a broken promise takes that long, however busy the machine is.
-PATIENCE = 20.0
+PATIENCE = 30.0
 
 
 class Log(Generic[T]):
@@ -70,4 +70,4 @@ def eventually(condition: Callable[[], object], what: str, within: float = PATIE
     pause = threading.Event()
     while not condition():
         assert time.monotonic() < until, f'not within {within} s: {what}'
-        pause.wait(0.005)
+        pause.wait(0.01)

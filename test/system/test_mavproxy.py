@@ -21,14 +21,22 @@ import importlib.util
 import sys
 from typing import Any
 
+from illuminator_ros.illuminator import operation
 import pytest
-from support.light import free_port
 from support.live_link import Bridge
+from support.ports import free_port
 from support.processes import ended, Program, python
+from support.waiting import PATIENCE
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec('MAVProxy') is None,
     reason='MAVProxy is not installed: pip install pyserial; pip install --no-deps MAVProxy')
+
+
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no change fail because the machine stood still behind its acknowledgement."""
+    monkeypatch.setattr(operation, 'CONFIRMATION_TIMEOUT', PATIENCE)
 
 
 @pytest.fixture

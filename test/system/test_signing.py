@@ -20,9 +20,10 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from support.light import free_port
-from support.processes import ended, Program, python
-from support.ros import Parameters, Ros, running_bridge, STREAM
+from support.ports import free_port
+from support.processes import Program
+from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
+from support.slow import pass_time_until
 
 KeyFile = Callable[[str], str]
 
@@ -40,7 +41,7 @@ def key_file(tmp_path: Path) -> KeyFile:
 
 @contextlib.contextmanager
 def simulator(port: int, *options: str) -> Iterator[Program]:
-    with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}', *options)) as it:
+    with running_simulator(f'udpout://127.0.0.1:{port}', *options) as it:
         yield it
 
 
@@ -74,9 +75,9 @@ def test_who_has_not_the_key_is_not_heard_and_counted(
           simulator(port, *other)):
         diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
 
-        diagnostics.wait(link_value(counter))
+        pass_time_until(lambda: any(map(link_value(counter), list(diagnostics.messages))))
 
-        assert bridge.count('connected') == 0
+        assert bridge.count('light 1/243 connected') == 0
 
 
 def test_the_key_stands_in_no_parameter_and_no_log(own_ros: Ros, key_file: KeyFile) -> None:

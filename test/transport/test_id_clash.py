@@ -72,7 +72,7 @@ def clashes(bridge: Bridge) -> bool:
 
 def test_our_own_frames_that_come_back_are_no_clash(run: Callable[..., Any], loop: Loop) -> None:
     bridge = run(Bridge(loop.url))
-    loop.seen.wait_for(lambda entry: True, count=4, within=5.0)
+    loop.seen.wait_for(lambda entry: True, count=4)
     assert not clashes(bridge)
 
 

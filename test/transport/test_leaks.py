@@ -26,7 +26,8 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import Jump, LiveLink, resources, wait_for_openers, wait_for_resources
-from support.open_channel import bound_socket, free_port, listening_socket
+from support.open_channel import bound_socket, listening_socket
+from support.ports import free_port
 from support.ptys import PtyDevice
 from support.waiting import eventually
 

@@ -29,7 +29,8 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import LiveLink
-from support.open_channel import bound_socket, free_port, listening_socket
+from support.open_channel import bound_socket, listening_socket
+from support.ports import free_port
 from support.waiting import Log
 
 Run = Callable[[LiveLink], LiveLink]
@@ -104,6 +105,12 @@ def test_tries_after_a_loss_are_not_reported(
 
 
 @pytest.fixture
+def endless_probation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no channel count as one that leads somewhere for the time alone that it was open."""
+    monkeypatch.setattr(link_module, 'PROBATION', 3600.0)
+
+
+@pytest.fixture
 def door(port: int) -> Iterator[socket.socket]:
     """Return a server that takes connections, for who drops them at once."""
     with listening_socket(port=port) as server:
@@ -117,7 +124,7 @@ def slam(door: socket.socket, times: int) -> None:
 
 
 def test_a_server_that_drops_every_connection_is_reported_once(
-    run: Run, port: int, door: socket.socket,
+    run: Run, port: int, door: socket.socket, endless_probation: None,
 ) -> None:
     link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
     slam(door, 5)
@@ -127,6 +134,7 @@ def test_a_server_that_drops_every_connection_is_reported_once(
 
 def test_a_server_that_drops_every_connection_is_asked_more_and_more_rarely(
     run: Run, port: int, door: socket.socket, monkeypatch: pytest.MonkeyPatch,
+    endless_probation: None,
 ) -> None:
     pauses = record_pauses(monkeypatch)
     run(LiveLink(f'tcp://127.0.0.1:{port}'))
@@ -152,7 +160,7 @@ def record_pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
 
 
 def test_a_server_that_has_dropped_connections_is_open_once_it_says_something(
-    run: Run, port: int, door: socket.socket,
+    run: Run, port: int, door: socket.socket, endless_probation: None,
 ) -> None:
     link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
     slam(door, 2)
@@ -189,7 +197,7 @@ def test_a_link_that_has_worked_is_tried_again_at_once(
 
 
 def test_a_server_that_speaks_and_closes_is_given_a_pause(
-    run: Run, port: int, monkeypatch: pytest.MonkeyPatch,
+    run: Run, port: int, monkeypatch: pytest.MonkeyPatch, endless_probation: None,
 ) -> None:
     pauses = record_pauses(monkeypatch)
     with listening_socket(port=port) as server:

@@ -26,7 +26,8 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import Jump, LiveLink
-from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
+from support.open_channel import bound_socket, listening_socket, OpenChannel
+from support.ports import free_port
 
 Run = Callable[[LiveLink], LiveLink]
 

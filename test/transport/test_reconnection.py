@@ -22,11 +22,17 @@ import socket
 import threading
 from typing import Any, Protocol
 
+from illuminator_ros.illuminator import operation
+from illuminator_ros.illuminator.light import Settings
 import pytest
 from support.live_link import Bridge, Jump, Lights, LiveLink
-from support.open_channel import free_port
+from support.ports import free_port
 from support.ptys import PtyDevice
 from support.relay import Relay
+from support.waiting import PATIENCE
+
+# s after which a light is lost; a machine that stands still for a while loses none.
+SILENCE = 30.0
 
 
 class Other(Protocol):
@@ -114,6 +120,12 @@ class _Router:
         self._lights.stop()
 
 
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no change fail because the machine stood still behind its acknowledgement."""
+    monkeypatch.setattr(operation, 'CONFIRMATION_TIMEOUT', PATIENCE)
+
+
 @pytest.fixture
 def clock() -> Jump:
     """Return a clock that can be set forward, so that silence takes no time."""
@@ -140,7 +152,7 @@ def other(
 @pytest.fixture
 def bridge(run: Callable[..., Any], other: Other, clock: Jump) -> Any:
     """Return the drone's side, to whom nobody has spoken yet."""
-    return run(Bridge(other.url, clock=clock))
+    return run(Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
 
 
 def lose(bridge: Any, other: Other, clock: Jump, count: int = 1) -> None:
@@ -149,7 +161,7 @@ def lose(bridge: Any, other: Other, clock: Jump, count: int = 1) -> None:
     # What it has still sent is taken first.
     bridge.ask(lambda now: None)
     # On UDP nothing but silence tells.
-    clock.ahead += 4.0
+    clock.ahead += SILENCE
     bridge.link.call(lambda now: None)
     bridge.lights.wait_for(lambda entry: entry[0] == 'lost', count=count)
 

@@ -25,7 +25,8 @@ from typing import Any
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel, tcp
 from illuminator_ros.mavlink.url import parse_url
 import pytest
-from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
+from support.open_channel import bound_socket, listening_socket, OpenChannel
+from support.ports import free_port
 
 OpenFunction = Callable[[str], OpenChannel]
 

@@ -26,7 +26,8 @@ from typing import Any
 from illuminator_ros.mavlink.transport import ChannelLost
 from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 import pytest
-from support.open_channel import free_port, OpenChannel
+from support.open_channel import OpenChannel
+from support.ports import free_port
 from support.waiting import PATIENCE
 
 

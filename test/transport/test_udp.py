@@ -25,7 +25,8 @@ from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM
 from illuminator_ros.mavlink.url import Address, UdpUrl
 import pytest
-from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
+from support.open_channel import bound_socket, has_nothing, OpenChannel
+from support.ports import free_port
 
 OpenFunction = Callable[[str | UdpUrl], OpenChannel]
 

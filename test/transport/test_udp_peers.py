@@ -28,7 +28,8 @@ import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink
-from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
+from support.open_channel import bound_socket, has_nothing, OpenChannel
+from support.ports import free_port
 
 COMMAND = CommandLong(*LIGHT, 512, 0, 440, 0, 0, 0, 0, 0, 0)
 MARK = heartbeat(18)

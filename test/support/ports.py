@@ -1,0 +1,102 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ports and ROS domains that nobody else on this machine takes, now or later in the test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import itertools
+import random
+import socket
+
+# Above the ports that Linux gives to sockets which are bound to none, or connected: nothing takes
+# one of these by chance between the moment that a test gets it and that a program binds it. The
+# ports of ROS domains lie below.
+FIRST, END = 61_000, 65_536
+# Ports for one process of tests; a port comes again after so many others.
+BLOCK = 64
+# Domains up to 101 have ports below those that are given to anybody.
+DOMAINS = range(1, 102)
+
+
+def _claim(name: str) -> socket.socket:
+    """Return what holds a name for this process; an OSError if another one holds it."""
+    claim = socket.socket(socket.AF_UNIX)
+    try:
+        # A name in the kernel and not a file: it goes with the process, however that ends.
+        claim.bind(f'\0illuminator_ros_test_{name}')
+    except OSError:
+        claim.close()
+        raise
+    return claim
+
+
+def _shuffled(numbers: range) -> list[int]:
+    """Return numbers in any order: others have no reason to want the same first."""
+    return random.SystemRandom().sample(numbers, len(numbers))
+
+
+class _Block:
+    """The ports of this process."""
+
+    def __init__(self) -> None:
+        for first in _shuffled(range(FIRST, END - BLOCK, BLOCK)):
+            with contextlib.suppress(OSError):
+                self._claim = _claim(f'ports_{first}')
+                self.ports = itertools.cycle(range(first, first + BLOCK))
+                return
+        raise RuntimeError('all ports for tests are claimed')
+
+
+# Here and not when it is needed: tests count the descriptors that are left open.
+_BLOCK = _Block()
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = '127.0.0.1') -> int:
+    """Return a port that nobody uses, and no other process of tests will be given."""
+    host = host.strip('[]')
+    family = socket.AF_INET6 if ':' in host else socket.AF_INET
+    for port in itertools.islice(_BLOCK.ports, BLOCK):
+        with contextlib.suppress(OSError), socket.socket(family, kind) as probe:
+            probe.bind((host, port))
+            return port
+    raise RuntimeError('none of the ports for this process is free')
+
+
+@contextlib.contextmanager
+def claimed_domain() -> Iterator[int]:
+    """Yield a ROS domain that nobody else on this machine uses meanwhile."""
+    for domain in _shuffled(DOMAINS):
+        try:
+            claim = _claim(f'domain_{domain}')
+        except OSError:
+            continue
+        with claim:
+            if not _has_participants(domain):
+                yield domain
+                return
+    raise RuntimeError('all ROS domains are in use')
+
+
+def _has_participants(domain: int) -> bool:
+    """Return whether somebody listens where participants do (DDSI-RTPS, 9.6.1.1)."""
+    for participant in range(10):
+        with socket.socket(type=socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', 7410 + 250 * domain + 2 * participant))
+            except OSError:
+                return True
+    return False

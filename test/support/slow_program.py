@@ -1,0 +1,46 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Run a module of ours that lives by the clock of :mod:`support.slow`."""
+
+from __future__ import annotations
+
+from importlib import import_module
+import signal
+import sys
+from typing import Any
+
+# Where each of them has the link that it makes.
+PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.process',
+          'illuminator_ros.simulator': 'illuminator_ros.simulator.run'}
+
+
+def main(module: str) -> int:
+    """Run a module with the rest of the command line, and return its exit status."""
+    # As the module does before it imports anything: of the threads that start meanwhile, none
+    # is to take a signal.
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    from support.slow import SlowLink
+    from support.waiting import PATIENCE
+    place: Any = import_module(PLACES[module])
+    place.Link = SlowLink
+    # What it takes to end in order on a busy machine it is to have.
+    import_module('illuminator_ros.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
+    if hasattr(place, 'OFF_LIMIT'):
+        place.OFF_LIMIT = PATIENCE / 2
+    return int(import_module(module).main())
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv.pop(1)))
