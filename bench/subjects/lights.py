@@ -55,7 +55,7 @@ RATE = 800
 WARM_UP, MEASURED = 0.8, 1.2
 FLAT = 1.2
 # s for which lights are listened to once the first is found.
-LISTENING = 3.0
+LISTENING = 2.0
 
 
 class Watcher(LightObserver):

@@ -25,7 +25,7 @@ from ..rows import at_most, middle, Row
 
 CALLS = 20
 # s of a light's statuses before it is looked.
-SERVED = 4.0
+SERVED = 3.0
 LIMIT_MB = 15.0
 
 

@@ -37,7 +37,7 @@ from ..rows import at_most, quantile, Row
 
 LIMIT_MS = 1000.0
 # s that it is away; the longer, the rarer the attempts may have become.
-ABSENCES = (0.2, 1.0, 3.0, 6.0)
+ABSENCES = (0.2, 1.0, 4.0)
 # s that it is there; longer than a connection has to last to be taken for a good one.
 LASTING = 1.2
 HELLO = frame_of(heartbeat(MavType.ILLUMINATOR), 0)
