@@ -26,7 +26,7 @@ test: lint
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \
-		test/conformance test/transport/test_conformance_process.py
+		test/monitor test/conformance test/transport/test_conformance_process.py
 
 lint: environment
 	@$(PYTHON_IN_VENV) -m ruff check .

@@ -34,7 +34,8 @@ setup(
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
-    extras_require={'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4']},
+    extras_require={
+        'monitor': ['rich>=13.3'], 'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4']},
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',
@@ -44,6 +45,7 @@ setup(
         'console_scripts': [
             'bridge = illuminator_ros.bridge:main',
             'conformance = illuminator_ros.conformance:main',
+            'monitor = illuminator_ros.monitor:main',
             'simulator = illuminator_ros.simulator:main',
         ],
     },

@@ -44,7 +44,7 @@ class Program:
         self._process = subprocess.Popen(
             command, text=True, env=environment(env), cwd=cwd or ROOT, errors='replace',
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            preexec_fn=_end_with_parent)
+            preexec_fn=end_with_parent)
         self.lines: list[str] = []
         self._grown = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -108,7 +108,7 @@ class Program:
         return self._process.poll() is None
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Have the kernel end this program with the thread that starts it, should that be killed."""
     PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
 
