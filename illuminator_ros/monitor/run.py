@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import argparse
 import copy
 import os
 import sys
@@ -32,8 +31,6 @@ from rclpy.utilities import remove_ros_args
 from rich.console import Console
 from rich.live import Live
 
-from .. import __version__
-from ..command_line import number, Parser
 from ..entry import one_line
 from ..ros.spinner import Spinner
 from ..termination import Termination
@@ -41,6 +38,7 @@ from .graph import Graph
 from .keys import KeyDecoder
 from .model import Fleet, Light
 from .operator import Operator
+from .options import parser
 from .terminal import ESCAPE_TIMEOUT, Keyboard, quiet_errors, unbuffered
 from .view import plain, Scene, screen
 
@@ -50,35 +48,6 @@ INTERVAL = 0.25
 SETTLING = 1.0
 # Characters: enough for every column of a table that nobody looks at on a terminal.
 PLAIN_WIDTH = 400
-DESCRIPTION = """\
-Shows the lights in a ROS graph: state, brightness, strobe, temperature, link and errors of each
-light of every bridge, whatever it is called. Keys switch and dim the selected one; ? lists them.
-Where standard input or output is no terminal, it prints one table and ends.
-"""
-EPILOG = """\
-examples:
-  ros2 run illuminator_ros monitor
-  ros2 run illuminator_ros monitor --once | grep LOST
-  NO_COLOR=1 ros2 run illuminator_ros monitor
-
-exit status: 0 after q, ctrl-c or SIGTERM, or with a table printed; 1 if no light was found for
-that table, or a package is missing; 2 if an argument is wrong.
-"""
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    made = Parser(
-        prog='monitor', description=DESCRIPTION, epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument('--once', action='store_true', help='print one table and end')
-    made.add_argument('--wait', type=number(0.1, 3600), default=6.0, metavar='S',
-                      help='s for which lights are looked for at most before that table is '
-                           'printed (default: 6)')
-    made.add_argument('--ascii', action='store_true',
-                      help='draw with ASCII characters only')
-    made.add_argument('--version', action='version', version=__version__)
-    return made
 
 
 class Monitor:

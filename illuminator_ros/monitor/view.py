@@ -120,7 +120,7 @@ def _plain(cell: Callable[[Light], str], style: str = '') -> Callable[[Light, Sc
 
 
 COLUMNS = (
-    Column('LIGHT', 14, 0, _plain(lambda light: light.name), grows=True),
+    Column('LIGHT', 14, 0, _plain(lambda light: light.name)),
     Column('STATE', 6, 0, _state),
     Column('', BAR_WIDTH, 4, _brightness_bar, plain=False),
     Column('BRIGHT', 6, 1, _plain(lambda light: brightness(light.value('brightness')))),
@@ -157,6 +157,8 @@ def table(scene: Scene, width: int, height: int) -> Table:
     shown = columns_for(width, max((len(light.name) for light in scene.lights), default=0))
     drawn = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0),
                   header_style='bold')
+    if not any(column.grows for column in shown):
+        shown[0] = replace(shown[0], grows=True)
     for column in shown:
         # With a narrow terminal the name alone stays, in whatever room there is.
         drawn.add_column(column.title, no_wrap=True, overflow='ellipsis',
@@ -171,7 +173,7 @@ def table(scene: Scene, width: int, height: int) -> Table:
 
 def _row_style(light: Light, scene: Scene) -> str:
     # What a light that is not there any more has said is not true any more.
-    stale = light.state(scene.now) in (State.SILENT, State.GONE)
+    stale = light.state(scene.now) in (State.LOST, State.SILENT, State.GONE)
     return ('dim ' if stale else '') + ('reverse' if light.name == scene.selected else '')
 
 
