@@ -20,7 +20,7 @@ import threading
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from std_srvs.srv import SetBool
-from support.light import CONFIGURE, free_port, MavResult, ON_OFF, ServedLight, Source
+from support.light import CONFIGURE, free_port, MavResult, ServedLight, Source
 from support.monitors import Watching, watching
 from support.ros import Ros, running_bridge, STATE
 
@@ -162,16 +162,6 @@ class TestWhatItAsks:
 
         monitor.outcome('off', Outcome.DONE)
         monitor.wait(lambda light: not light.wanted)
-
-    def test_of_switches_that_come_during_one_the_newest_is_done(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        light.fake.delays[ON_OFF] = 0.1
-        for _ in range(5):
-            monitor.ask(switch)
-
-        monitor.wait(lambda light: light.value('enabled') is True and not light.wanted)
-        assert len(light.commands(ON_OFF)) < 5
 
 
 class FakeBridge:
