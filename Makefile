@@ -4,13 +4,13 @@ TESTS ?= test
 
 SECONDS ?= 60
 
-.PHONY: help demo test lint unit fuzz soak clean environment
+.PHONY: help demo test check lint unit fuzz soak clean environment
 
 help:
 	@echo 'make demo    a simulated light and the bridge: the main job, shown'
 	@echo 'make test    all tests, and the linters'
 	@echo 'make unit    the tests that need no ROS'
-	@echo 'make lint    ruff and mypy'
+	@echo 'make lint    ruff, mypy and the linters of ROS'
 	@echo 'make fuzz    hostile input to both sides of the link for SECONDS=60'
 	@echo 'make soak    simulator and bridge with random faults for SECONDS=60'
 	@echo 'make clean   remove .venv and what was built'
@@ -21,16 +21,19 @@ environment:
 demo: environment
 	@$(PYTHON_IN_VENV) demo/run.py
 
-test: lint
+test: check
 	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile $(TESTS)
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \
 		test/monitor test/conformance test/transport/test_conformance_process.py
 
-lint: environment
+check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .
 	@$(PYTHON_IN_VENV) -m mypy -p illuminator_ros
+
+lint: check
+	@$(PYTHON_IN_VENV) -m pytest -q test/lint
 
 fuzz: environment
 	@$(PYTHON_IN_VENV) test/fuzz/run.py --seconds $(SECONDS)

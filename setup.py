@@ -13,29 +13,39 @@
 # limitations under the License.
 
 from pathlib import Path
-import re
 
 from setuptools import find_packages, setup
 
 package_name = 'illuminator_ros'
-version = re.search(
-    r"__version__ = '(.+)'", Path(package_name, '__init__.py').read_text()).group(1)
+
+
+def files(folder: str) -> list[str]:
+    """Return the files that lie in a folder."""
+    return sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+
 
 setup(
     name=package_name,
-    version=version,
+    # With package.xml's set by catkin_prepare_release, which wants it written here in full.
+    version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
     package_data={package_name: ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
-        (f'share/{package_name}/config', [str(path) for path in Path('config').glob('*.yaml')]),
+        *((f'share/{package_name}/{folder}', files(folder))
+          for folder in ('config', 'config/sros2', 'launch')),
     ],
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
     extras_require={
-        'monitor': ['rich>=13.3'], 'serial': ['pyserial>=3.5'], 'yaml': ['pyyaml>=5.4']},
+        'monitor': ['rich>=13.3'],
+        'serial': ['pyserial>=3.5'],
+        'yaml': ['pyyaml>=5.4'],
+        # "colcon test" looks here for pytest.
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich'],
+    },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',

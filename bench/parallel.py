@@ -26,6 +26,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
+from pathlib import Path
 import random
 import sys
 import threading
@@ -37,12 +38,11 @@ LIGHTS, CALLS, ROUNDS = 4, 150, 4
 os.environ.setdefault('ROS_DOMAIN_ID', str(random.randint(1, 101)))
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
-from scale import free_port, program, ROOT  # noqa: E402
-
-sys.path.insert(0, str(ROOT / 'test'))
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test'))
 
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from scale import free_port, program  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
 from support.light import ON_OFF, ServedLight, Source  # noqa: E402
 

@@ -110,7 +110,7 @@ class RosClient:
         """Call ``~/enable``."""
         return self.call(SetBool, 'enable', SetBool.Request(data=on))
 
-    def set(self, **values: Any) -> list[Any]:
+    def set(self, **values: Any) -> list[Any]:  # noqa: A003
         """Set parameters one by one, as ``ros2 param set`` does; return the results."""
         return list(self.call(SetParameters, 'set_parameters', SetParameters.Request(
             parameters=_parameters(values))).results)

@@ -14,4 +14,14 @@
 
 """A MAVLink illuminator (searchlight, torch, strobe) as an ordinary ROS 2 device."""
 
-__version__ = '0.1.0'
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    __version__: str
+else:
+    def __getattr__(name):
+        """Look ``__version__`` up when it is asked for (PEP 562)."""
+        if name != '__version__':
+            raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+        from .version import read_version
+        return read_version()

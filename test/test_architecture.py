@@ -47,7 +47,6 @@ FIRST = ('', 'bridge', 'conformance', 'monitor', 'simulator', 'entry', 'terminat
 QUICK = {'__future__', 'collections', 'contextlib', 'os', 're', 'signal', 'sys', 'threading',
          'time', 'typing', PACKAGE}
 LONGEST = 300
-HEADER = '# Copyright 2026 The illuminator_ros developers\n#\n# Licensed under the Apache License'
 
 MODULES = {
     '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
@@ -163,13 +162,6 @@ def tracked() -> list[Path]:
     if listed:
         return [ROOT / name for name in listed if (ROOT / name).exists()]
     return [*MODULES.values(), *sorted((ROOT / 'test').rglob('*.py'))]
-
-
-@pytest.mark.parametrize('path', tracked(), ids=lambda path: str(path.relative_to(ROOT)))
-def test_every_file_bears_the_licence(path: Path) -> None:
-    text = path.read_text()
-
-    assert text.removeprefix('#!/usr/bin/env python3\n').startswith(HEADER)
 
 
 def test_files_are_of_a_size_to_be_read_at_once() -> None:

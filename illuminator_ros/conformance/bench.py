@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any, TypeVar
 
+from .describe import command_name, describe, status_text
 from ..illuminator.model import Configuration, DIMMING_FLAGS, Mode, NOTHING, Status
 from ..mavlink.dialect import (
     CommandAck,
@@ -44,7 +45,6 @@ from ..mavlink.dialect import (
 )
 from ..mavlink.endpoint import Endpoint
 from ..mavlink.endpoint import Heartbeat as HeartbeatTimer
-from .describe import command_name, describe, status_text
 
 # s. The developer guide's own tests wait 3 s for an acknowledgement.
 ACK_TIMEOUT = 3.0
@@ -109,12 +109,12 @@ class Transaction:
 
     @property
     def finals(self) -> list[tuple[float, Any]]:
-        """The acknowledgements that are not reports of progress."""
+        """Return the acknowledgements that are not reports of progress."""
         return [(at, ack) for at, ack in self.acks if ack.result != MavResult.IN_PROGRESS]
 
     @property
     def result(self) -> int | None:
-        """The last result, None if there is none."""
+        """Return the last result, None if there is none."""
         return self.finals[-1][1].result if self.finals else None
 
     @property
@@ -124,9 +124,8 @@ class Transaction:
 
     @property
     def answer(self) -> str:
-        """The result, for people."""
+        """Return the result, for people."""
         return 'no acknowledgement' if self.result is None else result_name(self.result)
-
 
     def finding(self, what: str = '') -> Finding:
         """Return what is wrong with the answer, and the lines that show it."""
@@ -291,7 +290,7 @@ class Bench(Endpoint):
 
     @property
     def light(self) -> Source:
-        """The light's address."""
+        """Return the light's address."""
         assert self.found is not None
         return self.found
 

@@ -22,9 +22,9 @@ import json
 from typing import Any
 from xml.etree import ElementTree
 
-from .. import __version__
 from .requirement import HEARTBEAT, Requirement, Result, Verdict
 from .requirements import REQUIREMENTS
+from .. import __version__
 
 # Lines of the exchange that a table shows; the files have more.
 SHOWN_LINES = 12
@@ -54,7 +54,7 @@ class Report:
 
     @property
     def summary(self) -> str:
-        """The last line."""
+        """Return the last line."""
         return (f'{self.count(Verdict.PASS)} passed, {self.count(Verdict.FAIL)} failed, '
                 f'{self.count(Verdict.SKIPPED)} skipped in {self.seconds:.0f} s; '
                 f'{self.restored}')

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from .bench import Bench
@@ -73,7 +73,7 @@ MESSAGES = Specification('common message set', _GUIDE + 'messages/common.html')
 ROUTING = Specification('routing', _GUIDE + 'guide/routing.html')
 SERIALIZATION = Specification('serialization', _GUIDE + 'guide/serialization.html')
 
-Check = Callable[['Bench'], Awaitable['str | None']]
+Check: TypeAlias = 'Callable[[Bench], Awaitable[str | None]]'
 
 
 @dataclass(frozen=True)

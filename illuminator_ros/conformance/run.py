@@ -29,6 +29,10 @@ import sys
 from types import FrameType
 from typing import Any
 
+from .bench import Bench
+from .report import as_json, as_junit, catalogue, lines, Report
+from .requirement import REQUIREMENTS
+from .suite import FIND_TIMEOUT, Suite
 from .. import __version__
 from ..command_line import add_signing, address, integer, number, Parser, signing
 from ..illuminator.model import Identity
@@ -36,10 +40,6 @@ from ..mavlink.dialect import Source
 from ..mavlink.link import Link, LinkEvent
 from ..mavlink.signing_files import KeyFileError
 from ..mavlink.url import parse_url, UrlError
-from .bench import Bench
-from .report import as_json, as_junit, catalogue, lines, Report
-from .requirement import REQUIREMENTS
-from .suite import FIND_TIMEOUT, Suite
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

@@ -20,8 +20,6 @@ from collections.abc import Callable, Sequence
 import logging
 import math
 
-from ..illuminator.model import Configuration, Mode, shortest, Status
-from ..mavlink.dialect import MavCmd, STATUS_ID
 from .bench import (
     Bench,
     differences,
@@ -34,6 +32,8 @@ from .bench import (
 )
 from .requirement import Failed, Requirement, Result, Skipped, Verdict
 from .requirements import REQUIREMENTS
+from ..illuminator.model import Configuration, Mode, shortest, Status
+from ..mavlink.dialect import MavCmd, STATUS_ID
 
 # s
 FIND_TIMEOUT = 10.0

@@ -300,7 +300,7 @@ class Agreement:
 
     @property
     def _replaceable(self) -> Configure | None:
-        """The setpoint that is accepted and not confirmed yet: a newer one need not wait."""
+        """Return the setpoint that is accepted but not confirmed: a newer one need not wait."""
         current = self._queue.current
         if isinstance(current, Configure) and current.stream and current.confirming:
             return current

@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from .model import Identity, Limits, Mode
 from ..mavlink.dialect import (
     MAV_AUTOPILOT_ARDUPILOTMEGA,
     MAV_AUTOPILOT_INVALID,
@@ -30,7 +31,6 @@ from ..mavlink.dialect import (
     MavType,
     Source,
 )
-from .model import Identity, Limits, Mode
 
 
 class Extension(NamedTuple):

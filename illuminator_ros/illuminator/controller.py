@@ -21,6 +21,8 @@ import itertools
 import math
 from typing import Any
 
+from .light import Light, Settings
+from .model import Identity, Status
 from ..mavlink.agenda import Agenda
 from ..mavlink.command import CommandSender, Ending
 from ..mavlink.dialect import (
@@ -32,8 +34,6 @@ from ..mavlink.dialect import (
 )
 from ..mavlink.dialect import Heartbeat as HeartbeatMessage
 from ..mavlink.endpoint import Endpoint, Heartbeat
-from .light import Light, Settings
-from .model import Identity, Status
 
 # Lights that are kept apart; one more is passed over, so that memory is bounded.
 MAX_LIGHTS = 128

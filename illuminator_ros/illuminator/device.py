@@ -28,6 +28,11 @@ import math
 import random
 from typing import Any
 
+from .behaviour import Behaviour
+from .extended_status import ExtendedIlluminatorStatus
+from .model import checked, Configuration, ErrorFlag, Identity, InvalidValue, Limits, Mode
+from .outlet import Outlet, Schedule
+from .thermal import ThermalModel, ThermalProperties
 from ..mavlink.agenda import Agenda
 from ..mavlink.dialect import (
     CommandAck,
@@ -45,11 +50,6 @@ from ..mavlink.dialect import (
     STATUS_ID,
 )
 from ..mavlink.endpoint import Endpoint
-from .behaviour import Behaviour
-from .extended_status import ExtendedIlluminatorStatus
-from .model import checked, Configuration, ErrorFlag, Identity, InvalidValue, Limits, Mode
-from .outlet import Outlet, Schedule
-from .thermal import ThermalModel, ThermalProperties
 
 # s; the fastest status stream on offer. Whoever asks for more gets this.
 SHORTEST_INTERVAL = 0.01
@@ -182,7 +182,7 @@ class Device:
 
     @property
     def source(self) -> Source:
-        """The address of the light."""
+        """Return the address of the light."""
         return self.properties.source
 
     def addressed(self, message: Any) -> bool:

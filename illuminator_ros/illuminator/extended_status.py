@@ -24,8 +24,8 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from ..mavlink.dialect import IlluminatorStatus
 from .behaviour import Extension
+from ..mavlink.dialect import IlluminatorStatus
 
 
 class ExtendedIlluminatorStatus(IlluminatorStatus):  # type: ignore[misc, valid-type]

@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from ..mavlink.dialect import MavResult, MavType
 from .behaviour import Behaviour
 from .model import ErrorFlag
+from ..mavlink.dialect import MavResult, MavType
 
 
 class FaultError(ValueError):
@@ -97,7 +97,7 @@ class Fault:
 
     @property
     def default_text(self) -> str:
-        """The value where none is given, for people; '' where there is none."""
+        """Return the value where none is given, for people; '' where there is none."""
         if self.read is None:
             return ''
         if isinstance(self.default, MavResult):

@@ -20,9 +20,9 @@ from collections.abc import Callable
 import math
 from typing import TYPE_CHECKING
 
+from .model import Identity
 from ..mavlink.command import Command, Ending, Outcome
 from ..mavlink.dialect import INFORMATION_ID, MavCmd, result_name
-from .model import Identity
 
 if TYPE_CHECKING:
     from .light import Light

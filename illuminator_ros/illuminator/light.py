@@ -20,8 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
-from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 from .agreement import Agreement
 from .identification import Identification
 from .model import ErrorFlag, Identity, Limits, Status
@@ -30,6 +28,8 @@ from .operation import Done, Enable, OperationQueue, Result
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
+from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
+from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 
 # s without a status after which the light is asked for one, and between the askings.
 STATUS_TIMEOUT = 2.5
@@ -173,12 +173,12 @@ class Light:
 
     @property
     def limits(self) -> Limits:
-        """The strobe periods that the light reports to be possible."""
+        """Return the strobe periods that the light reports to be possible."""
         return self.status.limits if self.status else Limits()
 
     @property
     def temperature(self) -> float | None:
-        """The temperature, degC; None where the light does not measure it, or its sensor fails."""
+        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
         status = self.status
         if (status is None or not self.measures_temperature
                 or status.error_flags & ErrorFlag.THERMISTOR_FAILURE):

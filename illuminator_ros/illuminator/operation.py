@@ -29,9 +29,9 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any, TYPE_CHECKING
 
+from .model import Configuration, DIMMING_FLAGS, flag_names, Mode, Status
 from ..mavlink.command import Command, Ending, format_seconds, Outcome
 from ..mavlink.dialect import MavCmd, MavResult
-from .model import Configuration, DIMMING_FLAGS, flag_names, Mode, Status
 
 if TYPE_CHECKING:
     from .light import Light
@@ -111,7 +111,7 @@ class Operation(ABC):
     @property
     @abstractmethod
     def wish(self) -> str:
-        """What the light is to become, for people."""
+        """Return what the light is to become, for people."""
 
     @abstractmethod
     def found(self, status: Status) -> str:
@@ -352,7 +352,7 @@ class OperationQueue:
 
     @property
     def current(self) -> Operation | None:
-        """The change that is on its way."""
+        """Return the change that is on its way."""
         return self._operations[0] if self._operations else None
 
     def submit(self, operation: Operation, now: float) -> None:

@@ -25,8 +25,8 @@ import math
 import random
 from typing import Any
 
-from ..mavlink.dialect import Source
 from .behaviour import Behaviour
+from ..mavlink.dialect import Source
 
 
 class Outlet:

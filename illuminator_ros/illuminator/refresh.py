@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..mavlink.command import format_seconds, Outcome
 from .operation import Done, Result
+from ..mavlink.command import format_seconds, Outcome
 
 if TYPE_CHECKING:
     from .light import Light

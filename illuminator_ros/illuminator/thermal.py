@@ -86,12 +86,14 @@ class ThermalModel:
 
     @property
     def reading(self) -> float:
-        """The temperature as the light reports it, degC."""
+        """Return the temperature as the light reports it, degC."""
         return BROKEN_READING if self._sensor_failed else self.temperature
 
     @property
     def output(self) -> float:
         """Return the share (0..1) of the brightness asked for that the light gives."""
+        if not self.flags:
+            return 1.0
         if self.flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN:
             return 0.0
         if self.flags & ErrorFlag.THERMAL_THROTTLING:
@@ -124,5 +126,5 @@ class ThermalModel:
     def _switch(self, flag: ErrorFlag, on_at: float, off_below: float) -> None:
         if self.temperature >= on_at:
             self.flags |= flag
-        elif self.temperature < off_below:
+        elif self.flags and self.temperature < off_below:
             self.flags &= ~flag

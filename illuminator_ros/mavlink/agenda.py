@@ -40,7 +40,7 @@ class Agenda(Generic[K]):
         self._entered: dict[K, float] = {}
         self._order = itertools.count()
 
-    def set(self, key: K, deadline: float) -> None:
+    def set(self, key: K, deadline: float) -> None:  # noqa: A003
         """Set the deadline of a key, infinity for none."""
         self._deadlines[key] = deadline
         if deadline < self._entered.get(key, math.inf):

@@ -69,7 +69,7 @@ class Command:
 
     @property
     def key(self) -> tuple[Source, int]:
-        """What an acknowledgement can tell apart."""
+        """Return what an acknowledgement can tell apart."""
         return self.target, self.command
 
 
@@ -98,7 +98,7 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """What happened, for people, with the name of the MAV_RESULT."""
+        """Return what happened, for people, with the name of the MAV_RESULT."""
         if self.ending is Ending.ANSWERED and self.result is not None:
             return result_name(self.result)
         last = '' if self.result is None else f', last answer {result_name(self.result)}'

@@ -100,7 +100,7 @@ def result_name(result: int) -> str:
 
 class _Field(NamedTuple):
     name: str
-    type: str
+    type: str  # noqa: A003
     code: str
     units: str = ''
     enum: str = ''
@@ -117,6 +117,7 @@ def _define(name: str, id_: int, crc_extra: int, fields: list[_Field], order: li
     """
     by_name = {field.name: field for field in fields}
     names = [field.name for field in fields]
+    strings = [field.name for field in fields if field.type == 'char']
     layout = struct.Struct('<' + ''.join(by_name[n].code for n in order))
 
     def __init__(self: Any, *values: Any, **named: Any) -> None:
@@ -125,13 +126,13 @@ def _define(name: str, id_: int, crc_extra: int, fields: list[_Field], order: li
         self._instance_field = None
         self._instance_offset = -1
         given = dict(zip(names, values, strict=False), **named)
-        if len(values) > len(names) or set(given) != set(names):
+        if len(values) > len(names) or given.keys() != by_name.keys():
             raise TypeError(f'{name} takes exactly the fields {", ".join(names)}')
-        for field, value in given.items():
-            if by_name[field].type == 'char':
-                setattr(self, f'_{field}_raw', value)
-                value = value.partition(b'\0')[0].decode('ascii', errors='replace')
-            setattr(self, field, value)
+        for field in strings:
+            value = given[field]
+            setattr(self, f'_{field}_raw', value)
+            given[field] = value.partition(b'\0')[0].decode('ascii', errors='replace')
+        self.__dict__.update(given)
 
     def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> Any:
         return self._pack(mav, crc_extra, encode_payload(self), force_mavlink1=force_mavlink1)
@@ -206,7 +207,6 @@ HANDLED: dict[int, Any] = {
 }
 
 
-
 class Layout(NamedTuple):
     """What checks a frame: the CRC_EXTRA of its message, and the longest payload known of it."""
 
@@ -220,11 +220,21 @@ LAYOUTS: dict[int, Layout] = {
     for id_, cls in {**_common.mavlink_map, **HANDLED}.items()
 }
 
+# The CRC_EXTRA of those that are not decoded, by the three bytes that hold the id in a frame.
+FOREIGN: dict[bytes, bytes] = {
+    id_.to_bytes(3, 'little'): bytes((layout.crc_extra,))
+    for id_, layout in LAYOUTS.items() if id_ not in HANDLED
+}
+
 
 def encode_payload(message: Any) -> bytes:
     """Return the payload of a message as it goes on the wire, trailing zeros not yet cut."""
     cls = type(message)
-    return bytes(cls.unpacker.pack(*(wire_value(message, n) for n in cls.ordered_fieldnames)))
+    if 'char' in cls.fieldtypes:
+        values = [wire_value(message, name) for name in cls.ordered_fieldnames]
+    else:
+        values = [getattr(message, name) for name in cls.ordered_fieldnames]
+    return bytes(cls.unpacker.pack(*values))
 
 
 def wire_value(message: Any, field: str) -> Any:

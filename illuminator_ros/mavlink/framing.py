@@ -23,13 +23,13 @@ frame is lost.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 import re
 
 from fastcrc.crc16 import mcrf4xx
 
-from .dialect import Layout, LAYOUTS, Source
+from .dialect import FOREIGN, Layout, LAYOUTS, Source
 
 STX_V1 = 0xFE
 STX_V2 = 0xFD
@@ -41,6 +41,10 @@ FLAG_SIGNED = 0x01
 MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
 STARTS = (b'\xfd', b'\xfe')
+# The sources whose foreign frames are passed over: what to call with the sequence number of each
+# one, by the two bytes that hold the address in a frame.
+Known = Mapping[bytes, Callable[[int], None]]
+NOBODY: Known = {}
 _START = re.compile(b'[\xfd\xfe]')
 
 
@@ -127,8 +131,12 @@ class Decoder:
             frames += self.feed(rest)
         return frames
 
-    def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames that ``data`` completes, in order."""
+    def feed(self, data: bytes, known: Known = NOBODY) -> list[Frame]:
+        """
+        Return the frames that ``data`` completes, in order.
+
+        Foreign ones of known sources are checked, counted and passed over.
+        """
         self.taken += len(data)
         data = self._rest + data if self._rest else data
         frames: list[Frame] = []
@@ -136,6 +144,12 @@ class Decoder:
         signature_end = self._signature_end
         while match := _START.search(data, position):
             start = match.start()
+            if known and start >= signature_end:
+                passed = self._pass_over(data, start, known)
+                if passed > start:
+                    self.counters.skipped_bytes += start - end
+                    position = end = passed
+                    continue
             found = self._read(data, start)
             if found is None:
                 if start < signature_end and self._is_frame(data, signature_end):
@@ -163,6 +177,35 @@ class Decoder:
         self._rest = data[start:]
         self._signature_end = max(signature_end - start, 0)
         return frames
+
+    def _pass_over(self, data: bytes, start: int, known: Known) -> int:
+        """
+        Pass over good, whole, unsigned and foreign frames of known sources.
+
+        Most of what a busy link carries is of this kind, so it is made nothing of.
+
+        :param start: where a frame may begin.
+        :return: where something else begins.
+        """
+        size = len(data)
+        passed = 0
+        while start < size:
+            end = start + HEADER_V2 + CHECKSUM
+            try:
+                end += data[start + 1]
+                crc_extra = FOREIGN[data[start + 7:start + HEADER_V2]]
+                count = known[data[start + 5:start + 7]]
+            except (IndexError, KeyError):
+                break
+            if (data[start] != STX_V2 or data[start + 2] or end > size
+                    or mcrf4xx(data[start + 1:end - CHECKSUM] + crc_extra)
+                    != data[end - 2] | data[end - 1] << 8):
+                break
+            count(data[start + 4])
+            passed += 1
+            start = end
+        self.counters.frames += passed
+        return start
 
     def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
         """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""

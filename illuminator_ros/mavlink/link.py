@@ -17,22 +17,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import dataclass
 import logging
 import math
-import random
+import select
 import selectors
 import socket
 import threading
 import time
 from typing import Any
 
-from .dialect import decode_payload, encode_payload, HANDLED, Source
-from .echoes import Echoes
+from .crowd import COLLECTION, Crowd
+from .departure import Departure
+from .dialect import decode_payload, HANDLED
 from .endpoint import Endpoint
-from .framing import DecoderCounters, encode_frame, Frame
+from .framing import DecoderCounters, Frame
 from .opener import Opener
 from .reception import Reception
 from .routes import Routes
@@ -136,10 +137,9 @@ class Link:
         self._stopping = threading.Event()
         self._starting = threading.Lock()
         self._channel: Channel | None = None
-        self._sequences: dict[Source, int] = {}
+        self._departure = Departure(self._signing)
         self._reception = Reception(self._signing)
         self._routes = Routes()
-        self._echoes = Echoes()
         self._traffic = Traffic()
         self._since = clock()
         # Why the link is not open, as far as others know; '' where it is.
@@ -153,6 +153,14 @@ class Link:
         # Whether a frame has come over the channel.
         self._spoken = False
         self._knock_at = math.inf
+        # When there is something to do next, s, and whether there may be before that.
+        self._due = 0.0
+        self._stirred = False
+        # Whether something has come, if only for others.
+        self._passed_over = False
+        self._crowd = Crowd()
+        self._calls_only = select.poll()
+        self._calls_only.register(self._wake_out, select.POLLIN)
         self._pause = 0.0
         self._fault_log_due = -math.inf
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
@@ -224,16 +232,30 @@ class Link:
         self._wake_in.close()
 
     def _turn(self) -> None:
-        due = min(self.endpoint.next_deadline(), self._reception.next_deadline(),
-                  self._knock_at)
-        wait = min(max(due - self.clock(), self._pause), IDLE)
+        due = min(self._due, self._reception.next_deadline())
+        now = self.clock()
+        wait = min(max(due - now, self._pause), IDLE)
         self._pause = 0.0
+        if self._crowd.collects(now) and wait > COLLECTION:
+            # A call ends it.
+            self._calls_only.poll(1000 * COLLECTION)
+            wait = 0.0
         for key, events in self._selector.select(wait):
             if key.fileobj is self._wake_out:
                 with contextlib.suppress(BlockingIOError):
                     self._wake_out.recv(4096)
             elif self._channel is not None:
                 self._serve(key.fileobj, events)
+        now = self.clock()
+        if self._stirred or self._calls or now >= due:
+            self._work()
+        elif self._passed_over:
+            self._crowd.passed(now)
+        self._passed_over = False
+
+    def _work(self) -> None:
+        """Do what others asked for, and what is due."""
+        self._stirred = False
         self._run_calls()
         if self._channel is not None:
             self._look_after(self._channel, self.clock())
@@ -241,6 +263,8 @@ class Link:
         self._flush()
         if self.clock() >= self._store_due:
             self._guarded(self._store_timestamp)
+        self._due = min(self.endpoint.next_deadline(), self._knock_at, self._proven_at,
+                        self._store_due)
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         """Call what is not ours: its fault must not end the link, nor anything else in it."""
@@ -279,7 +303,6 @@ class Link:
             if events & selectors.EVENT_READ:
                 for peer, data in self._channel.receive(handle):
                     self._take(self._channel, peer, data)
-                    self._flush()
                     if self._channel is None:
                         return
         except OSError as error:
@@ -288,24 +311,31 @@ class Link:
     def _take(self, channel: Channel, peer: Peer, data: bytes) -> None:
         self._traffic.bytes_received += len(data)
         now = self.clock()
-        for frame in self._reception.take(peer, data, now, self._wall_clock()):
-            self._accept(channel, peer, frame, now)
+        frames = self._reception.take(peer, data, now, self._wall_clock())
+        self._passed_over = True
+        if frames:
+            for frame in frames:
+                self._accept(channel, peer, frame, now)
+            self._flush()
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
-        if frame.source in self._sequences and self._echoes.has(frame, now):
+        if self._departure.is_echo(frame, now):
             return
+        self._stirred = True
         if not self._spoken:
             self._spoken = True
             self._opener.answered()
             self._announce_again(channel, now)
         self._knock_at = now + SILENCE
-        self._traffic.count(frame.source, frame.sequence)
+        counter = self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
             self._guarded(self.endpoint.link_opened, now)
         self._routes.heard(frame.source, peer, now)
         if frame.message_id in HANDLED:
             self._guarded(self.endpoint.receive, frame.source,
                           decode_payload(frame.message_id, frame.payload), now)
+        if counter is not None:
+            self._reception.know(peer, frame.source, counter.add)
 
     def _look_after(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
@@ -319,31 +349,29 @@ class Link:
     def _flush(self) -> None:
         """Send what the endpoint has to say; without a channel it is said to nobody."""
         outgoing = self.endpoint.outgoing
-        while outgoing:
-            source, message = outgoing.popleft()
-            if self._channel is not None:
-                try:
-                    self._send(self._channel, source, message)
-                except OSError as error:
-                    self._lost(error)
+        while outgoing and self._channel is not None:
+            channel, now = self._channel, self.clock()
+            all_peers = channel.peers(now)
+            peers = self._routes.towards(outgoing[0][1], all_peers, now)
+            # What goes the same way goes together: its receiver is then woken only once.
+            frames = []
+            while outgoing and self._routes.towards(outgoing[0][1], all_peers, now) == peers:
+                source, message = outgoing.popleft()
+                frames.append(self._departure.frame(source, message, now, self._wall_clock()))
+                if getattr(message, 'target_system', 0):
+                    self._crowd.asked(now)
+            try:
+                self._send(channel, frames, peers)
+            except OSError as error:
+                self._lost(error)
+        outgoing.clear()
 
-    def _send(self, channel: Channel, source: Source, message: Any) -> None:
-        # Begun anywhere: two that were started together with one address are then told apart.
-        sequence = self._sequences.get(source, random.randrange(256))
-        self._sequences[source] = (sequence + 1) & 0xFF
-        payload = encode_payload(message)
-        self._echoes.sent(source, sequence, message.id, payload, self.clock())
-        frame = encode_frame(
-            message.id, payload, sequence=sequence, source=source,
-            crc_extra=message.crc_extra, signed=self._signing.signs)
-        if self._signing.signs:
-            frame = self._signing.sign(frame, self._wall_clock())
-        peers = self._routes.towards(message, channel.peers(self.clock()), self.clock())
+    def _send(self, channel: Channel, frames: list[bytes], peers: Sequence[Peer]) -> None:
         dropped = channel.dropped
-        channel.send(frame, peers)
+        channel.send(frames, peers)
         self._traffic.frames_dropped += channel.dropped - dropped
-        self._traffic.frames_sent += len(peers)
-        self._traffic.bytes_sent += len(frame) * len(peers)
+        self._traffic.frames_sent += len(frames) * len(peers)
+        self._traffic.bytes_sent += sum(map(len, frames)) * len(peers)
 
     def _opened(self, channel: Channel, now: float) -> None:
         if self._stopping.is_set():
@@ -386,6 +414,7 @@ class Link:
     def _lost(self, error: OSError) -> None:
         if self._channel is None:
             return
+        self._stirred = True
         name, was_open = self._channel.name, not self._reason
         self._doubtful = self._proven_at < math.inf and not self._spoken
         self._close()

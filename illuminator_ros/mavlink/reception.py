@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 from typing import NamedTuple
 
+from .dialect import Source
 from .framing import Decoder, DecoderCounters, Frame
-from .signing import Signing
+from .signing import Signing, SigningMode
 from .transport import Peer
 
 # Peers whose incomplete frames are kept apart.
@@ -28,6 +30,9 @@ MAX_DECODERS = 64
 # s; the longest frame takes 0.3 s at 9600 baud. What has not come by then is no frame but noise
 # that looks like the beginning of one, and good frames are held back behind it.
 STALL = 0.5
+# s after which the first frame of each source is looked at again as if it were not known: routes
+# and peers live on what is seen of it.
+RENEWAL = 0.5
 
 
 class _Wait(NamedTuple):
@@ -36,6 +41,15 @@ class _Wait(NamedTuple):
     start: int
     taken: int
     since: float
+
+
+class _Stream:
+    """What comes from one peer."""
+
+    def __init__(self, counters: DecoderCounters) -> None:
+        self.decoder = Decoder(counters=counters)
+        self.known: dict[bytes, Callable[[int], None]] = {}
+        self.renewal = 0.0
 
 
 class Reception:
@@ -48,24 +62,49 @@ class Reception:
     def __init__(self, signing: Signing) -> None:
         self.counters = DecoderCounters()
         self._signing = signing
-        self._decoders: dict[Peer, Decoder] = {}
+        self._streams: dict[Peer, _Stream] = {}
         self._waits: dict[Peer, _Wait] = {}
 
     def __len__(self) -> int:
-        return len(self._decoders)
+        return len(self._streams)
 
     def take(self, peer: Peer, data: bytes, now: float, unix_time: float) -> list[Frame]:
-        """Return the frames that bytes of a peer complete and that are to be believed."""
-        decoder = self._decoders.get(peer)
-        if decoder is None:
-            if len(self._decoders) >= MAX_DECODERS:
-                oldest = next(iter(self._decoders))
-                del self._decoders[oldest]
-                self._waits.pop(oldest, None)
-            decoder = self._decoders[peer] = Decoder(counters=self.counters)
-        frames = decoder.feed(data)
-        self._watch(peer, decoder, now)
-        return self._believed(frames, unix_time)
+        """
+        Return the frames that bytes of a peer complete and that are to be believed.
+
+        Foreign ones of sources that are known on this peer are only counted.
+        """
+        stream = self._streams.get(peer)
+        if stream is None:
+            stream = self._new_stream(peer)
+        if now >= stream.renewal:
+            stream.renewal = now + RENEWAL
+            stream.known.clear()
+        decoder = stream.decoder
+        frames = decoder.feed(data, stream.known)
+        if decoder.incomplete is not None or self._waits:
+            self._watch(peer, decoder, now)
+        return self._believed(frames, unix_time) if frames else frames
+
+    def _new_stream(self, peer: Peer) -> _Stream:
+        if len(self._streams) >= MAX_DECODERS:
+            oldest = next(iter(self._streams))
+            del self._streams[oldest]
+            self._waits.pop(oldest, None)
+        self._streams[peer] = stream = _Stream(self.counters)
+        return stream
+
+    def know(self, peer: Peer, source: Source, count: Callable[[int], None]) -> None:
+        """
+        Have foreign frames of a source on a peer counted for a while, and nothing more.
+
+        Where signatures matter it changes nothing: each frame is then looked at.
+
+        :param count: called with the sequence number of each.
+        """
+        stream = self._streams.get(peer)
+        if stream is not None and self._signing.mode is SigningMode.OFF:
+            stream.known[bytes(source)] = count
 
     def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
         start = decoder.incomplete
@@ -85,7 +124,7 @@ class Reception:
         found = []
         for peer, wait in list(self._waits.items()):
             if now >= wait.since + STALL:
-                decoder = self._decoders[peer]
+                decoder = self._streams[peer].decoder
                 frames = decoder.give_up(wait.taken)
                 self._watch(peer, decoder, now)
                 found += [(peer, frame) for frame in self._believed(frames, unix_time)]
@@ -93,11 +132,13 @@ class Reception:
 
     def next_deadline(self) -> float:
         """Return when :meth:`give_up` has something to do, infinity if never."""
-        return min((wait.since for wait in self._waits.values()), default=math.inf) + STALL
+        if not self._waits:
+            return math.inf
+        return min(wait.since for wait in self._waits.values()) + STALL
 
     def clear(self) -> None:
         """Forget what is incomplete: the link is closed."""
-        self._decoders.clear()
+        self._streams.clear()
         self._waits.clear()
 
     def _believed(self, frames: list[Frame], unix_time: float) -> list[Frame]:

@@ -25,6 +25,7 @@ MAX_SOURCES = 256
 # How far back a late or repeated frame is still recognised. Two identical numbers further apart
 # are two frames: the number has 8 bits.
 WINDOW = 64
+_ALL_SEEN = (1 << WINDOW) - 1
 # s
 LATELY = 10.0
 
@@ -64,6 +65,8 @@ class SequenceCounter:
     duplicate: int = 0
     reordered: int = 0
     _newest: int = -1
+    # The number that follows, -1 while that is not known.
+    _next: int = -1
     # Bit i is set where number newest - i has come.
     _seen: int = 0
     _lost_lately: Lately = field(default_factory=Lately)
@@ -72,16 +75,24 @@ class SequenceCounter:
     def add(self, sequence: int) -> None:
         """Take the number of a frame that has come."""
         self.received += 1
+        if sequence == self._next:
+            self._newest, self._next = sequence, (sequence + 1) & 0xFF
+            self._seen = (self._seen << 1 | 1) & _ALL_SEEN
+            return
+        self._add_irregular(sequence)
+        self._next = (self._newest + 1) & 0xFF
+
+    def _add_irregular(self, sequence: int) -> None:
         if self._newest < 0:
             # Nothing is known of what went before, so nothing of it is missing.
-            self._newest, self._seen = sequence, (1 << WINDOW) - 1
+            self._newest, self._seen = sequence, _ALL_SEEN
             return
         ahead = (sequence - self._newest) & 0xFF
         back = 256 - ahead
         if 0 < ahead <= 128 or back > WINDOW - 1 and ahead:
             self.lost += ahead - 1 if ahead <= 128 else 0
-            seen = self._seen << ahead | 1 if ahead <= 128 else (1 << WINDOW) - 1
-            self._seen = seen & ((1 << WINDOW) - 1)
+            seen = self._seen << ahead | 1 if ahead <= 128 else _ALL_SEEN
+            self._seen = seen & (_ALL_SEEN)
             self._newest = sequence
         elif not ahead or self._seen >> back & 1:
             self.duplicate += 1
@@ -89,6 +100,10 @@ class SequenceCounter:
             self._seen |= 1 << back
             self.reordered += 1
             self.lost -= 1
+
+    def restart(self) -> None:
+        """Forget the numbers but not the counts: what comes next follows on nothing."""
+        self._newest = self._next = -1
 
     def recent_loss(self, now: float) -> float:
         """Return the share of frames lost lately, %."""
@@ -103,18 +118,23 @@ class Traffic:
     What went over a link since it was made.
 
     :param bytes_received: all, good or not.
-    :param frames_received: those with the right checksum.
     :param frames_dropped: those that found no room to go out.
     """
 
     bytes_received: int = 0
     bytes_sent: int = 0
-    frames_received: int = 0
     frames_sent: int = 0
     frames_dropped: int = 0
     sources: dict[Source, SequenceCounter] = field(default_factory=dict)
+    _frames_of_others: int = 0
     _in: Lately = field(default_factory=Lately)
     _out: Lately = field(default_factory=Lately)
+
+    @property
+    def frames_received(self) -> int:
+        """Those that came with the right checksum; from any thread."""
+        return self._frames_of_others + sum(
+            counter.received for counter in list(self.sources.values()))
 
     def received_rate(self, now: float) -> float:
         """Return the bytes that came per second lately."""
@@ -124,17 +144,18 @@ class Traffic:
         """Return the bytes that went out per second lately."""
         return self._out.rate(self.bytes_sent, now)
 
-    def count(self, source: Source, sequence: int) -> None:
-        """Take a frame that has come with the right checksum."""
-        self.frames_received += 1
+    def count(self, source: Source, sequence: int) -> SequenceCounter | None:
+        """Take a frame that has come with the right checksum; return what counts its source."""
         counter = self.sources.get(source)
         if counter is None:
             if len(self.sources) >= MAX_SOURCES:
-                return
+                self._frames_of_others += 1
+                return None
             counter = self.sources[source] = SequenceCounter()
         counter.add(sequence)
+        return counter
 
     def restart(self) -> None:
         """Forget the sequence numbers but not the counts: the link was interrupted."""
         for counter in self.sources.values():
-            counter._newest = -1
+            counter.restart()

@@ -278,7 +278,7 @@ class _Parser:
         return int(text)
 
     def no_path(self, rest: str) -> str:
-        """MAVROS's own examples end in a slash; anything behind it has no meaning."""
+        """Return what is before the path; its slash alone may stand, as in MAVROS's examples."""
         rest, slash, path = rest.partition('/')
         if path:
             self.fail(f'{slash + path!r} has no meaning here')

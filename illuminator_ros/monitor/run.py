@@ -31,9 +31,6 @@ from rclpy.utilities import remove_ros_args
 from rich.console import Console
 from rich.live import Live
 
-from ..entry import one_line
-from ..ros.spinner import Spinner
-from ..termination import Termination
 from .graph import Graph
 from .keys import KeyDecoder
 from .model import Fleet, Light
@@ -41,6 +38,9 @@ from .operator import Operator
 from .options import parser
 from .terminal import ESCAPE_TIMEOUT, Keyboard, quiet_errors, unbuffered
 from .view import plain, Scene, screen
+from ..entry import one_line
+from ..ros.spinner import Spinner
+from ..termination import Termination
 
 # s between pictures.
 INTERVAL = 0.25

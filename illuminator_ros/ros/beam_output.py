@@ -24,12 +24,12 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from ..illuminator.light import Light
-from ..illuminator.model import Status
-from ..illuminator.observer import LightObserver
 from .beam import Beam, cone, Look
 from .mounting import Mounting
 from .outputs import STATE_QOS
+from ..illuminator.light import Light
+from ..illuminator.model import Status
+from ..illuminator.observer import LightObserver
 
 # Red, green, blue.
 WARM_WHITE = (1.0, 0.95, 0.75)

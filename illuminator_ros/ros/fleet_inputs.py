@@ -23,11 +23,11 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
+from .handover import Handover
 from ..illuminator.fleet import enable_all
 from ..illuminator.light import Light
 from ..illuminator.operation import Result
 from ..mavlink.link import Link
-from .handover import Handover
 
 
 class FleetInputs:

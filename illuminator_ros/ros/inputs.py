@@ -24,12 +24,12 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 
+from .handover import Handover
+from .parameter_services import ParameterServices
 from ..illuminator.light import Light
 from ..illuminator.model import checked, InvalidValue
 from ..illuminator.operation import Result
 from ..mavlink.link import Link
-from .handover import Handover
-from .parameter_services import ParameterServices
 
 # A request to a light: it answers once, through the last argument.
 Request = Callable[[Light, float, Callable[[Result, float], None]], None]

@@ -22,9 +22,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from rclpy.node import Node
 
-from ..illuminator.controller import Controller
-from ..illuminator.light import Light
-from ..mavlink.link import Link
 from .beam_output import BeamOutput
 from .diagnostics import (
     hardware_id,
@@ -39,6 +36,9 @@ from .inputs import Inputs
 from .mounting import Mounting
 from .outputs import Outputs, STREAM_QOS
 from .parameters import declare_device_parameters, misspelt
+from ..illuminator.controller import Controller
+from ..illuminator.light import Light
+from ..mavlink.link import Link
 
 # s without a light, after which the log says once what is known of the reason.
 PATIENCE = 5.0

@@ -27,11 +27,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool
 
+from .conversions import status_messages, STATUS_TOPICS, temperature_message
+from .parameters import DEVICE_SPECS, period_range
 from ..illuminator.light import Light
 from ..illuminator.model import Configuration, FIELDS, Identity, Limits, Mode, shortest, Status
 from ..illuminator.observer import Cause, LightObserver
-from .conversions import status_messages, STATUS_TOPICS, temperature_message
-from .parameters import DEVICE_SPECS, period_range
 
 # A late subscriber gets the last value.
 STATE_QOS = QoSProfile(

@@ -43,8 +43,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 
-from ..illuminator.model import checked, InvalidValue, Limits
 from .parameters import DEVICE_SPECS
+from ..illuminator.model import checked, InvalidValue, Limits
 
 # Sets values in the device; returns '' or why not.
 Configure = Callable[[dict[str, Any]], Awaitable[str]]

@@ -24,17 +24,17 @@ from typing import Any
 
 from rclpy.node import Node
 
+from .fleet_inputs import FleetInputs
+from .mounting import Mounting
+from .node import IlluminatorNode
+from .parameters import declare_link_parameters, LinkParameters, ParameterError
+from .spinner import Spinner
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings
 from ..mavlink.dialect import Source
 from ..mavlink.link import Link, LinkEvent
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
-from .fleet_inputs import FleetInputs
-from .mounting import Mounting
-from .node import IlluminatorNode
-from .parameters import declare_link_parameters, LinkParameters, ParameterError
-from .spinner import Spinner
 
 # s; SIGINT and SIGTERM end the process within 1 s, these and the leaving of ROS included.
 OFF_LIMIT = 0.6

@@ -19,11 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from .view import glance
 from ..illuminator.device import Device
 from ..illuminator.faults import active, FaultError, FAULTS, with_fault, without_fault
 from ..illuminator.faults import describe as describe_faults
 from ..illuminator.model import InvalidValue
-from .view import glance
 
 
 class _Wrong(ValueError):
@@ -33,7 +33,7 @@ class _Wrong(ValueError):
 @dataclass(frozen=True)
 class _Command:
     usage: str
-    help: str
+    help: str  # noqa: A003
     do: Callable[[Device, list[str], float], str]
     counts: tuple[int, ...]
 
@@ -172,5 +172,3 @@ def execute(line: str, devices: Sequence[Device], now: float) -> str:
     except (_Wrong, FaultError, InvalidValue) as error:
         return str(error)
     return '\n'.join(filter(None, answers)) or 'done'
-
-

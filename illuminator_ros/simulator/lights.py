@@ -22,10 +22,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .settings import merged, profile_of, properties, read, SettingError, SETTINGS
 from ..command_line import address
 from ..illuminator.device import DeviceProperties
 from ..mavlink.dialect import Source
-from .settings import merged, profile_of, properties, read, SettingError, SETTINGS
 
 MAX_LIGHTS = 200
 # The keys of a file beside the settings, and those of one of its lights.

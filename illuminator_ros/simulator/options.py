@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import argparse
 
+from .console import describe_commands
+from .settings import read, SettingError, SETTINGS, THERMAL
 from .. import __version__
 from ..command_line import add_signing, integer, Parser
 from ..illuminator.behaviour import PROFILES
 from ..illuminator.faults import describe
-from .console import describe_commands
-from .settings import read, SettingError, SETTINGS, THERMAL
 
 DEFAULT_URL = 'udpout://127.0.0.1:14590'
 

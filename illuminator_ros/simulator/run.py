@@ -24,17 +24,17 @@ import signal
 import sys
 import threading
 
+from .console import execute
+from .lights import lights, load, Scene
+from .options import DEFAULT_URL, parser
+from .settings import SettingError
+from .view import Glance, glance, LiveView, PlainView
 from ..command_line import signing
 from ..illuminator.device import DeviceProperties, Devices
 from ..mavlink.link import Link, LinkEvent
 from ..mavlink.signing_files import KeyFileError
 from ..mavlink.url import parse_url, Url, UrlError
 from ..termination import Termination
-from .console import execute
-from .lights import lights, load, Scene
-from .options import DEFAULT_URL, parser
-from .settings import SettingError
-from .view import Glance, glance, LiveView, PlainView
 
 # s between looks at the lights.
 VIEW_INTERVAL = 0.2

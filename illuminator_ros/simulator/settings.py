@@ -99,7 +99,7 @@ class Setting:
     """
 
     metavar: str
-    help: str
+    help: str  # noqa: A003
     read: Callable[[str], Any]
     adds: bool = False
 

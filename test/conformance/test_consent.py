@@ -16,14 +16,13 @@
 
 from dataclasses import replace
 
-import pytest
-from support.conformance_run import Run
-
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.simulator.settings import properties
+import pytest
+from support.conformance_run import Run
 
 DAZZLING = {one.name for one in REQUIREMENTS if one.dazzles}
 

@@ -17,14 +17,13 @@
 from pathlib import Path
 import re
 
-import pytest
-
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.simulator.console import COMMANDS, OTHERS
 from illuminator_ros.simulator.lights import scene
 from illuminator_ros.simulator.settings import SETTINGS
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFORMANCE = (ROOT / 'doc' / 'conformance.md').read_text()

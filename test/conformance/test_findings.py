@@ -17,15 +17,14 @@
 from dataclasses import replace
 import math
 
-import pytest
-from support.conformance_run import Run
-
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Identity, Limits
 from illuminator_ros.mavlink.dialect import Source
+import pytest
+from support.conformance_run import Run
 
 ACCEPTED_CHANGES = {'on', 'off', 'mode-internal', 'mode-external', 'brightness', 'strobe',
                     'strobe-limit-values', 'duty-cycle', 'command-int'}

@@ -14,13 +14,12 @@
 
 """The profiles against the suite: what is known of the lights in the field, and nothing else."""
 
-import pytest
-from support.conformance_run import Run
-
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.simulator.settings import properties
+import pytest
+from support.conformance_run import Run
 
 # The reference emulator: its address, its strings of 28 characters, that it does what is for
 # anybody, does not know COMMAND_INT, lets NaN in, sends at 1 Hz only, and has no clock.

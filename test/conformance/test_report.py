@@ -17,13 +17,12 @@
 import json
 from xml.etree import ElementTree
 
-import pytest
-from support.conformance_run import Run
-
 from illuminator_ros.conformance.report import as_json, as_junit, catalogue, lines, Report
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.model import Identity
+import pytest
+from support.conformance_run import Run
 
 
 @pytest.fixture(scope='module')

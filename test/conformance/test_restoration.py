@@ -17,14 +17,13 @@
 from dataclasses import replace
 import math
 
-import pytest
-from support.conformance_run import Run
-
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
+import pytest
+from support.conformance_run import Run
 
 BEFORE = Configuration(Mode.EXTERNAL_SYNC, 60.0, 0.5, 25.0)
 SHOULD_NOT_MATTER = sorted(set(FAULTS) - {

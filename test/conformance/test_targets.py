@@ -14,12 +14,11 @@
 
 """Which light is checked, and that others on the line do not matter."""
 
-from support.conformance_run import Run
-
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
+from support.conformance_run import Run
 
 FIRST, SECOND = Source(1, 243), Source(1, 244)
 BAD = with_fault(with_fault(Behaviour(), 'nan'), 'lie')

@@ -40,9 +40,8 @@ import traceback
 TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
-from support.siege import Siege, SIEGES  # noqa: E402
-
 from illuminator_ros.mavlink.signing import SigningMode  # noqa: E402
+from support.siege import Siege, SIEGES  # noqa: E402
 
 # Datagrams of one round: enough to fill every table, few enough to find one of them again.
 ROUND = 10_000

@@ -16,12 +16,11 @@
 
 import random
 
+from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, MavResult, STATUS_ID
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
-
-from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, MavResult, STATUS_ID
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 LIMIT = 0.9

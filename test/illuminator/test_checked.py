@@ -17,8 +17,6 @@
 from decimal import Decimal
 import struct
 
-import pytest
-
 from illuminator_ros.illuminator.model import (
     checked,
     float32,
@@ -27,6 +25,7 @@ from illuminator_ros.illuminator.model import (
     Mode,
     shortest,
 )
+import pytest
 
 NAN, INF = float('nan'), float('inf')
 LIMITS = Limits(float32(0.05), float32(10.0))

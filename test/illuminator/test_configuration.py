@@ -16,10 +16,9 @@
 
 from dataclasses import replace
 
-import pytest
-
 from illuminator_ros.illuminator.model import Configuration, float32, Mode
 from illuminator_ros.illuminator.operation import unexplained
+import pytest
 
 BASE = Configuration(Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)
 SYNCED = replace(BASE, mode=Mode.EXTERNAL_SYNC)

@@ -16,13 +16,12 @@
 
 from dataclasses import astuple
 
-import pytest
-from support.back_to_back import Pair
-from support.fake_light import FakeLight
-
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.dialect import MavCmd, MavResult
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 

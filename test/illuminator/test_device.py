@@ -14,8 +14,6 @@
 
 """The light's side: what it sends by itself and on request."""
 
-import pytest
-
 from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
 from illuminator_ros.illuminator.model import Identity
 from illuminator_ros.mavlink.dialect import (
@@ -33,6 +31,7 @@ from illuminator_ros.mavlink.dialect import (
     Source,
     STATUS_ID,
 )
+import pytest
 
 GROUND = Source(255, 190)
 NAN, INF = float('nan'), float('inf')

@@ -14,8 +14,6 @@
 
 """The light's side: the two commands that change it, and what they do not let in."""
 
-import pytest
-
 from illuminator_ros.illuminator.device import Device, DeviceProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.dialect import (
@@ -30,6 +28,7 @@ from illuminator_ros.mavlink.dialect import (
     Source,
     STATUS_ID,
 )
+import pytest
 
 GROUND = Source(255, 190)
 NAN, INF = float('nan'), float('inf')

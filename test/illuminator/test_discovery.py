@@ -16,10 +16,6 @@
 
 import math
 
-import pytest
-from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight, status_message
-
 from illuminator_ros.illuminator.controller import CLASH_MEMORY, Controller, MAX_LIGHTS
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
@@ -32,6 +28,9 @@ from illuminator_ros.mavlink.dialect import (
     MavType,
     Source,
 )
+import pytest
+from support.back_to_back import BRIDGE, Pair
+from support.fake_light import FakeLight, status_message
 
 ILLUMINATOR = heartbeat(MavType.ILLUMINATOR)
 SUBMARINE = 12

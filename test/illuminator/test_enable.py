@@ -16,10 +16,6 @@
 
 import re
 
-import pytest
-from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight
-
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT, PROGRESS_LIMIT
 from illuminator_ros.mavlink.dialect import (
@@ -31,6 +27,9 @@ from illuminator_ros.mavlink.dialect import (
     result_name,
     Source,
 )
+import pytest
+from support.back_to_back import BRIDGE, Pair
+from support.fake_light import FakeLight
 
 ON_OFF = MavCmd.ILLUMINATOR_ON_OFF
 SPENT = re.compile(r'\((\d+) (?:try|tries), (?:(\d+) ms|(\d+\.\d\d) s)\)$')

@@ -16,8 +16,6 @@
 
 import math
 
-import pytest
-
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import Device, DeviceProperties
 from illuminator_ros.illuminator.faults import (
@@ -38,6 +36,7 @@ from illuminator_ros.mavlink.dialect import (
     Source,
     STATUS_ID,
 )
+import pytest
 
 GROUND = Source(255, 190)
 ON_OFF = MavCmd.ILLUMINATOR_ON_OFF

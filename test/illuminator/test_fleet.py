@@ -14,12 +14,11 @@
 
 """One request to all lights: one answer, which names what became of each."""
 
-import pytest
-from support.back_to_back import Answer, Pair
-
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.fleet import enable_all
 from illuminator_ros.mavlink.dialect import Source
+import pytest
+from support.back_to_back import Answer, Pair
 
 LIGHTS = [DeviceProperties(Source(1, component)) for component in (243, 244, 245)]
 

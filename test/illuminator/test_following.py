@@ -14,13 +14,12 @@
 
 """What is agreed follows a light that somebody else changes, and sends it nothing."""
 
-import pytest
-from support.back_to_back import Pair
-from support.fake_light import FakeLight
-
 from illuminator_ros.illuminator.model import float32, Mode
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.dialect import MavCmd
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 THROTTLED, SHUT_DOWN = 1, 2

@@ -63,6 +63,7 @@ def test_a_finding_is_a_failure_and_says_how_to_see_it_again(
     run: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:
     class Weak(LightSiege):
+
         def check_service(self) -> None:
             raise AssertionError('as the test says')
 

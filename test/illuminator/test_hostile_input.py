@@ -24,11 +24,6 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-from support.frames import frame_of, raw_v2
-from support.heartbeats import heartbeat_frame
-from support.siege import BRIDGE, BridgeSiege, GENUINE, LightSiege, Siege, SIEGES
-
 from illuminator_ros.illuminator.controller import MAX_LIGHTS
 from illuminator_ros.illuminator.operation import MAX_WAITING, Result
 from illuminator_ros.mavlink.dialect import (
@@ -46,6 +41,10 @@ from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+import pytest
+from support.frames import frame_of, raw_v2
+from support.heartbeats import heartbeat_frame
+from support.siege import BRIDGE, BridgeSiege, GENUINE, LightSiege, Siege, SIEGES
 
 PEER = ('127.0.0.1', 40_000)
 

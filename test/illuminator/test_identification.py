@@ -14,13 +14,12 @@
 
 """How a light is asked what it is."""
 
-import pytest
-from support.back_to_back import Pair
-from support.fake_light import FakeLight
-
 from illuminator_ros.illuminator.identification import MAX_QUESTIONS, SETTLING_TIME
 from illuminator_ros.illuminator.model import Identity
 from illuminator_ros.mavlink.dialect import INFORMATION_ID, MavCmd, MavResult
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
 
 
 def questions(pair):

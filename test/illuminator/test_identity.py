@@ -14,8 +14,6 @@
 
 """COMPONENT_INFORMATION_BASIC, whose strings cannot be trusted to end."""
 
-import pytest
-
 from illuminator_ros.illuminator.model import flag_names, Identity, text
 from illuminator_ros.mavlink.dialect import (
     ComponentInformationBasic,
@@ -23,6 +21,7 @@ from illuminator_ros.mavlink.dialect import (
     encode_payload,
     INFORMATION_ID,
 )
+import pytest
 
 
 @pytest.mark.parametrize(('field', 'expected'), [

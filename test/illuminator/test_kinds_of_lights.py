@@ -14,13 +14,12 @@
 
 """Lights as they are in the field: the developer guide's emulator, ArduSub, and others."""
 
-import pytest
-from support.back_to_back import Pair
-from support.fake_light import FakeLight
-
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Limits
 from illuminator_ros.mavlink.dialect import CommandInt, MavCmd, MavResult, Source
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 

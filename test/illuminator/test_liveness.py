@@ -14,13 +14,12 @@
 
 """A light that falls silent, comes back, or comes back another."""
 
-import pytest
-from support.back_to_back import BRIDGE, Pair, START
-from support.fake_light import FakeLight, LIGHT
-
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
 from illuminator_ros.mavlink.dialect import heartbeat, MavCmd, MavType, STATUS_ID
+import pytest
+from support.back_to_back import BRIDGE, Pair, START
+from support.fake_light import FakeLight, LIGHT
 
 
 def test_a_light_is_lost_after_the_heartbeat_timeout_and_found_again(fake, faked):

@@ -19,19 +19,18 @@ from __future__ import annotations
 from collections import Counter
 import random
 
-import pytest
-from support.back_to_back import Pair
-from support.faulty_wire import Faults
-from support.loss_table import LOSS_TABLE
-from support.records import Answer
-from support.witness import CONFIGURE, Judge, ON_OFF, Request, TAKEN
-
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.dialect import MavCmd, Source
+import pytest
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
+from support.loss_table import LOSS_TABLE
+from support.records import Answer
+from support.witness import CONFIGURE, Judge, ON_OFF, Request, TAKEN
 
 KINDS = ('drop', 'duplicate', 'reorder', 'delay', 'corrupt')
 SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)

@@ -14,15 +14,14 @@
 
 """Overrides: sent at the first connection, and again with the agreed ones after a restart."""
 
-import pytest
-from support.back_to_back import Pair, START
-from support.fake_light import FakeLight
-
 from illuminator_ros.illuminator.agreement import RESTORE_INTERVAL
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.dialect import MavCmd, MavResult
+import pytest
+from support.back_to_back import Pair, START
+from support.fake_light import FakeLight
 
 CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
 

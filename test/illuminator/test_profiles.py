@@ -14,8 +14,6 @@
 
 """Lights as they are seen in the field."""
 
-import pytest
-
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.model import Status
@@ -33,6 +31,7 @@ from illuminator_ros.mavlink.dialect import (
     STATUS_ID,
 )
 from illuminator_ros.simulator.settings import properties
+import pytest
 
 GROUND = Source(255, 190)
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE

@@ -14,13 +14,12 @@
 
 """Requests to one light: in order, one at a time of each kind, each answered exactly once."""
 
-import pytest
-from support.back_to_back import Pair
-from support.faulty_wire import Faults
-
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.operation import MAX_WAITING, Result
 from illuminator_ros.mavlink.dialect import MavCmd, MavResult, Source
+import pytest
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 

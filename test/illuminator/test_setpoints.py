@@ -14,13 +14,12 @@
 
 """A stream of brightness setpoints: the newest wins, one command is in flight."""
 
+from illuminator_ros.illuminator.model import Mode
+from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
-
-from illuminator_ros.illuminator.model import Mode
-from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, MavResult
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 

@@ -14,15 +14,14 @@
 
 """What becomes of requests and parameters where several lights answer from one address."""
 
-import pytest
-from support.back_to_back import Pair
-from support.fake_light import FakeLight
-from support.shared_address import SharedAddress
-
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.dialect import MavCmd, Source
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
+from support.shared_address import SharedAddress
 
 AUTOPILOT = Source(1, 1)
 

@@ -14,11 +14,10 @@
 
 """Several lights behind one address are told from one light that is changed."""
 
-import pytest
-from support.fake_light import status_message
-
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.sharing import ENOUGH, Sharing
+import pytest
+from support.fake_light import status_message
 
 HOUR_MS = 3_600_000
 OFF, ON = {'enable': 0}, {'enable': 1}

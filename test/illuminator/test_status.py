@@ -14,11 +14,10 @@
 
 """ILLUMINATOR_STATUS, read from lights of every quality."""
 
-import pytest
-from support.fake_light import status_message
-
 from illuminator_ros.illuminator.model import Configuration, Limits, Mode, NOTHING, Status
 from illuminator_ros.mavlink.dialect import decode_payload, encode_payload, STATUS_ID
+import pytest
+from support.fake_light import status_message
 
 NAN, INF = float('nan'), float('inf')
 

@@ -16,10 +16,9 @@
 
 import dataclasses
 
-import pytest
-
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.thermal import ThermalModel, ThermalProperties
+import pytest
 
 THROTTLING = ErrorFlag.THERMAL_THROTTLING
 SHUTDOWN = ErrorFlag.OVER_TEMPERATURE_SHUTDOWN

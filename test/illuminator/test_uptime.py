@@ -14,9 +14,8 @@
 
 """What an uptime tells beside the one before."""
 
-import pytest
-
 from illuminator_ros.illuminator.uptime import compare_uptime, Uptime, WRAP_MS
+import pytest
 
 RUNNING, RESTARTED = Uptime.RUNNING, Uptime.RESTARTED
 LATE, NO_CLOCK = Uptime.LATE, Uptime.NO_CLOCK

@@ -17,16 +17,15 @@
 from dataclasses import replace
 import random
 
-import pytest
-from support.back_to_back import Pair
-from support.faulty_wire import Faults
-from support.records import Answer
-
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.dialect import Source
+import pytest
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
+from support.records import Answer
 
 SECONDS = 90.0
 # s after which all must be answered and known, once the line is good again: a restored
@@ -92,7 +91,7 @@ class Chaos:
         self.pair.close()
         self.is_open = False
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         if not self.is_open:
             self.pair.open()
             self.is_open = True

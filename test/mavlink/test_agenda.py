@@ -16,9 +16,8 @@
 
 import math
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from illuminator_ros.mavlink.agenda import Agenda
 
 TIMES = st.integers(0, 20)
@@ -28,6 +27,7 @@ STEPS = st.lists(st.one_of(
 
 
 @given(STEPS)
+@settings(deadline=None)
 def test_agrees_with_a_plain_search(steps: list[tuple]) -> None:
     agenda: Agenda[int] = Agenda()
     deadlines: dict[int, float] = {}

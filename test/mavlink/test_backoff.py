@@ -20,13 +20,12 @@ import itertools
 import threading
 from types import SimpleNamespace
 
-import pytest
-
 from illuminator_ros.mavlink import opener
 from illuminator_ros.mavlink.opener import Backoff, Opener
 from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
 from illuminator_ros.mavlink.url import MemoryUrl, Url
+import pytest
 
 
 def pauses(count: int, *, jitter: float = 1.0, spent: float = 0.0) -> list[float]:
@@ -95,6 +94,7 @@ def test_the_time_that_a_try_takes_counts(monkeypatch: pytest.MonkeyPatch) -> No
     now, spent, ended = [0.0], [], threading.Event()
 
     class Recorded(Backoff):
+
         def pause(self, seconds: float) -> float:
             spent.append(seconds)
             if len(spent) > 2:

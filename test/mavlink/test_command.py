@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from illuminator_ros.mavlink.command import Ending
+from illuminator_ros.mavlink.dialect import CommandInt, CommandLong, MavResult
 import pytest
 from support.command_rig import (
     ACCEPTED,
@@ -28,9 +30,6 @@ from support.command_rig import (
     REJECTED,
     Rig,
 )
-
-from illuminator_ros.mavlink.command import Ending
-from illuminator_ros.mavlink.dialect import CommandInt, CommandLong, MavResult
 
 ANSWERED, NO_ANSWER = Ending.ANSWERED, Ending.NO_ANSWER
 

@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
-import pytest
-from support.command_rig import ACCEPTED, DENIED, LIGHT, LONG, OURS, Rig
-
 from illuminator_ros.mavlink.command import Ending
 from illuminator_ros.mavlink.dialect import MavResult, Source
+import pytest
+from support.command_rig import ACCEPTED, DENIED, LIGHT, LONG, OURS, Rig
 
 AUTOPILOT = Source(1, 1)
 

@@ -18,11 +18,10 @@ from __future__ import annotations
 
 import math
 
-import pytest
-from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, OURS, Rig
-
 from illuminator_ros.mavlink.command import CommandSender, format_seconds
 from illuminator_ros.mavlink.dialect import Source
+import pytest
+from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, OURS, Rig
 
 
 @pytest.mark.parametrize('timeout', [0.0, -0.5, math.nan, math.inf])

@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
-import pytest
-from support.command_rig import ACCEPTED, FAILED, IN_PROGRESS, LONG, REJECTED, Rig
-
 from illuminator_ros.mavlink.command import Ending, PROGRESS_TIMEOUT
 from illuminator_ros.mavlink.dialect import MavResult
+import pytest
+from support.command_rig import ACCEPTED, FAILED, IN_PROGRESS, LONG, REJECTED, Rig
 
 
 def test_nothing_is_resent_once_it_is_in_progress() -> None:

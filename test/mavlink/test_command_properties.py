@@ -21,12 +21,11 @@ import random
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
+from illuminator_ros.mavlink.command import Ending, MAX_WAITING
+from illuminator_ros.mavlink.dialect import Source
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig, Run
 from support.faulty_wire import Faults, FaultyWire
-
-from illuminator_ros.mavlink.command import Ending, MAX_WAITING
-from illuminator_ros.mavlink.dialect import Source
 
 COMPONENTS = st.sampled_from([LIGHT, Source(1, 244)])
 COMMANDS = st.sampled_from([405, 406])

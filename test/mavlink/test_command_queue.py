@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
-import pytest
-from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig
-
 from illuminator_ros.mavlink.command import Command, Ending, MAX_WAITING, Outcome
 from illuminator_ros.mavlink.dialect import Source
+import pytest
+from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig
 
 OTHER = Source(1, 244)
 

@@ -23,11 +23,6 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pymavlink.dialects.v20 import common
-import pytest
-from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
-from support.reference_dialect import DEFINITIONS, fields_of, Peer, reference, twin
-
 from illuminator_ros.mavlink import dialect
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
@@ -45,6 +40,10 @@ from illuminator_ros.mavlink.dialect import (
     Source,
     STATUS_ID,
 )
+from pymavlink.dialects.v20 import common
+import pytest
+from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
+from support.reference_dialect import DEFINITIONS, fields_of, Peer, reference, twin
 
 ADDED = (IlluminatorStatus, ComponentInformationBasic)
 SIZES = {'char': 1, 'uint8_t': 1, 'uint16_t': 2, 'uint32_t': 4, 'int32_t': 4, 'uint64_t': 8,

@@ -14,11 +14,10 @@
 
 """Our own frames that come back are told from those of somebody else with our address."""
 
-import pytest
-
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.echoes import Echoes, MAX_FRAMES, MEMORY
 from illuminator_ros.mavlink.framing import Frame
+import pytest
 
 OURS = Source(1, 194)
 SENT = {'source': OURS, 'sequence': 7, 'message_id': 0, 'payload': b'\x01\x02\0\0'}

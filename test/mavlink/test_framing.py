@@ -18,11 +18,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-from support.frames import decoded, frame_of, LIGHT, only, raw_v1, raw_v2, spoilt
-from support.messages import EVERY_MESSAGE, STATUS
-from support.reference_dialect import fields_of, Peer, twin
-
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandLong,
@@ -35,6 +30,10 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.mavlink.framing import Decoder, encode_frame
 from illuminator_ros.mavlink.signing import signature
+import pytest
+from support.frames import decoded, frame_of, LIGHT, only, raw_v1, raw_v2, spoilt
+from support.messages import EVERY_MESSAGE, STATUS
+from support.reference_dialect import fields_of, Peer, twin
 
 KEY = bytes(range(32))
 FOREIGN_ID = 12345

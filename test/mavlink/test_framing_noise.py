@@ -20,14 +20,13 @@ import random
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.dialect import LAYOUTS
+from illuminator_ros.mavlink.framing import Decoder, FLAG_SIGNED, Frame, MAX_FRAME
+from illuminator_ros.mavlink.signing import signature
 import pytest
 from support.frames import FILLER, frame_of, raw_v1, raw_v2
 from support.messages import EVERY_MESSAGE
 from support.reference_dialect import Peer, twin
-
-from illuminator_ros.mavlink.dialect import LAYOUTS
-from illuminator_ros.mavlink.framing import Decoder, FLAG_SIGNED, Frame, MAX_FRAME
-from illuminator_ros.mavlink.signing import signature
 
 # Always the same examples: one in 65,536 damaged frames has the right checksum by chance.
 PROPERTY = settings(derandomize=True, deadline=None, max_examples=150)

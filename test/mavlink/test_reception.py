@@ -16,13 +16,12 @@
 
 from __future__ import annotations
 
-import pytest
-from support.frames import LIGHT, raw_v1
-from support.heartbeats import heartbeat_frame
-
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.reception import MAX_DECODERS, Reception, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
+import pytest
+from support.frames import LIGHT, raw_v1
+from support.heartbeats import heartbeat_frame
 
 UNIX = 1.7e9
 # The beginnings of what would be frames of 250 bytes, MAVLink 1 and 2, if more came.

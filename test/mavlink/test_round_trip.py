@@ -18,11 +18,10 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig
-
 from illuminator_ros.mavlink.dialect import MavResult, Source
 from illuminator_ros.mavlink.round_trip import ENOUGH, FLOOR, RoundTrip, WINDOW
+import pytest
+from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig
 
 
 def of(*seconds: float) -> RoundTrip:

@@ -16,9 +16,6 @@
 
 from __future__ import annotations
 
-import pytest
-from support.frames import LIGHT
-
 from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
 from illuminator_ros.mavlink.routes import (
     EXPIRY,
@@ -27,6 +24,8 @@ from illuminator_ros.mavlink.routes import (
     MAX_WAYS,
     Routes,
 )
+import pytest
+from support.frames import LIGHT
 
 PEERS = ('a', 'b', 'c')
 

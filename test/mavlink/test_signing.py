@@ -19,12 +19,6 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-import pytest
-from support.frames import frame_of, LIGHT, only
-from support.messages import EVERY_MESSAGE, STATUS
-from support.reference_dialect import fields_of, Peer, twin
-from support.signers import checker, KEY, LAST_STAMP, NOW, signed, stamp_at, unsigned, WRONG_KEY
-
 from illuminator_ros.mavlink.dialect import decode_payload, Source
 from illuminator_ros.mavlink.framing import Decoder
 from illuminator_ros.mavlink.signing import (
@@ -37,6 +31,11 @@ from illuminator_ros.mavlink.signing import (
     ticks,
     TICKS_PER_SECOND,
 )
+import pytest
+from support.frames import frame_of, LIGHT, only
+from support.messages import EVERY_MESSAGE, STATUS
+from support.reference_dialect import fields_of, Peer, twin
+from support.signers import checker, KEY, LAST_STAMP, NOW, signed, stamp_at, unsigned, WRONG_KEY
 
 OFF, SIGN, REQUIRE = SigningMode
 STAMP = stamp_at(NOW)

@@ -22,10 +22,6 @@ from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-from support.frames import frame_of
-from support.signers import checker, LAST_STAMP, NOW, stamp_at
-
 from illuminator_ros.mavlink.signing import NEW_STREAM_TICKS, Signing, TICKS_PER_SECOND
 from illuminator_ros.mavlink.signing_files import (
     KeyFileError,
@@ -33,6 +29,9 @@ from illuminator_ros.mavlink.signing_files import (
     MAX_KEY_FILE,
     TimestampStore,
 )
+import pytest
+from support.frames import frame_of
+from support.signers import checker, LAST_STAMP, NOW, stamp_at
 
 RAW = bytes(range(100, 132))
 PASSPHRASE = 'correct horse battery staple'
@@ -140,8 +139,8 @@ def test_impossible_path_is_refused() -> None:
 
 
 @given(st.one_of(
-    st.binary(max_size=80), st.text(max_size=80).map(str.encode), st.binary(min_size=32,
-                                                                           max_size=32)))
+    st.binary(max_size=80), st.text(max_size=80).map(str.encode),
+    st.binary(min_size=32, max_size=32)))
 @settings(derandomize=True, deadline=None, max_examples=200)
 def test_any_content_is_a_key_of_32_bytes_or_refused_without_showing_it(
         tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:

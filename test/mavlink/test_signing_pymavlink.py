@@ -18,12 +18,6 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-from support.frames import frame_of, only, raw_v2
-from support.messages import EVERY_MESSAGE, STATUS
-from support.reference_dialect import Peer, twin
-from support.signers import checker, KEY, LAST_STAMP, NOW, signed, stamp_at, unsigned, WRONG_KEY
-
 from illuminator_ros.mavlink import signing as module
 from illuminator_ros.mavlink.dialect import encode_payload, Source, STATUS_ID
 from illuminator_ros.mavlink.framing import Decoder
@@ -33,6 +27,11 @@ from illuminator_ros.mavlink.signing import (
     SigningCounters,
     SigningMode,
 )
+import pytest
+from support.frames import frame_of, only, raw_v2
+from support.messages import EVERY_MESSAGE, STATUS
+from support.reference_dialect import Peer, twin
+from support.signers import checker, KEY, LAST_STAMP, NOW, signed, stamp_at, unsigned, WRONG_KEY
 
 STAMP = stamp_at(NOW)
 

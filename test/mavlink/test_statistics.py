@@ -20,8 +20,6 @@ from collections.abc import Iterable
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-import pytest
-
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.statistics import (
     LATELY,
@@ -31,6 +29,7 @@ from illuminator_ros.mavlink.statistics import (
     Traffic,
     WINDOW,
 )
+import pytest
 
 LIGHT = Source(1, 243)
 

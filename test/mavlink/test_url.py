@@ -18,8 +18,6 @@ from __future__ import annotations
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-import pytest
-
 from illuminator_ros.mavlink.url import (
     Address,
     EXAMPLES,
@@ -31,6 +29,7 @@ from illuminator_ros.mavlink.url import (
     Url,
     UrlError,
 )
+import pytest
 
 # All interfaces, any free port.
 ANY = Address('', 0)

@@ -14,8 +14,6 @@
 
 """What keys ask of a light, given what is known of it."""
 
-import pytest
-
 from illuminator_ros.monitor.actions import (
     dim,
     refresh,
@@ -26,6 +24,7 @@ from illuminator_ros.monitor.actions import (
     switch_off,
 )
 from illuminator_ros.monitor.model import Light
+import pytest
 
 
 def light(setpoint: float | None = None, wanted: dict[str, object] | None = None,

@@ -14,9 +14,8 @@
 
 """Keys, as a terminal sends them."""
 
-import pytest
-
 from illuminator_ros.monitor.keys import HELP, KeyDecoder
+import pytest
 
 
 @pytest.mark.parametrize(('sent', 'keys'), [

@@ -14,8 +14,6 @@
 
 """What the monitor knows of lights, moment by moment."""
 
-import pytest
-
 from illuminator_ros.monitor.model import (
     Diagnosis,
     Fleet,
@@ -25,6 +23,7 @@ from illuminator_ros.monitor.model import (
     State,
     Trend,
 )
+import pytest
 
 BOW = '/bow'
 

@@ -14,12 +14,11 @@
 
 """What keys do: to the selection, and to the lights."""
 
-import pytest
-
 from illuminator_ros.monitor.actions import Ask
 from illuminator_ros.monitor.keys import HELP
 from illuminator_ros.monitor.model import Light
 from illuminator_ros.monitor.operator import Operator
+import pytest
 
 
 class Desk:

@@ -19,9 +19,8 @@ import os
 import pty
 import termios
 
-import pytest
-
 from illuminator_ros.monitor.terminal import Keyboard, quiet_errors, unbuffered
+import pytest
 
 
 class Ended(Exception):

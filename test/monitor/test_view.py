@@ -17,14 +17,13 @@
 import io
 import re
 
-import pytest
-from rich.console import Console
-from rich.screen import Screen
-
 from illuminator_ros.monitor.keys import HELP
 from illuminator_ros.monitor.model import Diagnosis, Fleet, Light, Outcome
 from illuminator_ros.monitor.texts import bar, BLOCKS, sparkline
 from illuminator_ros.monitor.view import columns_for, plain, Scene, screen
+import pytest
+from rich.console import Console
+from rich.screen import Screen
 
 NOW = 1000.0
 SIZES = [(200, 50), (132, 24), (80, 24), (60, 12), (40, 8), (20, 6), (12, 3), (5, 2), (1, 1)]

@@ -17,11 +17,10 @@
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
-
 from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.ros.diagnostics import why_nothing_is_heard
+import pytest
 
 
 @pytest.mark.parametrize(('traffic', 'signing', 'reason'), [

@@ -21,15 +21,14 @@ import re
 import subprocess
 from typing import Any
 
+from illuminator_ros.ros.node import IlluminatorNode
+from illuminator_ros.ros.parameters import ParameterError
+from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from rclpy.parameter import Parameter
 from support.light import free_port
 from support.processes import run
 from support.ros import own_domain, Ros, running_bridge
-
-from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.parameters import ParameterError
-from illuminator_ros.ros.process import BridgeProcess
 
 # Each: the arguments behind --ros-args, and what the line says. KEYS is a folder with key files.
 WRONG: dict[str, tuple[tuple[str, ...], str]] = {

@@ -18,6 +18,7 @@ import itertools
 import subprocess
 import sys
 
+from illuminator_ros.ros import beam_output
 import pytest
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
@@ -27,8 +28,6 @@ from support.processes import environment
 from support.recording import Recorder
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from visualization_msgs.msg import Marker
-
-from illuminator_ros.ros import beam_output
 
 BEAM = {'beam_range': 20, 'beam_angle': 1.0, 'frame_id': 'bow'}
 # What the statuses below go back to.

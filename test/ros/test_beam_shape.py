@@ -20,12 +20,11 @@ from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
-import pytest
-from support.fake_light import status_message
-
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.ros import beam as module
 from illuminator_ros.ros.beam import Beam, cone, Look, MAX_ALPHA, Point, SIDES
+import pytest
+from support.fake_light import status_message
 
 EXTERNAL_SYNC = 2
 

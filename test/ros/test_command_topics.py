@@ -25,6 +25,7 @@ from support.ros import Parameters, Ros, running_bridge
 
 
 class TestEnable:
+
     @pytest.mark.parametrize('on', [True, False])
     def test_it_switches_the_light(self, ros: Ros, light: ServedLight, on: bool) -> None:
         ros.publish(Bool, '/illuminator/cmd/enable', on)

@@ -17,6 +17,8 @@
 from collections.abc import Iterator
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.url import parse_url
 import pytest
 from std_msgs.msg import Bool
 from support.fake_light import FakeLight
@@ -24,9 +26,6 @@ from support.light import free_port, Source
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.shared_address import SharedAddress
-
-from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.url import parse_url
 
 SHARED = 'several lights answer as 1/1: their statuses contradict one another'
 

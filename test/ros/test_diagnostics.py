@@ -74,6 +74,7 @@ def wait_for(
 
 
 class TestArray:
+
     def test_it_has_the_link_and_the_lamp(self, recorder: Recorder) -> None:
         names = [status.name for status in recorder.wait().status]
 
@@ -102,6 +103,7 @@ class TestArray:
 
 
 class TestHardwareId:
+
     def test_the_link_s_is_its_url(self, recorder: Recorder) -> None:
         [link, _] = recorder.wait().status
 
@@ -141,6 +143,7 @@ class TestHardwareId:
 
 
 class TestValues:
+
     @pytest.mark.parametrize(('part', 'keys'), [('link', LINK_KEYS), ('lamp', LAMP_KEYS)])
     def test_the_keys(self, recorder: Recorder, part: str, keys: set[str]) -> None:
         assert set(wait_for(recorder, part)) == keys

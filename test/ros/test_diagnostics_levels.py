@@ -19,13 +19,12 @@ import math
 import socket
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from illuminator_ros.mavlink.dialect import heartbeat, MavType
+from illuminator_ros.ros import diagnostics as module
 import pytest
 from support.embedded import embedded_bridge
 from support.light import CONFIGURE, MavResult, ServedLight, Source
 from support.ros import Parameters, Ros, running_bridge, STREAM
-
-from illuminator_ros.mavlink.dialect import heartbeat, MavType
-from illuminator_ros.ros import diagnostics as module
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 

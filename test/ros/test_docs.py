@@ -19,9 +19,6 @@ from pathlib import Path
 import re
 from typing import Any
 
-import pytest
-import yaml
-
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.monitor import graph, keys, model, requests
@@ -34,6 +31,8 @@ from illuminator_ros.ros.parameters import (
     LINK_PARAMETERS,
     ParameterSpec,
 )
+import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / 'README.md').read_text()
@@ -93,6 +92,13 @@ def test_yaml_mentions_each_parameter_of_the_light() -> None:
     text = (ROOT / 'config' / 'bridge.yaml').read_text()
     for spec in DEVICE_PARAMETERS:
         assert re.search(rf'^    # {spec.name}: ', text, re.MULTILINE)
+
+
+@pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)
+def test_yaml_tells_the_unit(spec: ParameterSpec) -> None:
+    text = (ROOT / 'config' / 'bridge.yaml').read_text()
+    assert re.search(rf'^    (# )?{spec.name}: .+ # {re.escape(spec.unit)}(,|$)', text,
+                     re.MULTILINE) or not spec.unit
 
 
 @pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)

@@ -38,6 +38,7 @@ def messages_at_once(ros: Ros) -> list[str]:
 
 
 class TestNoLight:
+
     def test_both_fail_at_once_where_none_was_ever_heard(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
             assert messages_at_once(own_ros) == 2 * [

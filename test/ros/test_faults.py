@@ -18,6 +18,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.illuminator.agreement import Agreement
+from illuminator_ros.illuminator.light import Light
+from illuminator_ros.ros.node import IlluminatorNode
+from illuminator_ros.ros.outputs import Outputs
+from illuminator_ros.ros.parameter_services import ParameterServices
+from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from rcl_interfaces.srv import ListParameters
 from std_msgs.msg import Bool, Float32
@@ -25,13 +31,6 @@ from std_srvs.srv import SetBool, Trigger
 from support.embedded import embedded_bridge
 from support.light import eventually, ON_OFF, ServedLight
 from support.ros import Parameters, Ros, STREAM
-
-from illuminator_ros.illuminator.agreement import Agreement
-from illuminator_ros.illuminator.light import Light
-from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.outputs import Outputs
-from illuminator_ros.ros.parameter_services import ParameterServices
-from illuminator_ros.ros.process import BridgeProcess
 
 FAULT = RuntimeError('injected')
 

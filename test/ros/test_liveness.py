@@ -19,14 +19,13 @@ import random
 import socket
 import time
 
+from illuminator_ros.mavlink.dialect import heartbeat
 import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
 from support.light import ServedLight, Source
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
-
-from illuminator_ros.mavlink.dialect import heartbeat
 
 AUTOPILOT = 2
 # s; DESIGN.md, 3.4.
@@ -142,6 +141,7 @@ class TestLink:
 
 
 class TestWhatIsALight:
+
     def test_one_that_sends_only_heartbeats(self, port: int, bridge: Program) -> None:
         light = ServedLight(port, stream=0.0)
         light.fake.pushes = False

@@ -17,17 +17,16 @@
 from collections.abc import Iterator
 import threading
 
+from illuminator_ros.monitor import requests
+from illuminator_ros.monitor.actions import dim, refresh, Request, strobe, switch, switch_off
+from illuminator_ros.monitor.graph import lights_among, TOPICS, type_name
+from illuminator_ros.monitor.model import Light, Outcome, State
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from std_srvs.srv import SetBool
 from support.light import CONFIGURE, free_port, MavResult, ServedLight, Source
 from support.monitors import Watching, watching
 from support.ros import Ros, running_bridge, STATE
-
-from illuminator_ros.monitor import requests
-from illuminator_ros.monitor.actions import dim, refresh, Request, strobe, switch, switch_off
-from illuminator_ros.monitor.graph import lights_among, TOPICS, type_name
-from illuminator_ros.monitor.model import Light, Outcome, State
 
 
 @pytest.fixture(scope='module')

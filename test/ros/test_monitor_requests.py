@@ -17,16 +17,15 @@
 import threading
 from typing import Any
 
+from illuminator_ros.monitor.actions import dim, strobe, switch
+from illuminator_ros.monitor.model import Fleet, Outcome
+from illuminator_ros.monitor.requests import ANSWER_LIMIT, Requests
 import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 from std_srvs.srv import SetBool
-
-from illuminator_ros.monitor.actions import dim, strobe, switch
-from illuminator_ros.monitor.model import Fleet, Outcome
-from illuminator_ros.monitor.requests import ANSWER_LIMIT, Requests
 
 
 class Client:

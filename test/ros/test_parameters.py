@@ -40,6 +40,7 @@ LINK = {
 
 
 class TestBeforeTheFirstStatus:
+
     @pytest.fixture(scope='class')
     def alone(self, ros: Ros) -> Iterator[Parameters]:
         """Return the parameters of a bridge that has not heard a light."""
@@ -142,6 +143,7 @@ class TestDescriptors:
 
 
 class TestLinkParameters:
+
     def test_all_of_them_are_there_with_their_types(self, parameters: Parameters) -> None:
         assert dict(zip(LINK, parameters.types(*LINK), strict=True)) == LINK
 

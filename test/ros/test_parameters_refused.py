@@ -92,6 +92,7 @@ def test_what_the_node_keeps_itself_is_taken_back_with_a_refused_atomic_set(
 
 
 class TestInTime:
+
     @pytest.mark.parametrize('atomically', [False, True])
     def test_a_light_that_says_nothing(
         self, light: ServedLight, parameters: Parameters, atomically: bool,

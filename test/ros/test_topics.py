@@ -155,6 +155,7 @@ def test_what_cannot_be_true_is_not_published_and_the_rest_is(
 
 
 class TestConnected:
+
     def test_it_is_false_before_a_light_is_heard(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
             recorder = own_ros.subscribe(Bool, '/illuminator/connected')

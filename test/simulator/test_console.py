@@ -14,16 +14,16 @@
 
 """What can be done to simulated lights while they run."""
 
-import pytest
-
 from illuminator_ros.illuminator.device import DeviceProperties, Devices
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.mavlink.dialect import IlluminatorStatus, Source
 from illuminator_ros.simulator.console import COMMANDS, describe_commands, execute
+import pytest
 
 
 class Bench:
+
     def __init__(self):
         self.lights = Devices([
             DeviceProperties(source=Source(1, 243), name='bow'),
@@ -32,7 +32,7 @@ class Bench:
         self.lights.poll(0.0)
         self.lights.outgoing.clear()
 
-    def type(self, line, now=10.0):
+    def enter(self, line, now=10.0):
         return execute(line, self.lights.devices, now)
 
 
@@ -45,30 +45,30 @@ def bench():
     ('on', (True, True)), ('all on', (True, True)), ('bow on', (True, False)),
     ('1/244 on', (False, True))])
 def test_a_line_is_for_all_lights_or_for_one(bench, line, expected):
-    assert bench.type(line) == 'done'
+    assert bench.enter(line) == 'done'
     assert (bench.bow.enabled, bench.other.enabled) == expected
 
 
 def test_a_button_is_seen_at_once_in_the_status(bench):
-    bench.type('bow brightness 30')
+    bench.enter('bow brightness 30')
     ((source, status),) = bench.lights.outgoing
     assert isinstance(status, IlluminatorStatus)
     assert (source, status.brightness) == (Source(1, 243), 30.0)
 
 
 def test_the_rest_of_a_configuration_stays(bench):
-    bench.type('strobe 0.5 25')
-    bench.type('brightness 30')
-    bench.type('mode external_sync')
+    bench.enter('strobe 0.5 25')
+    bench.enter('brightness 30')
+    bench.enter('mode external_sync')
     configuration = bench.bow.configuration
     assert configuration.params() == (2.0, 30.0, 0.5, 25.0)
-    bench.type('strobe 0')
+    bench.enter('strobe 0')
     assert bench.bow.configuration.strobe_period == 0
 
 
 def test_lights_are_switched_off(bench):
-    bench.type('on')
-    bench.type('off')
+    bench.enter('on')
+    bench.enter('off')
     assert not bench.bow.enabled
 
 
@@ -82,67 +82,67 @@ def test_lights_are_switched_off(bench):
     ('clear nope', "no fault 'nope'"), ('stern on', "no command or light 'stern'")])
 def test_a_line_that_means_nothing_is_answered_and_does_nothing(bench, line, said):
     before = bench.bow.configuration, bench.bow.enabled, bench.bow.behaviour
-    assert said in bench.type(line)
+    assert said in bench.enter(line)
     assert (bench.bow.configuration, bench.bow.enabled, bench.bow.behaviour) == before
 
 
 def test_an_empty_line_is_nothing(bench):
-    assert bench.type('  \n') == ''
+    assert bench.enter('  \n') == ''
 
 
 @pytest.mark.parametrize('line', ['fault refuse=failed', 'refuse=failed'])
 def test_a_fault_begins_and_ends(bench, line):
-    bench.type(f'bow {line}')
-    assert bench.type('faults') == '1/243: refuse\n1/244: no fault'
-    bench.type('clear refuse')
-    assert bench.type('bow faults') == '1/243: no fault'
+    bench.enter(f'bow {line}')
+    assert bench.enter('faults') == '1/243: refuse\n1/244: no fault'
+    bench.enter('clear refuse')
+    assert bench.enter('bow faults') == '1/243: no fault'
 
 
 def test_all_faults_end_at_once(bench):
     for name in ('drop', 'lie', 'thermistor'):
-        bench.type(f'fault {name}')
-    bench.type('clear')
+        bench.enter(f'fault {name}')
+    bench.enter('clear')
     assert bench.bow.behaviour == DeviceProperties().behaviour
 
 
 @pytest.mark.parametrize('name', [name for name in FAULTS if name != 'reboot'])
 def test_every_fault_can_be_typed(bench, name):
-    assert bench.type(f'fault {name}') == 'done'
-    assert bench.type('bow faults') == f'1/243: {name}'
+    assert bench.enter(f'fault {name}') == 'done'
+    assert bench.enter('bow faults') == f'1/243: {name}'
 
 
 @pytest.mark.parametrize('line', ['reboot', 'fault reboot'])
 def test_a_restart_happens_once(bench, line):
-    bench.type('on')
+    bench.enter('on')
     assert bench.bow.uptime_ms(10.0) == 10_000
-    bench.type(line)
+    bench.enter(line)
     assert (bench.bow.enabled, bench.bow.uptime_ms(10.0)) == (False, 0)
     bench.lights.poll(60.0)
     assert bench.bow.uptime_ms(60.0) == 50_000
 
 
 def test_the_surroundings_get_hot(bench):
-    bench.type('ambient 90')
+    bench.enter('ambient 90')
     bench.lights.poll(2000.0)
     assert bench.bow.status(2000.0).temp_c == pytest.approx(90.0, abs=0.1)
     assert bench.bow.status(2000.0).error_status == ErrorFlag.THERMAL_THROTTLING
 
 
 def test_a_light_can_be_heated_and_cools_down_again(bench):
-    bench.type('temperature 100')
+    bench.enter('temperature 100')
     assert bench.bow.status(10.1).error_status == 3
     assert bench.bow.status(2000.0).error_status == 0
 
 
 def test_what_each_light_does_can_be_seen(bench):
-    bench.type('bow on')
-    first, second = bench.type('status').splitlines()
+    bench.enter('bow on')
+    first, second = bench.enter('status').splitlines()
     assert first.startswith('1/243 bow') and '  ON  ' in first
     assert second.startswith('1/244') and '  off  ' in second
 
 
 def test_help_has_every_command_and_every_fault(bench):
-    text = bench.type('help')
+    text = bench.enter('help')
     for command in COMMANDS.values():
         assert command.usage in text
     for name in FAULTS:

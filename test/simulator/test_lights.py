@@ -14,14 +14,13 @@
 
 """Which lights the command line and a file describe."""
 
-import pytest
-
 from illuminator_ros.illuminator.faults import active
 from illuminator_ros.illuminator.model import Limits, Mode
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.simulator.lights import lights, load, Scene, scene
 from illuminator_ros.simulator.options import parser
 from illuminator_ros.simulator.settings import SettingError, SETTINGS
+import pytest
 
 
 def described(*arguments, file=None):

@@ -19,13 +19,12 @@ import os
 import re
 import shutil
 
-import pytest
-
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import Device, DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.simulator.view import glance, LiveView, PlainView
+import pytest
 
 
 @pytest.fixture

@@ -22,8 +22,6 @@ import random
 import struct
 from typing import Any
 
-from support.frames import raw_v1, raw_v2
-
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,
@@ -37,6 +35,7 @@ from illuminator_ros.mavlink.dialect import (
     Source,
 )
 from illuminator_ros.mavlink.signing import MAX_TICKS, signature, ticks
+from support.frames import raw_v1, raw_v2
 
 FLOATS = (0.0, -0.0, 1.0, 50.0, 100.0, 100.00001, -1.0, -1e-30, 1e-45, 3.4e38, -3.4e38, 25.5,
           math.nan, -math.nan, math.inf, -math.inf, 440.0, 396.0, 1e6, 0.05, 3600.5)

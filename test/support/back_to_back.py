@@ -20,9 +20,6 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from support.faulty_wire import Faults, FaultyWire
-from support.records import Answer, Recorder
-
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
 from illuminator_ros.illuminator.light import Light, Settings
@@ -39,6 +36,8 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.mavlink.endpoint import Endpoint
 from illuminator_ros.mavlink.framing import Decoder, encode_frame
+from support.faulty_wire import Faults, FaultyWire
+from support.records import Answer, Recorder
 
 BRIDGE = Source(1, 194)
 ONE_LIGHT = (DeviceProperties(),)
@@ -121,17 +120,17 @@ class Pair:
 
     @property
     def light(self) -> Light:
-        """The light that the controller has found first."""
+        """Return the light that the controller has found first."""
         return next(iter(self.controller.lights.values()))
 
     @property
     def recorder(self) -> Recorder:
-        """What the observer of that light was told."""
+        """Return what the observer of that light was told."""
         return self.recorders[self.light.source]
 
     @property
     def device(self) -> Device:
-        """The first simulated light."""
+        """Return the first simulated light."""
         assert isinstance(self.other, Devices)
         return self.other.devices[0]
 
@@ -190,7 +189,7 @@ class Pair:
         for end in (self.near, self.far):
             end.wire.faults = Faults()
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         """Open the line."""
         self._switch(is_open=True)
         self.controller.link_opened(self.now)

@@ -52,7 +52,7 @@ class Run:
 
     @property
     def outcome(self) -> Outcome:
-        """The outcome; an error unless there is exactly one."""
+        """Return the outcome; an error unless there is exactly one."""
         (outcome,) = self.outcomes
         return outcome
 
@@ -63,7 +63,7 @@ class Run:
 
     @property
     def result(self) -> int | None:
-        """The MAV_RESULT that it ended with."""
+        """Return the MAV_RESULT that it ended with."""
         return self.outcome.result
 
 
@@ -149,7 +149,7 @@ class Rig:
 
     @property
     def messages(self) -> list[Any]:
-        """What was sent."""
+        """Return what was sent."""
         return [message for _, message in self.frames]
 
     @property

@@ -18,14 +18,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from support.virtual_link import START, VirtualLink
-
 from illuminator_ros.conformance.bench import Bench
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.suite import Suite
 from illuminator_ros.illuminator.device import DeviceProperties, Devices
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
+from support.virtual_link import START, VirtualLink
 
 TESTER = Source(255, 190)
 # s for which the lights have been on when a run begins.
@@ -63,7 +62,7 @@ class Run:
 
     @property
     def failed(self) -> set[str]:
-        """The names of the requirements that the light does not meet."""
+        """Return the names of the requirements that the light does not meet."""
         return self.names(Verdict.FAIL)
 
     def result(self, name: str):

@@ -21,12 +21,11 @@ import contextlib
 import threading
 from typing import Any
 
+from illuminator_ros.ros.node import IlluminatorNode
+from illuminator_ros.ros.process import BridgeProcess
 import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
-
-from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.process import BridgeProcess
 
 
 @contextlib.contextmanager

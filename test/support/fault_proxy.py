@@ -63,7 +63,7 @@ class FaultProxy:
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def set(self, faults: Faults) -> None:
+    def set(self, faults: Faults) -> None:  # noqa: A003
         """Have other faults from now on."""
         with self._lock:
             self._faults = faults

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import logging
 import os
 from typing import Any
 
@@ -30,6 +31,16 @@ from support.ros import own_domain, Parameters, Ros, running_bridge
 def ros_home(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Keep logs and time stamps of the programs under test out of the user's home."""
     os.environ['ROS_HOME'] = str(tmp_path_factory.mktemp('ros_home'))
+
+
+@pytest.fixture(scope='module', autouse=True)
+def log_routes() -> Iterator[None]:
+    """Undo what a bridge in the test's own process does to logging: others look at their logs."""
+    logger = logging.getLogger('illuminator_ros')
+    handlers, propagate = list(logger.handlers), logger.propagate
+    yield
+    logger.handlers[:] = handlers
+    logger.propagate = propagate
 
 
 @pytest.fixture(scope='module')

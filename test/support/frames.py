@@ -19,12 +19,12 @@ from __future__ import annotations
 from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
-from support.messages import STATUS
-
 from illuminator_ros.mavlink.dialect import encode_payload, LAYOUTS, Source
 from illuminator_ros.mavlink.framing import Decoder, encode_frame, Frame
+from support.messages import STATUS
 
 LIGHT = Source(1, 243)
+AUTOPILOT = Source(7, 1)
 # Never the beginning of a frame, and long enough to end the wait for the rest of any.
 FILLER = bytes(300)
 
@@ -45,6 +45,11 @@ def raw_v2(message_id: int, payload: bytes, *, crc_extra: int | None = None, inc
     header = bytes((len(payload), incompat, compat, sequence, *source))
     body = header + message_id.to_bytes(3, 'little') + payload
     return b'\xfd' + body + mcrf4xx(body + bytes((crc_extra,))).to_bytes(2, 'little')
+
+
+def foreign_frame(sequence: int = 0, source: Source = AUTOPILOT) -> bytes:
+    """Return a frame with a message that is nothing to us: ATTITUDE."""
+    return raw_v2(30, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)
 
 
 def raw_v1(message_id: int, payload: bytes, *, crc_extra: int | None = None, sequence: int = 0,

@@ -16,10 +16,9 @@
 
 from __future__ import annotations
 
-from support.frames import frame_of, LIGHT
-
 from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
 from illuminator_ros.mavlink.framing import Decoder
+from support.frames import frame_of, LIGHT
 
 
 def heartbeat_frame(

@@ -25,8 +25,6 @@ import time
 from types import TracebackType
 from typing import Any
 
-from support.fake_light import FakeLight
-
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,
@@ -38,6 +36,7 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
+from support.fake_light import FakeLight
 
 LIGHT = Source(1, 243)
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
@@ -178,7 +177,7 @@ class ServedLight:
         """Have the next frame look as if ``count`` before it had been lost."""
         def act(now: float) -> None:
             assert self._link is not None
-            sequences = self._link._sequences
+            sequences = self._link._departure.sequences
             sequences[self.fake.source] = (sequences.get(self.fake.source, 0) + count) & 0xFF
         self.do(act)
 

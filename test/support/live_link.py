@@ -22,8 +22,6 @@ import threading
 import time
 from typing import Any
 
-from support.waiting import eventually, Log, PATIENCE
-
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.device import DeviceProperties, Devices
 from illuminator_ros.illuminator.light import Light, Settings
@@ -33,6 +31,7 @@ from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link, LinkEvent
 from illuminator_ros.mavlink.url import parse_url, Url
+from support.waiting import eventually, Log, PATIENCE
 
 BRIDGE = Source(1, 194)
 OPENER = 'mavlink-open'
@@ -135,6 +134,7 @@ class Lights(LiveLink):
 
 
 class _Watcher(LightObserver):
+
     def __init__(self, log: Log[tuple[str, Light]]) -> None:
         self._log = log
 

@@ -30,14 +30,13 @@ import termios
 import threading
 from typing import Any
 
+from illuminator_ros.monitor.actions import Ask
+from illuminator_ros.monitor.model import Light, Outcome
+from illuminator_ros.monitor.run import Monitor
 from rclpy.node import Node
 from support.light import eventually
 from support.processes import end_with_parent, environment, ROOT
 from support.ros import Ros
-
-from illuminator_ros.monitor.actions import Ask
-from illuminator_ros.monitor.model import Light, Outcome
-from illuminator_ros.monitor.run import Monitor
 
 # Cursor movements and colours.
 _CONTROL = re.compile(r'\x1b\[[\d;?]*[A-Za-z]')

@@ -21,9 +21,8 @@ import socket
 import time
 from typing import Any
 
-from support.waiting import PATIENCE
-
 from illuminator_ros.mavlink.transport import Channel
+from support.waiting import PATIENCE
 
 
 class OpenChannel:
@@ -60,9 +59,9 @@ class OpenChannel:
             data += b''.join(piece for _, piece in self.receive())
         return data
 
-    def broadcast(self, frame: bytes, now: float = 0.0) -> None:
-        """Send a frame to everybody."""
-        self.channel.send(frame, self.channel.peers(now))
+    def broadcast(self, *frames: bytes, now: float = 0.0) -> None:
+        """Send frames to everybody."""
+        self.channel.send(frames, self.channel.peers(now))
 
     def close(self) -> None:
         """Close it."""

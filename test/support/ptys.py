@@ -24,12 +24,11 @@ from pathlib import Path
 import select
 import threading
 
-from support.frames import frame_of
-from support.waiting import PATIENCE
-
 from illuminator_ros.illuminator.device import DeviceProperties, Devices
 from illuminator_ros.mavlink.dialect import decode_payload, HANDLED
 from illuminator_ros.mavlink.framing import Decoder
+from support.frames import frame_of
+from support.waiting import PATIENCE
 
 
 class PtyDevice:

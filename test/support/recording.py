@@ -37,7 +37,7 @@ class Recorder:
 
     @property
     def values(self) -> list[Any]:
-        """The ``data`` of all messages."""
+        """Return the ``data`` of all messages."""
         return [message.data for message in self.messages]
 
     def clear(self) -> None:

@@ -88,7 +88,7 @@ class Answer:
 
     @property
     def result(self) -> Result:
-        """The result; an error unless there is exactly one."""
+        """Return the result; an error unless there is exactly one."""
         (result,) = self.results
         return result
 

@@ -30,9 +30,8 @@ from pathlib import Path
 import tempfile
 from typing import Any
 
-from pymavlink.generator import mavgen
-
 from illuminator_ros.mavlink.dialect import Source
+from pymavlink.generator import mavgen
 
 # Message id, name and fields (type, name, further attributes), in the order of common.xml.
 # None stands where the extension fields begin.

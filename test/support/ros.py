@@ -193,7 +193,7 @@ class Parameters:
         """Return the names of all parameters."""
         return list(self.start(ListParameters, 'list_parameters').result().result.names)
 
-    def set(self, **values: Any) -> list[Any]:
+    def set(self, **values: Any) -> list[Any]:  # noqa: A003
         """Set parameters with one call of set_parameters; return the results."""
         return list(self.start_set(**values).result().results)
 

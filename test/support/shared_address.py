@@ -18,10 +18,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from support.fake_light import FakeLight
-
 from illuminator_ros.mavlink.dialect import CommandAck, Source
 from illuminator_ros.mavlink.endpoint import Endpoint
+from support.fake_light import FakeLight
 
 
 class SharedAddress(Endpoint):

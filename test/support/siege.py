@@ -21,9 +21,6 @@ import math
 import random
 from typing import Any
 
-from support.attacker import Attacker
-from support.simulated_link import SimulatedLink
-
 from illuminator_ros.illuminator.controller import Controller, MAX_LIGHTS
 from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
 from illuminator_ros.illuminator.light import Light, Settings
@@ -47,6 +44,8 @@ from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+from support.attacker import Attacker
+from support.simulated_link import SimulatedLink
 
 KEY = bytes(range(32))
 BRIDGE = Source(1, 194)
@@ -152,7 +151,7 @@ class Siege:
                 ('ways', max(map(len, link._routes._ways.values()), default=0), MAX_WAYS),
                 ('streams', len(link._signing._streams), MAX_STREAMS),
                 ('outgoing', len(waiting), 0),
-                ('sequences', len(link._sequences), 8)):
+                ('sequences', len(link._departure.sequences), 8)):
             assert size <= bound, f'{size} {what}, more than {bound}'
 
     def attack(self) -> None:
@@ -187,7 +186,7 @@ class BridgeSiege(Siege):
 
     @property
     def controller(self) -> Controller:
-        """What is attacked."""
+        """Return what is attacked."""
         controller: Controller = self.link.endpoint
         return controller
 

@@ -18,9 +18,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from support.frames import frame_of, LIGHT, only
-from support.messages import STATUS
-
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.framing import Frame
 from illuminator_ros.mavlink.signing import (
@@ -30,6 +27,8 @@ from illuminator_ros.mavlink.signing import (
     SigningMode,
     ticks,
 )
+from support.frames import frame_of, LIGHT, only
+from support.messages import STATUS
 
 KEY = bytes(range(32))
 WRONG_KEY = bytes(range(1, 33))

@@ -21,9 +21,6 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
-from support.back_to_back import Pair, START
-from support.records import Answer
-
 from illuminator_ros.illuminator.device import Device, Devices
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.model import Mode
@@ -36,6 +33,8 @@ from illuminator_ros.mavlink.dialect import (
     MavResult,
     Source,
 )
+from support.back_to_back import Pair, START
+from support.records import Answer
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 TRIES = re.compile(r'\((\d+) (?:try|tries), ')
@@ -102,7 +101,7 @@ class Request:
 
     @property
     def message(self) -> str:
-        """What the answer says."""
+        """Return what the answer says."""
         return self.answer.result.message
 
 

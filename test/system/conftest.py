@@ -18,6 +18,7 @@ from support.fixtures import (  # noqa: F401
     bridge,
     domain,
     light,
+    log_routes,
     own_ros,
     parameters,
     port,

@@ -19,6 +19,7 @@ from pathlib import Path
 import shutil
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import pytest
 from support.light import free_port
@@ -26,28 +27,42 @@ from support.processes import ended, environment, Program, ROOT
 from support.ros import Parameters, Ros
 
 COLCON = shutil.which('colcon', path=f'{Path(sys.executable).parent}:/usr/bin')
-SOURCES = ('illuminator_ros', 'resource', 'config', 'launch', 'package.xml', 'setup.py',
-           'setup.cfg', 'LICENSE', 'README.md')
+LEFT_OUT = shutil.ignore_patterns(
+    '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'bench', 'demo')
+# A part that is quick: that all tests pass is for "make test" to say.
+PART = ('test/mavlink/test_url.py', 'test/illuminator/test_uptime.py')
+PLANTED = """def test_passes() -> None:
+    assert True
 
 
-pytestmark = pytest.mark.skipif(COLCON is None, reason='colcon is not installed')
+def test_fails() -> None:
+    assert False, 'planted'
+"""
+
+pytestmark = [pytest.mark.skipif(COLCON is None, reason='colcon is not installed'),
+              pytest.mark.timeout(300)]
+
+
+def colcon(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run colcon as in a shell that knows of no package of ours."""
+    path = {'PATH': f'{Path(sys.executable).parent}:/usr/bin:/bin'}
+    return subprocess.run([str(COLCON), *arguments], cwd=workspace, text=True, timeout=120,
+                          capture_output=True, env={**environment(path), 'PYTHONPATH': ''})
 
 
 @pytest.fixture(scope='module')
-def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build a copy of the package and return where it is installed."""
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a workspace with a copy of the package, built."""
     workspace = tmp_path_factory.mktemp('workspace')
-    source = workspace / 'src' / 'illuminator_ros'
-    source.mkdir(parents=True)
-    for name in SOURCES:
-        if (ROOT / name).is_dir():
-            shutil.copytree(ROOT / name, source / name,
-                            ignore=shutil.ignore_patterns('__pycache__'))
-        elif (ROOT / name).exists():
-            shutil.copy(ROOT / name, source / name)
-    path = {'PATH': f'{Path(sys.executable).parent}:/usr/bin:/bin'}
-    subprocess.run([str(COLCON), 'build'], cwd=workspace, check=True, capture_output=True,
-                   timeout=50, env={**environment(path), 'PYTHONPATH': ''})
+    shutil.copytree(ROOT, workspace / 'src' / 'illuminator_ros', ignore=LEFT_OUT)
+    outcome = colcon(workspace, 'build')
+    assert outcome.returncode == 0, outcome.stderr
+    return workspace
+
+
+@pytest.fixture(scope='module')
+def prefix(workspace: Path) -> Path:
+    """Return where the package is installed."""
     return workspace / 'install' / 'illuminator_ros'
 
 
@@ -62,6 +77,14 @@ def installed(prefix: Path) -> dict[str, str]:
     'share/ament_index/resource_index/packages/illuminator_ros',
     'share/illuminator_ros/package.xml',
     'share/illuminator_ros/config/bridge.yaml',
+    'share/illuminator_ros/config/diagnostics_aggregator.yaml',
+    'share/illuminator_ros/config/foxglove_layout.json',
+    'share/illuminator_ros/config/joystick.yaml',
+    'share/illuminator_ros/config/plotjuggler_layout.xml',
+    'share/illuminator_ros/config/sros2/illuminator.policy.xml',
+    'share/illuminator_ros/launch/bridge.launch.xml',
+    'share/illuminator_ros/launch/demo.launch.xml',
+    'share/illuminator_ros/launch/joystick.launch.xml',
 ])
 def test_what_ros_looks_for_is_installed(prefix: Path, path: str) -> None:
     assert (prefix / path).is_file()
@@ -86,6 +109,36 @@ def test_the_executables_are_where_ros2_run_looks(
 
     assert (outcome.returncode, outcome.stderr) == (0, '')
     assert outcome.stdout.startswith(f'usage: {name} ')
+
+
+def results(workspace: Path) -> tuple[int, str]:
+    """Return exit status and output of ``colcon test-result``."""
+    outcome = colcon(workspace, 'test-result', '--verbose')
+    return outcome.returncode, outcome.stdout
+
+
+def test_colcon_test_runs_the_tests_with_pytest(workspace: Path) -> None:
+    outcome = colcon(workspace, 'test', '--pytest-args', *PART)
+    status, output = results(workspace)
+
+    assert (outcome.returncode, status) == (0, 0), output
+    assert '0 errors, 0 failures, 0 skipped' in output
+    report = ElementTree.parse(workspace / 'build' / 'illuminator_ros' / 'pytest.xml')
+    assert {case.get('classname') for case in report.iter('testcase')} == {
+        'illuminator_ros.test.mavlink.test_url', 'illuminator_ros.test.illuminator.test_uptime'}
+
+
+def test_a_test_that_fails_is_in_the_result(workspace: Path) -> None:
+    planted = workspace / 'src' / 'illuminator_ros' / 'test' / 'test_planted.py'
+    planted.write_text(PLANTED)
+
+    outcome = colcon(workspace, 'test', '--return-code-on-test-failure', '--pytest-args',
+                     'test/test_planted.py')
+    status, output = results(workspace)
+
+    assert (outcome.returncode, status) == (1, 1)
+    assert '2 tests, 0 errors, 1 failure, 0 skipped' in output
+    assert 'test_fails' in output
 
 
 @pytest.fixture

@@ -19,18 +19,18 @@ import re
 import subprocess
 import sys
 
-import pytest
-from support.processes import environment, ROOT, run
-
 from illuminator_ros import __version__
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 from illuminator_ros.simulator.options import parser
+import pytest
+from support.processes import environment, ROOT, run
 
 BRIDGE, SIMULATOR = 'illuminator_ros.bridge', 'illuminator_ros.simulator'
 MONITOR = 'illuminator_ros.monitor'
 
 
 class TestHelp:
+
     @pytest.mark.parametrize('module', [BRIDGE, SIMULATOR, MONITOR])
     @pytest.mark.parametrize('option', ['--help', '-h'])
     def test_it_is_printed_and_that_is_all(self, module: str, option: str) -> None:
@@ -119,6 +119,7 @@ def test_the_simulator_refuses_what_is_wrong_in_one_line(
 
 
 class TestMissingPackages:
+
     def run_without(self, package: str, module: str, tmp_path: Path) -> tuple[int, str]:
         blocker = tmp_path / 'sitecustomize.py'
         blocker.write_text(f'import sys\nsys.modules[{package!r}] = None\n')

@@ -21,12 +21,11 @@ import selectors
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink.transport import open_channel
+from illuminator_ros.mavlink.url import parse_url, Url
 import pytest
 from support.live_link import LiveLink, resources, wait_for_resources
 from support.open_channel import OpenChannel
-
-from illuminator_ros.mavlink.transport import open_channel
-from illuminator_ros.mavlink.url import parse_url, Url
 
 
 def _has_ipv6() -> bool:

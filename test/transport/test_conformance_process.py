@@ -23,10 +23,9 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
+from illuminator_ros.conformance.requirements import REQUIREMENTS
 import pytest
 from support.processes import environment, Program, ROOT, run
-
-from illuminator_ros.conformance.requirements import REQUIREMENTS
 
 # Started like this, none of what `pip install` does not bring can be imported.
 WITHOUT_ROS = (

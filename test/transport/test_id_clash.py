@@ -20,12 +20,11 @@ import socket
 import threading
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import MavType
 import pytest
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, Bridge
 from support.waiting import eventually, Log
-
-from illuminator_ros.mavlink.dialect import MavType
 
 
 class Loop:

@@ -20,6 +20,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
@@ -27,9 +29,6 @@ from support.live_link import Jump, LiveLink, resources, wait_for_openers, wait_
 from support.open_channel import bound_socket, free_port, listening_socket
 from support.ptys import PtyDevice
 from support.waiting import eventually
-
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
 
 CYCLES = 200
 
@@ -153,10 +152,9 @@ def test_a_link_that_is_made_and_ended() -> None:
 
 
 def test_a_link_that_is_never_started(monkeypatch: pytest.MonkeyPatch) -> None:
-    from support.live_link import Talker
-
     from illuminator_ros.mavlink.link import Link
     from illuminator_ros.mavlink.url import parse_url
+    from support.live_link import Talker
     before = resources()
     links: list[Any] = [
         Link(parse_url('memory://x'), Talker(), label='x') for _ in range(10)]

@@ -21,17 +21,16 @@ import contextlib
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink import link as link_module
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.opener import FIRST_PAUSE
+from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import LiveLink
 from support.open_channel import bound_socket, free_port, listening_socket
 from support.waiting import Log
-
-from illuminator_ros.mavlink import link as link_module
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.opener import FIRST_PAUSE
-from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 
 Run = Callable[[LiveLink], LiveLink]
 
@@ -140,6 +139,7 @@ def record_pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
     pauses: Log[float] = Log()
 
     class Recorded(opener.Backoff):
+
         def __init__(self) -> None:
             super().__init__(lambda: 1.0)
 
@@ -221,7 +221,7 @@ def no_way_out(monkeypatch: pytest.MonkeyPatch) -> Log[Any]:
     def opened(url: Any) -> Any:
         channel = open_channel(url)
 
-        def send(frame: bytes, peers: Any) -> None:
+        def send(frames: Any, peers: Any) -> None:
             raise ChannelLost(101, 'Network is unreachable')
 
         monkeypatch.setattr(channel, 'send', send)

@@ -22,17 +22,16 @@ import math
 import threading
 from typing import Any
 
+from illuminator_ros.mavlink import link as link_module
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.dialect import heartbeat
+from illuminator_ros.mavlink.link import LinkEvent
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Talker
 from support.open_channel import listening_socket, OpenChannel
 from support.waiting import Log
-
-from illuminator_ros.mavlink import link as link_module
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.dialect import heartbeat
-from illuminator_ros.mavlink.link import LinkEvent
 
 Run = Callable[[LiveLink], LiveLink]
 
@@ -210,6 +209,7 @@ def test_time_stamps_of_signing_that_cannot_be_stored_do_not_end_the_link(
     run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture, reason: Exception,
 ) -> None:
     class Store:
+
         def store(self, timestamp: int, *, last: bool = False) -> None:
             raise reason
 

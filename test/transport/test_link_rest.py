@@ -22,6 +22,9 @@ import socket
 import threading
 import time
 
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.reception import STALL
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
@@ -29,10 +32,6 @@ from support.live_link import LiveLink, Talker
 from support.open_channel import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
-
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.reception import STALL
 
 Run = Callable[[LiveLink], LiveLink]
 

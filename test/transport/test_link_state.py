@@ -19,15 +19,14 @@ from __future__ import annotations
 from collections.abc import Callable
 import threading
 
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.link import LinkState
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import Jump, LiveLink
 from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
-
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.link import LinkState
 
 Run = Callable[[LiveLink], LiveLink]
 

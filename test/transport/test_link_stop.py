@@ -23,15 +23,14 @@ import threading
 import time
 from typing import Any
 
+from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink.transport import resolve, tcp
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import LiveLink, resources, wait_for_openers, wait_for_resources
 from support.open_channel import bound_socket, free_port, listening_socket
 from support.waiting import Log, PATIENCE
-
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.transport import resolve, tcp
 
 
 @pytest.fixture(autouse=True)

@@ -21,11 +21,10 @@ import os
 from pathlib import Path
 import socket
 
-import pytest
-from support.open_channel import bound_socket, listening_socket
-
 from illuminator_ros.mavlink.transport import open_channel
 from illuminator_ros.mavlink.url import parse_url
+import pytest
+from support.open_channel import bound_socket, listening_socket
 
 
 def reason(url: str) -> str:

@@ -42,6 +42,7 @@ class Other(Protocol):
 
 
 class _TcpServer:
+
     def __init__(self, clock: Jump) -> None:
         self._clock = clock
         self._port = free_port(socket.SOCK_STREAM)
@@ -58,6 +59,7 @@ class _TcpServer:
 
 
 class _SerialDevice:
+
     def __init__(self, clock: Jump, directory: Path) -> None:
         self._clock = clock
         self._device = PtyDevice(directory)

@@ -21,12 +21,11 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from illuminator_ros.mavlink.transport import ChannelLost, open_channel
+from illuminator_ros.mavlink.url import parse_url
 import pytest
 from support.open_channel import OpenChannel
 from support.ptys import PtyDevice
-
-from illuminator_ros.mavlink.transport import ChannelLost, open_channel
-from illuminator_ros.mavlink.url import parse_url
 
 serial = pytest.importorskip('serial', reason='pyserial is not installed')
 

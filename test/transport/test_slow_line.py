@@ -21,13 +21,12 @@ from pathlib import Path
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink.transport.base import FrameQueue, MAX_QUEUED
 import pytest
 from support.heartbeats import numbered_frames, numbers_in
 from support.open_channel import listening_socket, OpenChannel
 from support.ptys import PtyDevice
 from support.waiting import eventually, PATIENCE
-
-from illuminator_ros.mavlink.transport.base import FrameQueue, MAX_QUEUED
 
 
 def contents(queue: FrameQueue) -> bytes:

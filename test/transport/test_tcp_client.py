@@ -22,11 +22,10 @@ import socket
 import struct
 from typing import Any
 
-import pytest
-from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
-
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel, tcp
 from illuminator_ros.mavlink.url import parse_url
+import pytest
+from support.open_channel import bound_socket, free_port, listening_socket, OpenChannel
 
 OpenFunction = Callable[[str], OpenChannel]
 
@@ -119,6 +118,7 @@ def test_the_addresses_of_a_name_share_the_time_there_is(monkeypatch: pytest.Mon
     waits = []
 
     class Watched(socket.socket):
+
         def connect(self, address: Any) -> None:
             waits.append(self.gettimeout())
             raise TimeoutError
@@ -146,6 +146,7 @@ def test_the_second_address_of_a_name_is_tried_too(
 def test_a_connection_with_itself_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     # The kernel makes one where the free port that it takes is the one that is connected to.
     class Selfish(socket.socket):
+
         def connect(self, address: Any) -> None:
             self.bind(address)
             super().connect(address)

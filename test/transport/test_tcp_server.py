@@ -23,12 +23,11 @@ import socket
 import struct
 from typing import Any
 
+from illuminator_ros.mavlink.transport import ChannelLost
+from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 import pytest
 from support.open_channel import free_port, OpenChannel
 from support.waiting import PATIENCE
-
-from illuminator_ros.mavlink.transport import ChannelLost
-from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 
 
 @pytest.fixture
@@ -85,7 +84,7 @@ def test_a_broadcast_goes_to_all_clients(ours: OpenChannel, connect: Connect) ->
 def test_what_is_sent_to_one_client_goes_to_no_other(ours: OpenChannel, connect: Connect) -> None:
     one, other = connect(), connect()
     peer = say(ours, one)
-    ours.channel.send(b'to one', [peer])
+    ours.channel.send([b'to one'], [peer])
     ours.broadcast(b'to all')
     assert other.recv(100) == b'to all'
 

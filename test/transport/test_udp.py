@@ -21,11 +21,11 @@ import errno
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink.transport import ChannelLost, open_channel
+from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM
+from illuminator_ros.mavlink.url import Address, UdpUrl
 import pytest
 from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
-
-from illuminator_ros.mavlink.transport import ChannelLost, open_channel
-from illuminator_ros.mavlink.url import Address, UdpUrl
 
 OpenFunction = Callable[[str | UdpUrl], OpenChannel]
 
@@ -137,10 +137,28 @@ def test_a_learnt_peer_out_of_reach_is_forgotten_and_no_loss(channel: OpenFuncti
         # Nothing can be sent to port 0.
         ours.channel.heard(('127.0.0.1', 0), 0.0)
         ours.channel.heard(good.getsockname(), 0.0)
-        ours.broadcast(b'frame')
+        ours.broadcast(bytes(MAX_DATAGRAM), b'frame')
+        assert good.recv(MAX_DATAGRAM) == bytes(MAX_DATAGRAM)
         assert good.recv(100) == b'frame'
         assert ours.channel.peers(0.0) == (good.getsockname(),)
-        assert ours.channel.dropped == 1
+        assert ours.channel.dropped == 2
+
+
+@pytest.mark.parametrize(('sizes', 'datagrams'), [
+    ([0], [0]),
+    ([10, 20], [30]),
+    ([MAX_DATAGRAM - 1, 1], [MAX_DATAGRAM]),
+    ([MAX_DATAGRAM - 1, 2], [MAX_DATAGRAM - 1, 2]),
+    ([280] * 12, [1400, 1400, 560]),
+])
+def test_frames_share_datagrams_that_pass_an_ethernet_whole(
+    channel: OpenFunction, sizes: list[int], datagrams: list[int],
+) -> None:
+    with bound_socket() as remote:
+        ours = channel(f'udpout://127.0.0.1:{remote.getsockname()[1]}')
+        ours.broadcast(*map(bytes, sizes))
+        assert [len(remote.recv(65536)) for _ in datagrams] == datagrams
+        assert has_nothing(remote)
 
 
 class _FailingSocket:

@@ -20,16 +20,15 @@ from collections.abc import Callable
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
+from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
+from illuminator_ros.mavlink.url import Address, UdpUrl
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink
 from support.open_channel import bound_socket, free_port, has_nothing, OpenChannel
-
-from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
-from illuminator_ros.mavlink.framing import Decoder
-from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
-from illuminator_ros.mavlink.url import Address, UdpUrl
 
 COMMAND = CommandLong(*LIGHT, 512, 0, 440, 0, 0, 0, 0, 0, 0)
 MARK = heartbeat(18)
@@ -153,6 +152,15 @@ def test_messages_to_who_was_heard_nowhere_go_to_everybody(bridge: Any, port: in
         assert COMMAND.id in ids_until_mark(other)
 
 
+def test_what_is_said_together_comes_in_one_datagram(bridge: Any, port: int) -> None:
+    with bound_socket() as one:
+        hear(bridge, port, [(one, Source(7, 1))])
+        say(bridge, COMMAND, MARK)
+        while COMMAND.id not in (ids := ids_in(one.recv(65536))):
+            pass
+        assert ids == [COMMAND.id, MARK.id]
+
+
 def hear(bridge: Any, port: int, talkers: list[tuple[socket.socket, Source]]) -> None:
     """Have a link hear several senders."""
     for count, (sender, source) in enumerate(talkers, 1):
@@ -166,11 +174,16 @@ def say(bridge: Any, *messages: Any) -> None:
         (BRIDGE, message) for message in messages))
 
 
+def ids_in(datagram: bytes) -> list[int]:
+    """Return the ids of the messages in a datagram."""
+    return [frame.message_id for frame in Decoder().feed(datagram)]
+
+
 def ids_until_mark(receiver: socket.socket) -> list[int]:
     """Return the ids of the messages that come before the mark."""
     ids = []
     while True:
-        (frame,) = Decoder().feed(receiver.recv(300))
-        if frame.payload[:4] == MARK.custom_mode.to_bytes(4, 'little'):
-            return ids
-        ids.append(frame.message_id)
+        for frame in Decoder().feed(receiver.recv(65536)):
+            if frame.payload[:4] == MARK.custom_mode.to_bytes(4, 'little'):
+                return ids
+            ids.append(frame.message_id)

@@ -15,8 +15,8 @@
 """The requirements, in the order in which they are checked; importing a module enters them."""
 
 # isort: off
-from . import heartbeat, status, information, command, switch, configuration, interval
-from . import thermal, totals
+from . import heartbeat, status, information, command  # noqa: I101
+from . import switch, configuration, interval, thermal, totals  # noqa: I101
 # isort: on
 from ..requirement import REQUIREMENTS
 

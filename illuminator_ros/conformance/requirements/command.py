@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from ...mavlink.dialect import MavCmd, MavResult, Source, STATUS_ID
 from ..bench import Bench
 from ..requirement import COMMAND, fail_if, Failed, MESSAGES, requirement, ROUTING, Skipped
+from ...mavlink.dialect import MavCmd, MavResult, Source, STATUS_ID
 
 # No MAV_CMD, and none that will be one soon.
 UNKNOWN_COMMAND = 65000

@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
-from ...illuminator.model import float32, Limits, Mode
-from ...mavlink.dialect import MavCmd, MavResult
 from ..bench import Bench, LOW, Transaction
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
+from ...illuminator.model import float32, Limits, Mode
+from ...mavlink.dialect import MavCmd, MavResult
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 INTERNAL = float(Mode.INTERNAL_CONTROL)

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from ...mavlink.dialect import MAV_AUTOPILOT_INVALID, MavType
 from ..bench import Bench
 from ..requirement import Failed, HEARTBEAT, requirement, ROUTING, Skipped
+from ...mavlink.dialect import MAV_AUTOPILOT_INVALID, MavType
 
 
 @requirement('heartbeat', 'sends HEARTBEAT', HEARTBEAT, 'HEARTBEAT Broadcast Frequency')

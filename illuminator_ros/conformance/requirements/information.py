@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...illuminator.model import Identity
-from ...mavlink.dialect import INFORMATION_ID, MavCmd, wire_value
 from ..bench import Bench
 from ..requirement import Failed, ILLUMINATOR, MESSAGES, requirement, Skipped
+from ...illuminator.model import Identity
+from ...mavlink.dialect import INFORMATION_ID, MavCmd, wire_value
 
 STRINGS = ('vendor_name', 'model_name', 'software_version', 'hardware_version', 'serial_number')
 

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from ...mavlink.dialect import MavCmd, STATUS_ID
 from ..bench import Bench, median, periods
 from ..requirement import Failed, MESSAGES, requirement, Skipped
+from ...mavlink.dialect import MavCmd, STATUS_ID
 
 # s
 INTERVAL = 0.25

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import math
 
-from ...illuminator.model import flag_names, KNOWN_FLAGS, Mode, Status
-from ...mavlink.dialect import MavCmd, STATUS_ID
 from ..bench import Bench, median, periods
 from ..describe import status_text
 from ..requirement import Failed, ILLUMINATOR, MESSAGES, requirement, Skipped
+from ...illuminator.model import flag_names, KNOWN_FLAGS, Mode, Status
+from ...mavlink.dialect import MavCmd, STATUS_ID
 
 
 @requirement('status-stream', 'sends ILLUMINATOR_STATUS at a regular rate', ILLUMINATOR,

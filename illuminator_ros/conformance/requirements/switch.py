@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from ...mavlink.dialect import MavCmd
 from ..bench import Bench
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement
+from ...mavlink.dialect import MavCmd
 
 
 @requirement('on', 'is switched on', ILLUMINATOR, 'ON/OFF', changes=True)

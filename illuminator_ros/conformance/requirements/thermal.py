@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
-from ...illuminator.model import ErrorFlag, flag_names, Status
 from ..bench import Bench
 from ..requirement import Failed, ILLUMINATOR, requirement, Skipped
+from ...illuminator.model import ErrorFlag, flag_names, Status
 
 # K that a light has to get warmer for a flag to have a reason.
 STEP = 0.5

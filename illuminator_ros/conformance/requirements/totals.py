@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from ...mavlink.dialect import MavResult, result_name, Source
 from ..bench import Bench, median, periods, Transaction
 from ..requirement import (
     COMMAND,
@@ -27,6 +26,7 @@ from ..requirement import (
     SERIALIZATION,
     Skipped,
 )
+from ...mavlink.dialect import MavResult, result_name, Source
 
 # s
 LONGEST_HEARTBEAT_GAP = 2.6

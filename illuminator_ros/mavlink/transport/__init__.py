@@ -16,12 +16,12 @@
 
 from __future__ import annotations
 
-from ..url import MemoryUrl, SerialUrl, TcpUrl, UdpUrl, Url
 from .base import Channel, ChannelLost, Peer
 from .memory import open_memory
 from .serial import open_serial
 from .tcp import TcpClient, TcpServer
 from .udp import UdpChannel
+from ..url import MemoryUrl, SerialUrl, TcpUrl, UdpUrl, Url
 
 __all__ = ['Channel', 'ChannelLost', 'open_channel', 'Peer']
 

@@ -71,9 +71,11 @@ class Channel(ABC):
         return False
 
     @abstractmethod
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """
-        Send a frame to some of the peers, dropping it where there is no room.
+        Send frames to some of the peers, dropping them where there is no room.
+
+        Frames that are given together go out together, in one datagram where there are datagrams.
 
         :raises ChannelLost: if the channel is gone.
         """

@@ -22,8 +22,8 @@ import socket
 import threading
 from typing import Any
 
-from ..url import MemoryUrl
 from .base import Channel, Peer
+from ..url import MemoryUrl
 
 _hub: dict[str, list[_MemoryChannel]] = {}
 _lock = threading.Lock()
@@ -38,6 +38,7 @@ def open_memory(url: MemoryUrl) -> Channel:
 
 
 class _MemoryChannel(Channel):
+
     def __init__(self, hub_name: str) -> None:
         self._hub_name = hub_name
         self._inbox, self._entrance = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -58,14 +59,14 @@ class _MemoryChannel(Channel):
     def peers(self, now: float) -> Sequence[Peer]:
         return (None,)
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         with _lock:
             for other in _hub.get(self._hub_name, []):
                 if other is not self:
                     try:
-                        other._entrance.send(frame)
+                        other._entrance.send(b''.join(frames))
                     except BlockingIOError:
-                        self.dropped += 1
+                        self.dropped += len(frames)
 
     def close(self) -> None:
         with _lock:

@@ -24,8 +24,8 @@ import selectors
 import termios
 from typing import Any, TYPE_CHECKING
 
-from ..url import SerialUrl
 from .base import Channel, ChannelLost, FrameQueue, Peer
+from ..url import SerialUrl
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -62,6 +62,7 @@ def open_serial(url: SerialUrl) -> Channel:
 
 
 class _SerialChannel(Channel):
+
     def __init__(self, port: Serial, url: SerialUrl) -> None:
         self._port = port
         self._fd: int = port.fileno()
@@ -86,8 +87,8 @@ class _SerialChannel(Channel):
     def peers(self, now: float) -> Sequence[Peer]:
         return (None,)
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
-        self.dropped += self._queue.put(frame)
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
+        self.dropped += sum(self._queue.put(frame) for frame in frames)
         self.writable(self._fd)
 
     def writable(self, handle: Any) -> None:

@@ -24,9 +24,9 @@ import selectors
 import socket
 from typing import Any
 
-from ..url import Address
 from .base import Channel, ChannelLost, FrameQueue, MAX_QUEUED, Peer
 from .resolve import resolve
+from ..url import Address
 
 # s over all addresses of a name; the link must be back within 1 s of the other side.
 CONNECT_TIMEOUT = 0.8
@@ -66,9 +66,9 @@ class _Stream:
         except BlockingIOError:
             return None
 
-    def send(self, frame: bytes) -> int:
+    def send(self, frames: Sequence[bytes]) -> int:
         """Queue and write; return how many frames were dropped."""
-        dropped = self.queue.put(frame)
+        dropped = sum(self.queue.put(frame) for frame in frames)
         self.flush()
         return dropped
 
@@ -110,10 +110,10 @@ class TcpClient(Channel):
         """See :meth:`Channel.peers`."""
         return (None,)
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
         try:
-            self.dropped += self._stream.send(frame)
+            self.dropped += self._stream.send(frames)
         except OSError as error:
             raise ChannelLost(error.errno, error.strerror) from None
         self._stream.watch(self._selector)
@@ -239,24 +239,21 @@ class TcpServer(Channel):
         self._now = now
         return tuple(self._clients)
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
         for peer in peers:
-            self._write(peer, frame)
+            self._write(peer, frames)
 
     def writable(self, handle: Any) -> None:
         """See :meth:`Channel.writable`."""
-        self._write(handle, None)
+        self._write(handle, ())
 
-    def _write(self, peer: Any, frame: bytes | None) -> None:
+    def _write(self, peer: Any, frames: Sequence[bytes]) -> None:
         stream = self._clients.get(peer)
         if stream is None:
             return
         try:
-            if frame is None:
-                stream.flush()
-            else:
-                self.dropped += stream.send(frame)
+            self.dropped += stream.send(frames)
         except OSError:
             self._drop(peer)
         else:

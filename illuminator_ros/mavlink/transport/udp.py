@@ -24,9 +24,9 @@ import selectors
 import socket
 from typing import Any
 
-from ..url import Address, UdpUrl
 from .base import Channel, ChannelLost, Peer
 from .resolve import resolve
+from ..url import Address, UdpUrl
 
 # Peers that a listening socket sends to. A new one is not let in over a live one.
 MAX_PEERS = 32
@@ -34,6 +34,8 @@ MAX_PEERS = 32
 PEER_EXPIRY = 10.0
 # Datagrams read before other work gets its turn.
 BATCH = 64
+# Bytes of frames in one datagram: what passes an Ethernet in one piece.
+MAX_DATAGRAM = 1400
 # What a flight controller sends at once must fit; the kernel may allow less.
 RECEIVE_BUFFER = 4 * 1024 * 1024
 # The kernel or the network device has no room just now.
@@ -118,26 +120,46 @@ class UdpChannel(Channel):
         self._peers[peer] = now
         return new
 
-    def send(self, frame: bytes, peers: Sequence[Peer]) -> None:
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
-        for peer in peers:
-            try:
-                self._socket.sendto(frame, peer)  # type: ignore[call-overload]
-            except (BlockingIOError, ConnectionError):
-                self.dropped += 1
-            except OSError as error:
-                if error.errno in NO_ROOM:
-                    self.dropped += 1
-                    continue
-                if peer not in self._peers:
-                    raise ChannelLost(error.errno, error.strerror) from None
-                # One learnt peer out of reach is no loss of the link.
-                self.dropped += 1
-                del self._peers[peer]
+        begin = 0
+        for end in _ends(frames):
+            datagram = b''.join(frames[begin:end])
+            for peer in peers:
+                if not self._sent(datagram, peer):
+                    self.dropped += end - begin
+            begin = end
+
+    def _sent(self, datagram: bytes, peer: Any) -> bool:
+        """Send to one peer; return whether there was room."""
+        try:
+            self._socket.sendto(datagram, peer)
+        except (BlockingIOError, ConnectionError):
+            return False
+        except OSError as error:
+            if error.errno in NO_ROOM:
+                return False
+            if peer == self._remote:
+                raise ChannelLost(error.errno, error.strerror) from None
+            # One learnt peer out of reach is no loss of the link.
+            self._peers.pop(peer, None)
+            return False
+        return True
 
     def close(self) -> None:
         """See :meth:`Channel.close`."""
         self._socket.close()
+
+
+def _ends(frames: Sequence[bytes]) -> Iterator[int]:
+    """Return behind which of the frames each datagram ends."""
+    size = 0
+    for index, frame in enumerate(frames):
+        if size and size + len(frame) > MAX_DATAGRAM:
+            yield index
+            size = 0
+        size += len(frame)
+    yield len(frames)
 
 
 def _same_host(peer: Any, remote: Any) -> bool:

@@ -1,0 +1,30 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What ament_copyright asks for."""
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.copyright
+@pytest.mark.linter
+def test_copyright(monkeypatch: pytest.MonkeyPatch) -> None:
+    linter = pytest.importorskip('ament_copyright.main', reason='ament_copyright is not installed')
+    monkeypatch.chdir(ROOT)
+
+    assert linter.main(argv=[]) == 0

@@ -1,0 +1,34 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What ament_xmllint asks for; it loads the schema of package.xml from the network."""
+
+from pathlib import Path
+import shutil
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.linter
+@pytest.mark.xmllint
+def test_xmllint(monkeypatch: pytest.MonkeyPatch) -> None:
+    linter = pytest.importorskip('ament_xmllint.main', reason='ament_xmllint is not installed')
+    monkeypatch.chdir(ROOT)
+
+    if shutil.which('xmllint') is None:
+        pytest.skip('xmllint is not installed')
+
+    assert linter.main(argv=[]) == 0

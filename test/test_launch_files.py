@@ -1,0 +1,258 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The launch files, as launch_xml of Jazzy reads them.
+
+``launch`` cannot be had without a ROS installation; what it would refuse is in tables here.
+"""
+
+from pathlib import Path
+import re
+import xml.etree.ElementTree as ET
+
+from illuminator_ros.illuminator.behaviour import PROFILES
+from illuminator_ros.ros.parameters import LINK_PARAMETERS
+from illuminator_ros.simulator.options import parser
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+FILES = {path.name: ET.parse(path).getroot()
+         for path in sorted((ROOT / 'launch').glob('*.launch.xml'))}
+EVERY = pytest.mark.parametrize('launch', FILES.values(), ids=FILES)
+
+# What may stand where, with the attributes that it must have and those that it may have.
+ELEMENTS: dict[str, tuple[set[str], set[str]]] = {
+    'launch/arg': ({'name', 'description', 'default'}, set()),
+    'arg/choice': ({'value'}, set()),
+    'launch/let': ({'name', 'value'}, set()),
+    'launch/node': ({'pkg', 'exec'}, {
+        'name', 'namespace', 'output', 'respawn', 'respawn_delay', 'ros_args', 'if', 'unless'}),
+    'node/param': ({'name', 'value', 'type'}, set()),
+    'node/remap': ({'from', 'to'}, set()),
+    'launch/executable': ({'cmd'}, {'name', 'output', 'on_exit'}),
+    'launch/include': ({'file'}, set()),
+    'include/arg': ({'name', 'value'}, set()),
+}
+SUBSTITUTIONS = {'var', 'find-pkg-share', 'exec-in-pkg', 'dirname', 'not-equals'}
+OURS = 'illuminator_ros'
+PAGE = (ROOT / 'doc' / 'ros.md').read_text()
+FOREIGN = {'joy': {'joy_node'}, 'joy_teleop': {'joy_teleop'}}
+# Attributes that launch reads when it parses, before there are values: no $(var) there.
+LITERAL = {'respawn_delay': float}
+
+
+def texts(launch: ET.Element) -> list[str]:
+    """Return all that may hold substitutions."""
+    return [value for element in launch.iter() for value in element.attrib.values()]
+
+
+def declared(launch: ET.Element) -> list[str]:
+    """Return the names of the arguments of a launch file."""
+    return [argument.attrib['name'] for argument in launch.findall('arg')]
+
+
+def executables() -> set[str]:
+    """Return the names that setup.py installs."""
+    return set(re.findall(r"'(\w+) = illuminator_ros", (ROOT / 'setup.py').read_text()))
+
+
+def bridges() -> list[ET.Element]:
+    return FILES['bridge.launch.xml'].findall('node')
+
+
+def test_there_are_launch_files() -> None:
+    assert set(FILES) == {'bridge.launch.xml', 'demo.launch.xml', 'joystick.launch.xml'}
+
+
+@EVERY
+def test_the_namespace_of_a_group_holds_where_none_is_given(launch: ET.Element) -> None:
+    """One that begins with a slash, such as / itself, would not be put into the group's."""
+    [namespace] = [argument for argument in launch.findall('arg')
+                   if argument.attrib['name'] == 'namespace']
+    assert namespace.attrib['default'] == ''
+
+
+@EVERY
+def test_elements_and_attributes_are_known(launch: ET.Element) -> None:
+    assert (launch.tag, launch.attrib) == ('launch', {})
+    for parent in launch.iter():
+        for child in parent:
+            needed, possible = ELEMENTS[f'{parent.tag}/{child.tag}']
+            assert needed <= child.attrib.keys() <= needed | possible, child.attrib
+            assert not (child.text or '').strip()
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_launch_itself_reads_the_file(name: str) -> None:
+    frontend = pytest.importorskip('launch.frontend', reason='launch comes with ROS only')
+    for plugin in ('launch_xml', 'launch_ros'):
+        pytest.importorskip(plugin, reason='launch comes with ROS only')
+
+    root, parser = frontend.Parser.load(str(ROOT / 'launch' / name))
+    arguments = parser.parse_description(root).get_launch_arguments()
+
+    assert [argument.name for argument in arguments] == declared(FILES[name])
+
+
+@EVERY
+def test_each_argument_is_described(launch: ET.Element) -> None:
+    assert declared(launch)
+    for argument in launch.findall('arg'):
+        assert len(argument.attrib['description']) > 10, argument.attrib['name']
+
+
+@EVERY
+def test_a_choice_is_offered_for_what_can_be_chosen(launch: ET.Element) -> None:
+    for argument in launch.findall('arg'):
+        choices = [choice.attrib['value'] for choice in argument.findall('choice')]
+        assert not choices or argument.attrib['default'] in choices
+
+
+@EVERY
+def test_substitutions_are_known_and_closed(launch: ET.Element) -> None:
+    for text in texts(launch):
+        assert set(re.findall(r'\$\(([^ )]*)', text)) <= SUBSTITUTIONS, text
+        assert text.count('$(') == text.count(')'), text
+
+
+@EVERY
+def test_each_variable_is_declared_before_it_is_used(launch: ET.Element) -> None:
+    known: set[str] = set()
+    for element in launch:
+        for part in element.iter():
+            for text in part.attrib.values():
+                assert set(re.findall(r'\$\(var ([^)]*)\)', text)) <= known, text
+        if element.tag in ('arg', 'let'):
+            known.add(element.attrib['name'])
+
+
+@EVERY
+def test_each_argument_is_used(launch: ET.Element) -> None:
+    used = re.findall(r'\$\(var ([^)]*)\)', ' '.join(texts(launch)))
+    assert set(declared(launch)) <= set(used)
+
+
+@EVERY
+def test_what_launch_reads_at_once_is_a_value(launch: ET.Element) -> None:
+    for element in launch.iter():
+        for name, kind in LITERAL.items():
+            if name in element.attrib:
+                kind(element.attrib[name])
+
+
+@EVERY
+def test_executables_are_installed(launch: ET.Element) -> None:
+    started = [(node.attrib['pkg'], node.attrib['exec']) for node in launch.findall('node')]
+    for executable in launch.findall('executable'):
+        names = re.findall(r'\$\(exec-in-pkg (\w+) (\w+)\)', executable.attrib['cmd'])
+        started += [(package, name) for name, package in names]
+        assert names
+    for package, name in started:
+        assert name in {OURS: executables(), **FOREIGN}[package]
+
+
+@EVERY
+def test_files_that_are_named_are_installed(launch: ET.Element) -> None:
+    for text in texts(launch):
+        text = text.replace(f'$(find-pkg-share {OURS})', str(ROOT))
+        text = text.replace('$(dirname)', str(ROOT / 'launch'))
+        if text.startswith(str(ROOT)):
+            assert Path(text).is_file()
+        assert '$(find-pkg-share' not in text
+
+
+@EVERY
+def test_an_included_file_gets_arguments_that_it_has(launch: ET.Element) -> None:
+    for include in launch.findall('include'):
+        included = FILES[Path(include.attrib['file']).name]
+        given = {argument.attrib['name'] for argument in include.findall('arg')}
+        assert given <= set(declared(included))
+
+
+def test_parameters_of_the_bridge_are_parameters() -> None:
+    known = {spec.name: spec for spec in LINK_PARAMETERS}
+    given = [param.attrib for node in bridges() for param in node.findall('param')]
+    assert given
+    for param in given:
+        assert type(known[param['name']].default).__name__ == param['type']
+    for node in bridges():
+        for name in re.findall(r'-p (\w+):=', node.attrib['ros_args']):
+            assert name in known
+
+
+def test_without_a_url_all_is_the_same_but_the_url() -> None:
+    [given, left] = bridges()
+    expected = {**left.attrib, 'if': left.attrib['unless']}
+    del expected['unless']
+    expected['ros_args'] += ' -p connection_url:=$(var connection_url)'
+
+    assert given.attrib == expected
+    assert not list(left)
+
+
+def test_the_url_is_for_the_node_and_for_all_so_that_it_wins_over_any_section() -> None:
+    given = bridges()[0]
+    ros_args = given.attrib['ros_args']
+    assert ros_args.index('--params-file') < ros_args.index('-p connection_url')
+    assert [param.attrib['name'] for param in given.findall('param')] == ['connection_url']
+    # Only with both of them does launch write the full name into the file that it makes.
+    assert {'name', 'namespace'} <= given.attrib.keys()
+
+
+def test_the_simulator_takes_the_arguments_of_the_demonstration() -> None:
+    [simulator] = FILES['demo.launch.xml'].findall('executable')
+    defaults = {argument.attrib['name']: argument.attrib['default']
+                for argument in FILES['demo.launch.xml'].findall('arg')}
+    command = re.sub(r'\$\(var (\w+)\)', lambda name: defaults[name[1]],
+                     simulator.attrib['cmd'])
+    options = parser().parse_args(command.partition(f'{OURS}) ')[2].split())
+    assert (options.url, options.count) == ('udpout://127.0.0.1:14590', 1)
+    [profile] = [argument.attrib['description'] for argument
+                 in FILES['demo.launch.xml'].findall('arg')
+                 if argument.attrib['name'] == 'profile']
+    assert set(re.findall(r'\w+', profile.partition(':')[2])) - {'or'} == set(PROFILES)
+
+
+def test_remapped_topics_are_those_of_the_joystick_s_file() -> None:
+    content = yaml.safe_load((ROOT / 'config' / 'joystick.yaml').read_text())
+    used = {command['topic_name'] for command in content['/**']['ros__parameters'].values()}
+    remapped = {remap.attrib['from']: remap.attrib['to']
+                for remap in FILES['joystick.launch.xml'].iter('remap')}
+    assert set(remapped) == used
+    for before, after in remapped.items():
+        assert after == before.replace('illuminator', '$(var name)')
+
+
+def test_the_page_has_each_argument_of_the_bridge_with_its_default() -> None:
+    rows = [[cell.strip(' `') for cell in line.split('|')[1:3]]
+            for line in PAGE.splitlines() if line.startswith('| `')]
+    defaults = {argument.attrib['name']: argument.attrib['default']
+                for argument in FILES['bridge.launch.xml'].findall('arg')}
+    assert {name: default.replace('$SHARE', f'$(find-pkg-share {OURS})')
+            for name, default in rows} == defaults
+
+
+def test_the_page_names_arguments_of_the_demonstration_that_there_are() -> None:
+    [sentence] = re.findall(r'^`demo.launch.xml` runs.*$', PAGE, re.MULTILINE)
+    named = set(re.findall('`(\\w+)`', sentence))
+    assert named == set(declared(FILES['demo.launch.xml']))
+
+
+def test_what_is_installed_is_what_the_page_names() -> None:
+    named = set(re.findall(r'\$SHARE/config/([\w/.]+)', PAGE))
+    assert named == {str(path.relative_to(ROOT / 'config'))
+                     for path in (ROOT / 'config').rglob('*') if path.is_file()}
+    assert set(re.findall(r'ros2 launch illuminator_ros (\S+)', PAGE)) == set(FILES)

@@ -1,0 +1,142 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the package says of itself, to the tools of ROS that read it."""
+
+import ast
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+from catkin_pkg.changelog import get_changelog_from_path
+from catkin_pkg.package import parse_package
+from catkin_pkg.package_version import (
+    get_forthcoming_label,
+    update_changelog_sections,
+    update_versions,
+)
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = 'illuminator_ros'
+# Modules whose rosdep key is another than their name; fastcrc comes with pymavlink.
+KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
+        'pymavlink': 'python3-pymavlink-pip', 'pytest': 'python3-pytest',
+        'serial': 'python3-serial', 'yaml': 'python3-yaml',
+        'catkin_pkg': 'python3-catkin-pkg-modules'}
+
+pytestmark = pytest.mark.timeout(300)
+# Extras, which whoever wants them installs.
+OPTIONAL = {'rich', 'textual'}
+
+
+def imported(folder: Path) -> set[str]:
+    """Return the modules that the Python files of a folder import, of whatever package."""
+    names = set()
+    for path in folder.rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.partition('.')[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                names.add(str(node.module).partition('.')[0])
+    return names - sys.stdlib_module_names - OPTIONAL
+
+
+def output(folder: Path, *arguments: str) -> str:
+    """Return what Python prints in a folder."""
+    return subprocess.run([sys.executable, *arguments], cwd=folder, text=True, timeout=120,
+                          capture_output=True, check=True).stdout.strip()
+
+
+def versions(folder: Path) -> list[str]:
+    """Return the version as package.xml, setup.py and the imported package have it."""
+    return [
+        parse_package(str(folder)).version,
+        output(folder, 'setup.py', '--version').splitlines()[-1],
+        output(folder, '-c', f'import {PACKAGE}; print({PACKAGE}.__version__)')]
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """Return a copy of what a release changes."""
+    for name in ('package.xml', 'setup.py', 'setup.cfg', 'CHANGELOG.rst'):
+        shutil.copy(ROOT / name, tmp_path)
+    shutil.copytree(ROOT / PACKAGE, tmp_path / PACKAGE)
+    return tmp_path
+
+
+def test_there_is_one_version() -> None:
+    assert len(set(versions(ROOT))) == 1
+
+
+def test_a_release_sets_the_version_everywhere(copy: Path) -> None:
+    update_versions({str(copy): parse_package(str(copy))}, '12.3.4')
+
+    assert versions(copy) == ['12.3.4'] * 3
+
+
+def test_what_is_not_released_yet_is_forthcoming(copy: Path) -> None:
+    path = str(copy / 'CHANGELOG.rst')
+    changelog = get_changelog_from_path(path, PACKAGE)
+    label = get_forthcoming_label(changelog.rst)
+    assert label == 'Forthcoming'
+
+    update_changelog_sections({PACKAGE: (path, changelog, label)}, '12.3.4')
+
+    released = get_changelog_from_path(path, PACKAGE)
+    assert '``bridge``' in str(released.get_content_of_version('12.3.4')[0])
+
+
+def test_what_the_package_imports_is_declared() -> None:
+    declared = {depend.name for depend in parse_package(str(ROOT)).exec_depends}
+
+    needed = {KEYS.get(name, name) for name in imported(ROOT / PACKAGE) - {PACKAGE}}
+
+    assert needed - declared == set()
+
+
+def test_what_the_tests_import_is_declared() -> None:
+    package = parse_package(str(ROOT))
+    declared = {depend.name for depend in package.exec_depends + package.test_depends}
+    own = {path.stem for path in ROOT.glob('*/*') if path != (ROOT / 'illuminator_ros')}
+
+    needed = {KEYS.get(name, name) for name in imported(ROOT / 'test') - own - {PACKAGE}}
+
+    assert needed - declared == set()
+
+
+@pytest.mark.parametrize('linter', ['copyright', 'flake8', 'pep257', 'xmllint'])
+def test_each_linter_of_ros_is_declared_and_run(linter: str) -> None:
+    assert f'ament_{linter}' in {each.name for each in parse_package(str(ROOT)).test_depends}
+    assert (ROOT / 'test' / 'lint' / f'test_{linter}.py').is_file()
+
+
+def test_the_workflow_tests_with_jazzy_and_runs_what_ci_runs() -> None:
+    """It has its effect elsewhere: here only its form can be checked."""
+    workflow = yaml.safe_load((ROOT / '.github' / 'workflows' / 'ci.yaml').read_text())
+    jazzy, without_ros = (workflow['jobs'][name] for name in ('jazzy', 'without-ros'))
+    steps = {step['uses'].partition('@')[0]: step for step in jazzy['steps']}
+
+    # YAML 1.1 takes the key "on" for a truth value.
+    assert set(workflow[True]) >= {'push', 'pull_request'}
+    assert {job['runs-on'] for job in workflow['jobs'].values()} == {'ubuntu-24.04'}
+    assert steps['ros-tooling/setup-ros']['with']['required-ros-distributions'] == 'jazzy'
+    built = steps['ros-tooling/action-ros-ci']
+    assert (built['with']['package-name'], built['with']['target-ros2-distro']) == (
+        PACKAGE, 'jazzy')
+    assert built['env']['PIP_BREAK_SYSTEM_PACKAGES'] == '1'
+    [command] = [step['run'] for step in without_ros['steps'] if step.get('run') == '.ci/run']
+    assert (ROOT / command).stat().st_mode & 0o111
