@@ -29,7 +29,7 @@ test: check
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \
-		test/conformance test/transport/test_conformance_process.py
+		test/monitor test/conformance test/transport/test_conformance_process.py
 
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .

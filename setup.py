@@ -40,10 +40,11 @@ setup(
     # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
     extras_require={
+        'monitor': ['rich>=13.3'],
         'serial': ['pyserial>=3.5'],
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
-        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml'],
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich'],
         # Plots of the benchmark.
         'bench': ['matplotlib>=3.9'],
     },
@@ -56,6 +57,7 @@ setup(
         'console_scripts': [
             'bridge = illuminator_ros.bridge:main',
             'conformance = illuminator_ros.conformance:main',
+            'monitor = illuminator_ros.monitor:main',
             'simulator = illuminator_ros.simulator:main',
         ],
     },

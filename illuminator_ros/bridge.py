@@ -16,10 +16,9 @@
 
 from __future__ import annotations
 
-import re
 import sys
 
-from .entry import enter
+from .entry import enter, one_line
 from .termination import Termination
 
 
@@ -97,9 +96,7 @@ def _run(arguments: list[str], termination: Termination) -> int:
 
 def _wrong(what: str) -> int:
     """Say in one line what is wrong with the command line, and return the exit status for it."""
-    # rcl ends its messages with the places in its sources that they passed through.
-    text = re.sub(r', at /[^ ,]+:\d+', '', ' '.join(what.split()))
-    print(f'bridge: {text}', file=sys.stderr)
+    print(f'bridge: {one_line(what)}', file=sys.stderr)
     return 2
 
 

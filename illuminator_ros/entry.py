@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import re
 import sys
 
 from .termination import Termination
@@ -26,6 +27,7 @@ _REMEDIES = {
     'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
     'pymavlink': 'pip install pymavlink',
     'fastcrc': 'pip install fastcrc',
+    'rich': "sudo apt install python3-rich, or pip install 'rich>=13.3'",
     'visualization_msgs': 'sudo apt install ros-jazzy-visualization-msgs',
 }
 
@@ -54,3 +56,8 @@ def explained(name: str, run: Callable[[], int]) -> int:
             raise
         print(f'{name}: {package} is not installed: {_REMEDIES[package]}', file=sys.stderr)
         return 1
+
+
+def one_line(message: object) -> str:
+    """Return a message of rcl in one line, without the places in its sources that it ends with."""
+    return re.sub(r', at /[^ ,]+:\d+', '', ' '.join(str(message).split()))

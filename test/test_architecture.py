@@ -36,8 +36,15 @@ FORBIDDEN = {'mavlink': ROS, 'illuminator': ROS | IO | TIME | THREADS, 'ros': {'
 # Inside mavlink/ too, the protocol itself does no I/O and has no clock.
 SANS_IO = ('agenda', 'command', 'dialect', 'echoes', 'endpoint', 'framing', 'round_trip',
            'signing', 'statistics', 'url')
+# What parts of the monitor must do without.
+PURE = ROS | IO | TIME | THREADS
+MONITOR = {
+    **dict.fromkeys(('model', 'actions', 'keys', 'operator', 'texts'), PURE | {'rich'}),
+    'view': PURE, 'terminal': ROS | {'rich'}, 'graph': {'rich'} | IO | TIME | THREADS,
+    'requests': {'rich'} | IO | TIME | THREADS,
+}
 # Imported before signals are taken, and therefore quick to import.
-FIRST = ('', 'bridge', 'conformance', 'simulator', 'entry', 'termination')
+FIRST = ('', 'bridge', 'conformance', 'monitor', 'simulator', 'entry', 'termination')
 QUICK = {'__future__', 'collections', 'contextlib', 'os', 're', 'signal', 'sys', 'threading',
          'time', 'typing', PACKAGE}
 LONGEST = 300
@@ -95,6 +102,21 @@ def test_a_layer_knows_nothing_of_what_is_not_its_own(module: str) -> None:
 def test_simulator_and_conformance_need_no_ros(module: str) -> None:
     assert roots(imports(module)) & ROS == set()
     assert not [name for name in imports(module) if name.startswith(f'{PACKAGE}.ros')]
+
+
+@pytest.mark.parametrize('name', MONITOR)
+def test_a_part_of_the_monitor_knows_only_its_own(name: str) -> None:
+    module = f'{PACKAGE}.monitor.{name}'
+
+    assert roots(imports(module)) & MONITOR[name] == set()
+
+
+@pytest.mark.parametrize('module', [m for m in MODULES if m.split('.')[1:2] == ['monitor']])
+def test_the_monitor_knows_lights_by_ros_only(module: str) -> None:
+    below = {'illuminator_ros.illuminator.model', 'illuminator_ros.ros.spinner'}
+
+    assert {name for name in imports(module) if name.startswith(tuple(
+        f'{PACKAGE}.{part}' for part in LAYERS if part))} <= below
 
 
 @pytest.mark.parametrize('name', SANS_IO)

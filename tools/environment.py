@@ -35,7 +35,8 @@ VERSIONS = ((3, 12), (3, 11), (3, 10), (3, 13))
 # Lower bounds: the oldest with which the tests have passed. The wheels of ROS 2 Jazzy stand in
 # for a ROS installation; nothing of them is needed where ROS is sourced.
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
-PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5']
+# rich, 14 MB with what it brings, draws the monitor; nothing else needs it.
+PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'rich>=13.3']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.5', 'hypothesis>=6.100',
         'pyyaml>=6', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
         'catkin_pkg>=0.5',

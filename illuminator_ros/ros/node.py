@@ -19,7 +19,7 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from rclpy.node import Node
 
 from .beam_output import BeamOutput
@@ -157,5 +157,8 @@ class IlluminatorNode(Node):
                 self._hardware_id = self._hardware_id or hardware_id(light)
                 array.status.append(
                     lamp_status(self.get_name(), self._hardware_id, light, now))
+            for status in array.status:
+                # Their names leave out the namespace.
+                status.values.append(KeyValue(key='node', value=self.get_fully_qualified_name()))
             self._levels = [status.level for status in array.status]
             self._diagnostics.publish(array)

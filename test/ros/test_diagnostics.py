@@ -30,20 +30,20 @@ from support.slow import CLOCK
 INFORMATION = 396
 # What is text by nature; all other values are one number or true or false.
 TEXTS = {'url', 'address', 'mode', 'agreed', 'vendor', 'model', 'software_version',
-         'hardware_version', 'serial_number'}
+         'hardware_version', 'serial_number', 'node'}
 LINK_KEYS = {
     'url', 'open', 'since_s', 'openings', 'peers', 'lights', 'frames_received', 'frames_sent',
     'frames_dropped', 'bytes_received', 'bytes_sent', 'bytes_received_per_s',
     'bytes_sent_per_s', 'crc_errors', 'frames_lost', 'frames_duplicate', 'frames_reordered',
     'loss_percent', 'round_trip_p50_ms', 'round_trip_p95_ms', 'commands_sent',
     'commands_resent', 'commands_unanswered', 'signatures_good', 'signatures_bad',
-    'signatures_replayed', 'unsigned_frames', 'signatures_unchecked',
+    'signatures_replayed', 'unsigned_frames', 'signatures_unchecked', 'node',
 }
 LAMP_KEYS = {
     'address', 'connected', 'heard_s_ago', 'restarts', 'shared_address', 'enabled', 'mode',
     'brightness_percent', 'strobe_period_s', 'strobe_duty_cycle_percent', 'temperature_c',
     'error_flags', 'uptime_s', 'status_s_ago', 'agreed', 'vendor', 'model', 'software_version',
-    'hardware_version', 'serial_number',
+    'hardware_version', 'serial_number', 'node',
 }
 
 

@@ -22,6 +22,8 @@ from typing import Any
 from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.monitor import graph, keys, model, requests
+from illuminator_ros.monitor.options import parser
 from illuminator_ros.ros import beam, beam_output, mounting
 from illuminator_ros.ros.conversions import STATUS_TOPICS
 from illuminator_ros.ros.diagnostics import FLAG_LEVELS
@@ -38,6 +40,7 @@ README = (ROOT / 'README.md').read_text()
 PERFORMANCE = (ROOT / 'doc' / 'performance.md').read_text()
 DESIGN = (ROOT / 'doc' / 'design.md').read_text()
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
+MONITOR = (ROOT / 'doc' / 'monitor.md').read_text()
 BEAM = (ROOT / 'doc' / 'beam.md').read_text()
 LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
 
@@ -123,6 +126,26 @@ def test_beam_page_has_each_parameter_with_its_unit() -> None:
     f'drop it {beam_output.LIFETIME} s'])
 def test_beam_page_has_the_limits_of_the_code(text: str) -> None:
     assert text in BEAM
+
+
+def test_monitor_page_has_each_key_with_what_it_does() -> None:
+    rows = [(tuple(re.findall('`([^`]+)`', cells[0])), cells[1])
+            for cells in table(MONITOR, 'key')]
+    assert rows == list(keys.HELP)
+
+
+def test_monitor_page_has_each_state() -> None:
+    rows = [cells[0] for cells in table(MONITOR, 'state')]
+    assert rows == [f'`{state.value}`' for state in model.State]
+
+
+@pytest.mark.parametrize('text', [
+    f'for {model.SILENCE:g} s, not even', f'within {requests.ANSWER_LIMIT:g} s',
+    f'`--wait` {parser().get_default("wait"):g} s',
+    ', '.join(f'`{topic}`' for topic in graph.SIGNATURE).replace(
+        ', `error_flags`', ' and `error_flags`')])
+def test_monitor_page_has_the_limits_of_the_code(text: str) -> None:
+    assert text in MONITOR
 
 
 def test_design_page_has_the_bounds_of_the_code() -> None:

@@ -44,7 +44,7 @@ class Program:
         self._process = subprocess.Popen(
             command, env=environment(env), cwd=cwd or ROOT, bufsize=0,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            preexec_fn=_end_with_parent)
+            preexec_fn=end_with_parent)
         self._lines: list[str] = []
         self._rest = b''
         self._ended = False
@@ -132,7 +132,7 @@ class Program:
         return self._process.poll() is None
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Have the kernel end this program with the thread that starts it, should that be killed."""
     PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
 

@@ -99,7 +99,7 @@ def test_all_of_the_package_is_installed(prefix: Path) -> None:
     assert (site / 'illuminator_ros' / 'py.typed').is_file()
 
 
-@pytest.mark.parametrize('name', ['bridge', 'conformance', 'simulator'])
+@pytest.mark.parametrize('name', ['bridge', 'conformance', 'monitor', 'simulator'])
 def test_the_executables_are_where_ros2_run_looks(
     prefix: Path, installed: dict[str, str], name: str, tmp_path: Path,
 ) -> None:

@@ -26,11 +26,12 @@ import pytest
 from support.processes import environment, ROOT, run
 
 BRIDGE, SIMULATOR = 'illuminator_ros.bridge', 'illuminator_ros.simulator'
+MONITOR = 'illuminator_ros.monitor'
 
 
 class TestHelp:
 
-    @pytest.mark.parametrize('module', [BRIDGE, SIMULATOR])
+    @pytest.mark.parametrize('module', [BRIDGE, SIMULATOR, MONITOR])
     @pytest.mark.parametrize('option', ['--help', '-h'])
     def test_it_is_printed_and_that_is_all(self, module: str, option: str) -> None:
         outcome = run(module, option)
@@ -60,7 +61,7 @@ class TestHelp:
         for action in parser()._actions:
             assert (action.option_strings or [action.dest])[-1] in text
 
-    @pytest.mark.parametrize('module', [BRIDGE, SIMULATOR])
+    @pytest.mark.parametrize('module', [BRIDGE, SIMULATOR, MONITOR])
     def test_the_version_is_the_package_s(self, module: str) -> None:
         outcome = run(module, '--version')
 
@@ -139,6 +140,15 @@ class TestMissingPackages:
 
         assert status == 1
         assert text.endswith(': pymavlink is not installed: pip install pymavlink\n')
+
+    @pytest.mark.parametrize(('package', 'remedy'), [
+        ('rclpy', 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"'),
+        ('rich', "sudo apt install python3-rich, or pip install 'rich>=13.3'")])
+    def test_the_monitor_says_what_to_install(
+        self, tmp_path: Path, package: str, remedy: str,
+    ) -> None:
+        assert self.run_without(package, MONITOR, tmp_path) == (
+            1, f'monitor: {package} is not installed: {remedy}\n')
 
     def test_the_simulator_needs_no_ros(self, tmp_path: Path) -> None:
         blocker = tmp_path / 'sitecustomize.py'

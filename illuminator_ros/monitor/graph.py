@@ -1,0 +1,173 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lights in the ROS graph: found by their interface, listened to, and asked."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+import functools
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Temperature
+from std_msgs.msg import Bool, Float32, Float64, String, UInt32
+
+from .actions import Ask
+from .model import Diagnosis, Fleet, Outcome
+from .requests import Requests
+
+# What a light publishes, with the types.
+TOPICS: dict[str, Any] = {
+    'connected': Bool, 'enabled': Bool, 'brightness': Float32, 'error_flags': UInt32,
+    'mode': String, 'strobe_period': Float32, 'strobe_duty_cycle': Float32, 'uptime': Float64,
+    'temperature': Temperature,
+}
+# Whoever publishes these with their types is a light, whatever it is called.
+SIGNATURE = ('connected', 'enabled', 'brightness', 'error_flags')
+STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# What is published for every status is taken as it comes, in order; nothing else is of use.
+STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+# s between looks at the graph.
+LOOK_INTERVAL = 0.5
+
+
+def type_name(type_: Any) -> str:
+    """Return what the graph calls a message type."""
+    return f'{type_.__module__.split(".")[0]}/msg/{type_.__name__}'
+
+
+def lights_among(
+    topics: list[tuple[str, list[str]]], publishers: Callable[[str], int],
+) -> list[str]:
+    """
+    Return the names of the lights among the topics of a graph.
+
+    :param publishers: how many nodes publish a topic: our own subscriptions are topics too.
+    """
+    types = dict(topics)
+    last = f'/{SIGNATURE[0]}'
+    names = [topic.removesuffix(last) for topic in types if topic.endswith(last)]
+    return [name for name in names if name and all(
+        type_name(TOPICS[topic]) in types.get(f'{name}/{topic}', ())
+        and publishers(f'{name}/{topic}') for topic in SIGNATURE)]
+
+
+class Graph:
+    """
+    Keeps a fleet up to date, in the thread of its node's executor.
+
+    :param lock: guards the fleet.
+    :param clock: returns the time, s.
+    """
+
+    def __init__(
+        self, node: Node, fleet: Fleet, lock: AbstractContextManager[Any],
+        clock: Callable[[], float],
+    ) -> None:
+        self._node = node
+        self._fleet = fleet
+        self._lock = lock
+        self._clock = clock
+        self._subscriptions: dict[str, list[Any]] = {}
+        self._requests: dict[str, Requests] = {}
+        # What other threads want to have done here.
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._guard = node.create_guard_condition(self._do_jobs)
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, STREAM_QOS)
+        node.create_subscription(ParameterEvent, '/parameter_events', self._changed, EVENT_QOS)
+        node.create_timer(LOOK_INTERVAL, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def submit(self, name: str, ask: Ask) -> None:
+        """Ask something of a light; callable from any thread."""
+        self._call(lambda: self._submit(name, ask))
+
+    def clear_gone(self) -> None:
+        """Forget the lights that are gone; callable from any thread."""
+        self._call(self._clear_gone)
+
+    def look(self) -> None:
+        """Look at who is there, and at what has not been answered."""
+        topics = self._node.get_topic_names_and_types()
+        names = lights_among(topics, self._node.count_publishers)
+        now = self._clock()
+        with self._lock:
+            new = self._fleet.seen(names, now)
+        for name in new:
+            self._subscriptions[name] = [
+                self._node.create_subscription(
+                    type_, f'{name}/{topic}', functools.partial(self._take, name, topic),
+                    STREAM_QOS if topic == 'temperature' else STATE_QOS)
+                for topic, type_ in TOPICS.items()]
+            self._requests[name] = Requests(
+                self._node, name, self._fleet, self._lock, self._clock)
+        for requests in self._requests.values():
+            requests.poll()
+
+    def _call(self, job: Callable[[], None]) -> None:
+        self._jobs.append(job)
+        self._guard.trigger()
+
+    def _do_jobs(self) -> None:
+        while self._jobs:
+            self._jobs.popleft()()
+
+    def _submit(self, name: str, ask: Ask) -> None:
+        with self._lock:
+            light = self._fleet.get(name)
+            request = ask(light) if light else None
+            if request is None:
+                self._fleet.acted(name, 'not asked', Outcome.FAILED,
+                                  'it has not told its brightness yet', self._clock())
+        if request is not None:
+            self._requests[name].submit(request)
+
+    def _clear_gone(self) -> None:
+        with self._lock:
+            names = self._fleet.clear_gone()
+        for name in names:
+            self._requests.pop(name).destroy()
+            for subscription in self._subscriptions.pop(name):
+                self._node.destroy_subscription(subscription)
+
+    def _take(self, name: str, topic: str, message: Any) -> None:
+        value = message.temperature if topic == 'temperature' else message.data
+        with self._lock:
+            self._fleet.take(name, topic, value, self._clock())
+
+    def _diagnosed(self, array: Any) -> None:
+        for status in array.status:
+            values: Mapping[str, str] = {pair.key: pair.value for pair in status.values}
+            # The name of the status has the node's, without its namespace.
+            name, kind = values.get('node', ''), status.name.rpartition(': ')[2]
+            diagnosis = Diagnosis(status.level[0], status.message, values)
+            with self._lock:
+                self._fleet.diagnosed(name, kind, diagnosis, self._clock())
+
+    def _changed(self, event: Any) -> None:
+        for parameter in [*event.new_parameters, *event.changed_parameters]:
+            if parameter.name == 'brightness':
+                value = parameter_value_to_python(parameter.value)
+                if isinstance(value, float):
+                    with self._lock:
+                        self._fleet.agreed(event.node, value)

@@ -1,0 +1,101 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The terminal: keys one by one, nothing else written on it, and all as before at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import os
+import select
+import sys
+import tempfile
+import termios
+
+# s after an escape in which what belongs to it must have come.
+ESCAPE_TIMEOUT = 0.05
+
+
+@contextlib.contextmanager
+def unbuffered(descriptor: int) -> Iterator[None]:
+    """Have a terminal pass on each key at once, without showing it."""
+    before = termios.tcgetattr(descriptor)
+    changed = termios.tcgetattr(descriptor)
+    changed[3] &= ~(termios.ICANON | termios.ECHO)
+    changed[6][termios.VMIN], changed[6][termios.VTIME] = 1, 0
+    # Stopped by ctrl-z it would leave a shell with this terminal.
+    changed[6][termios.VSUSP] = b'\0'
+    try:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
+        yield
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+@contextlib.contextmanager
+def quiet_errors() -> Iterator[None]:
+    """Keep what the middleware writes to standard error off the screen, and show it afterwards."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield
+        finally:
+            sys.stderr.flush()
+            os.dup2(kept, 2)
+            os.close(kept)
+            file.seek(0)
+            while chunk := file.read(1 << 16):
+                os.write(2, chunk)
+
+
+class Keyboard:
+    """What is typed, and :meth:`wake` from other threads."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._woken, self._waker = os.pipe()
+        os.set_blocking(self._waker, False)
+
+    def close(self) -> None:
+        """Free what it uses."""
+        os.close(self._woken)
+        os.close(self._waker)
+
+    def wake(self) -> None:
+        """Have :meth:`read` return; callable from any thread."""
+        with contextlib.suppress(OSError):
+            os.write(self._waker, b'\0')
+
+    def read(self, timeout: float, on_end: Callable[[], None]) -> bytes:
+        """
+        Wait for keys and return what they send, b'' if none was pressed.
+
+        :param timeout: s.
+        :param on_end: called if the terminal is gone.
+        """
+        ready, _, _ = select.select([self._descriptor, self._woken], [], [], timeout)
+        if self._woken in ready:
+            os.read(self._woken, 4096)
+        if self._descriptor not in ready:
+            return b''
+        try:
+            data = os.read(self._descriptor, 4096)
+        except OSError:
+            data = b''
+        if not data:
+            on_end()
+        return data

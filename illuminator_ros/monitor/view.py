@@ -1,0 +1,294 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is shown of the lights; from the model to what rich draws. No ROS, no terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.layout import Layout
+from rich.table import Table
+from rich.text import Text
+
+from .keys import HELP
+from .model import Action, Light, Outcome, State
+from .texts import (
+    age,
+    bar,
+    brightness,
+    link_quality,
+    milliseconds,
+    mode,
+    percent,
+    sparkline,
+    strobe,
+    temperature,
+)
+
+STATE_STYLES = {State.ON: 'bold green', State.OFF: '', State.UNKNOWN: 'dim',
+                State.LOST: 'bold red', State.SILENT: 'yellow', State.GONE: 'red'}
+OUTCOME_STYLES = {Outcome.PENDING: 'dim', Outcome.DONE: 'green', Outcome.FAILED: 'bold red'}
+LEVELS = (('OK', 'green'), ('WARN', 'yellow'), ('ERROR', 'bold red'), ('STALE', 'dim'))
+BAR_WIDTH = 10
+TREND_WIDTH = 12
+DETAIL_TREND_WIDTH = 60
+# Lines that the selected light's details need at least to be of use.
+DETAIL_HEIGHT = 4
+FOOTER = 'space on/off  +/- brightness  s strobe  r refresh  a all off  ? help  q quit'
+NO_LIGHTS = 'no lights in this ROS graph yet; is a bridge running, with this ROS_DOMAIN_ID?'
+
+
+@dataclass(frozen=True)
+class Scene:
+    """
+    What is to be shown.
+
+    :param selected: the name of the light that keys are for.
+    :param ascii_only: whether the terminal shows nothing else.
+    """
+
+    lights: Sequence[Light]
+    selected: str | None
+    now: float
+    show_help: bool = False
+    ascii_only: bool = False
+
+
+@dataclass(frozen=True)
+class Column:
+    """
+    A column of the table.
+
+    :param width: characters.
+    :param rank: of the columns that there is no room for, the one with the highest goes first.
+    :param grows: whether it takes what room is left.
+    """
+
+    title: str
+    width: int
+    rank: int
+    cell: Callable[[Light, Scene], Text]
+    grows: bool = False
+    plain: bool = True
+
+
+def _state(light: Light, scene: Scene) -> Text:
+    state = light.state(scene.now)
+    return Text(state.value, STATE_STYLES[state])
+
+
+def _brightness_bar(light: Light, scene: Scene) -> Text:
+    value = light.value('brightness')
+    style = 'yellow' if light.state(scene.now) is State.ON else 'dim'
+    return Text(bar(value, BAR_WIDTH, ascii_only=scene.ascii_only), style)
+
+
+def _trend(light: Light, scene: Scene) -> Text:
+    values = light.temperatures.last(TREND_WIDTH, scene.now)
+    return Text(sparkline(values, ascii_only=scene.ascii_only), 'cyan')
+
+
+def _last(light: Light, scene: Scene) -> Text:
+    return _action(light.action) if light.action else Text('')
+
+
+def _action(action: Action) -> Text:
+    text = Text(f'{action.text}: ')
+    text.append(action.outcome.value, OUTCOME_STYLES[action.outcome])
+    if action.answer:
+        text.append(f': {action.answer}')
+    return text
+
+
+def _plain(cell: Callable[[Light], str], style: str = '') -> Callable[[Light, Scene], Text]:
+    return lambda light, scene: Text(cell(light), style)
+
+
+COLUMNS = (
+    Column('LIGHT', 14, 0, _plain(lambda light: light.name)),
+    Column('STATE', 6, 0, _state),
+    Column('', BAR_WIDTH, 4, _brightness_bar, plain=False),
+    Column('BRIGHT', 6, 1, _plain(lambda light: brightness(light.value('brightness')))),
+    Column('STROBE', 11, 5, _plain(lambda light: strobe(
+        light.value('strobe_period'), light.value('strobe_duty_cycle')))),
+    Column('MODE', 8, 8, _plain(lambda light: mode(light.value('mode')))),
+    Column('TEMP', 8, 2, _plain(lambda light: temperature(light.value('temperature')))),
+    Column('TREND', TREND_WIDTH, 9, _trend, plain=False),
+    Column('LOSS', 5, 6, _plain(lambda light: percent(light.link, 'loss_percent'))),
+    Column('RTT', 7, 7, _plain(lambda light: milliseconds(light.link, 'round_trip_p50_ms'))),
+    Column('ERRORS', 10, 3, _plain(lambda light: ', '.join(light.flags), 'yellow'), grows=True),
+    Column('LAST', 24, 10, _last, grows=True),
+)
+TITLES = [column.title for column in COLUMNS]
+
+
+def columns_for(width: int, longest: int = 0) -> list[Column]:
+    """
+    Return the columns that fit in a width, with a space between them.
+
+    :param longest: characters of the longest name; it gets a third of the width at most.
+    """
+    chosen: list[Column] = []
+    names = replace(COLUMNS[0], width=max(COLUMNS[0].width, min(longest, width // 3)))
+    for column in sorted((names, *COLUMNS[1:]), key=lambda column: column.rank):
+        if sum(one.width + 1 for one in [*chosen, column]) > width and column.rank:
+            break
+        chosen.append(column)
+    return sorted(chosen, key=lambda column: TITLES.index(column.title))
+
+
+def table(scene: Scene, width: int, height: int) -> Table:
+    """Return a row for each light, around the selected one where there is no room for all."""
+    shown = columns_for(width, max((len(light.name) for light in scene.lights), default=0))
+    drawn = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0),
+                  header_style='bold')
+    if not any(column.grows for column in shown):
+        shown[0] = replace(shown[0], grows=True)
+    for column in shown:
+        # With a narrow terminal the name alone stays, in whatever room there is.
+        drawn.add_column(column.title, no_wrap=True, overflow='ellipsis',
+                         min_width=min(column.width, max(width - 8, 1)),
+                         max_width=None if column.grows else column.width,
+                         ratio=column.width if column.grows else None)
+    for light in window(scene.lights, scene.selected, max(height - 1, 1)):
+        drawn.add_row(*(column.cell(light, scene) for column in shown),
+                      style=_row_style(light, scene))
+    return drawn
+
+
+def _row_style(light: Light, scene: Scene) -> str:
+    # What a light that is not there any more has said is not true any more.
+    stale = light.state(scene.now) in (State.LOST, State.SILENT, State.GONE)
+    return ('dim ' if stale else '') + ('reverse' if light.name == scene.selected else '')
+
+
+def window(lights: Sequence[Light], selected: str | None, height: int) -> Sequence[Light]:
+    """Return as many lights as there are lines, the selected one among them."""
+    at = next((at for at, light in enumerate(lights) if light.name == selected), 0)
+    first = max(0, min(at - height // 2, len(lights) - height))
+    return lights[first:first + height]
+
+
+def title(scene: Scene) -> Text:
+    """Return the first line: how many lights, and in what state."""
+    states = [light.state(scene.now) for light in scene.lights]
+    parts = [f'{states.count(state)} {state.value}' for state in State if state in states]
+    plural = '' if len(states) == 1 else 's'
+    return Text(f'{len(states)} light{plural}' + (f': {", ".join(parts)}' if parts else ''),
+                'bold', no_wrap=True, overflow='ellipsis')
+
+
+def details(light: Light, scene: Scene) -> RenderableType:
+    """Return all that is known of a light."""
+    rows = Table.grid(padding=(0, 1), expand=True)
+    rows.add_column(style='bold', no_wrap=True)
+    rows.add_column(ratio=1)
+    if light.action is not None:
+        answered = _action(light.action)
+        answered.append(f' ({age(scene.now - light.action.at)} ago)', 'dim')
+        rows.add_row('last', answered)
+    for kind, one in (('lamp', light.lamp), ('link', light.link)):
+        if one is not None:
+            word, style = LEVELS[min(one.level, len(LEVELS) - 1)]
+            text = Text(word, style)
+            text.append(f': {one.message}' + (f'; {link_quality(one)}' if kind == 'link' else ''),
+                        'default')
+            rows.add_row(kind, text)
+    rows.add_row('light', Text(_facts(light, scene)))
+    values = light.temperatures.last(DETAIL_TREND_WIDTH, scene.now)
+    known = [value for value in values if value is not None]
+    if known:
+        rows.add_row('temp', Text.assemble(
+            f'{temperature(light.value("temperature"))} ',
+            (sparkline(values, ascii_only=scene.ascii_only).lstrip(), 'cyan'),
+            f' {min(known):.1f} to {max(known):.1f} in 2 min'))
+    return rows
+
+
+def _facts(light: Light, scene: Scene) -> str:
+    identity = ' '.join(light.lamp.values.get(key, '') for key in ('vendor', 'model')
+                        ) if light.lamp else ''
+    serial = light.lamp.values.get('serial_number', '') if light.lamp else ''
+    shines = brightness(light.value('brightness'))
+    agreed = light.setpoint
+    if agreed is not None and agreed != light.value('brightness'):
+        shines += f' (agreed: {agreed:g} %)'
+    up = light.value('uptime')
+    silence = light.silence(scene.now)
+    return ', '.join(filter(None, (
+        identity.strip(), serial and f'no. {serial}', shines,
+        strobe(light.value('strobe_period'), light.value('strobe_duty_cycle')),
+        str(light.value('mode') or ''), '' if up is None else f'up {age(up)}',
+        f'nothing heard for {age(silence)}' if silence > 2 else '')))
+
+
+def help_text() -> Table:
+    """Return what each key does."""
+    drawn = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
+    drawn.add_column(style='bold')
+    drawn.add_column()
+    for keys, text in HELP:
+        drawn.add_row('  '.join(keys), text)
+    return drawn
+
+
+def screen(scene: Scene, width: int, height: int) -> RenderableType:
+    """Return what fills a terminal."""
+    footer = Text(FOOTER, 'dim', no_wrap=True, overflow='ellipsis')
+    if scene.show_help:
+        return _stacked(height, (help_text(), None), (Text('any key goes back', 'dim'), 1))
+    if not scene.lights:
+        return _stacked(height, (title(scene), 1), (Text(NO_LIGHTS), None), (footer, 1))
+    selected = next((light for light in scene.lights if light.name == scene.selected), None)
+    rows = len(scene.lights) + 1
+    room = height - 2
+    if selected is None or room < DETAIL_HEIGHT + 3:
+        return _stacked(height, (title(scene), 1), (table(scene, width, room), None), (footer, 1))
+    # Half of the screen is for the table at least, and all that the details do not need.
+    rows = min(rows, max(room - DETAIL_HEIGHT - 7, room // 2))
+    heading = Text(f'\n{selected.name}', 'bold', no_wrap=True, overflow='ellipsis')
+    return _stacked(height, (title(scene), 1), (table(scene, width, rows), rows),
+                    (Group(heading, details(selected, scene)), None), (footer, 1))
+
+
+def _stacked(height: int, *parts: tuple[RenderableType, int | None]) -> RenderableType:
+    """Return parts of so many lines one above the other; None is what is left."""
+    if height < 4:
+        # There is only room for what matters most, which never has a fixed height.
+        return next(part for part, lines in parts if lines is None)
+    layout = Layout()
+    layout.split_column(*(Layout(part, size=lines) if lines else Layout(part)
+                          for part, lines in parts))
+    return layout
+
+
+def plain(scene: Scene) -> RenderableType:
+    """Return a table without colours, bars and bounds, to be printed once."""
+    if not scene.lights:
+        return Text('no lights')
+    drawn = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style='')
+    shown = [column for column in COLUMNS[:-1] if column.plain]
+    for column in shown:
+        drawn.add_column(column.title, no_wrap=True)
+    drawn.add_column('DIAGNOSTICS', no_wrap=True)
+    for light in scene.lights:
+        found = [f'{LEVELS[min(one.level, 3)][0]}: {one.message}'
+                 for one in (light.lamp, light.link) if one and one.level]
+        drawn.add_row(*(Text(column.cell(light, scene).plain or '-') for column in shown),
+                      Text('; '.join(found) or ('OK' if light.lamp or light.link else '-')))
+    return drawn

@@ -1,0 +1,232 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the monitor shows, on terminals of every size and kind."""
+
+import io
+import re
+
+from illuminator_ros.monitor.keys import HELP
+from illuminator_ros.monitor.model import Diagnosis, Fleet, Light, Outcome
+from illuminator_ros.monitor.texts import bar, BLOCKS, sparkline
+from illuminator_ros.monitor.view import columns_for, plain, Scene, screen
+import pytest
+from rich.console import Console
+from rich.screen import Screen
+
+NOW = 1000.0
+SIZES = [(200, 50), (132, 24), (80, 24), (60, 12), (40, 8), (20, 6), (12, 3), (5, 2), (1, 1)]
+
+
+def fleet_of(*names: str) -> Fleet:
+    """Return lights that are on and have told everything."""
+    fleet = Fleet()
+    fleet.seen(names, NOW)
+    for name in names:
+        for topic, value in {
+            'connected': True, 'enabled': True, 'brightness': 40.0, 'mode': 'internal_control',
+            'strobe_period': 0.5, 'strobe_duty_cycle': 20.0, 'error_flags': 1, 'uptime': 300.0,
+        }.items():
+            fleet.take(name, topic, value, NOW)
+        for second in range(10):
+            fleet.take(name, 'temperature', 30.0 + second, NOW - 20 + 2 * second)
+        fleet.take(name, 'temperature', 41.5, NOW)
+        fleet.agreed(name, 90.0)
+        fleet.diagnosed(name, 'link', Diagnosis(1, '12 % of the frames lost', {
+            'loss_percent': '12.3', 'round_trip_p50_ms': '3.2', 'round_trip_p95_ms': '40'}), NOW)
+        fleet.diagnosed(name, 'lamp', Diagnosis(1, 'dimmed because it is hot', {
+            'vendor': 'maker', 'model': 'torch', 'serial_number': 'T-1'}), NOW)
+    return fleet
+
+
+def shown(fleet: Fleet, width: int = 132, height: int = 24, *, color: str | None = None,
+          now: float = NOW, selected: str | None = '/bow', **how: bool) -> str:
+    """Return what a terminal gets, with its colours if some are asked for."""
+    file = io.StringIO()
+    console = Console(file=file, width=width, height=height, force_terminal=bool(color),
+                      color_system=color, highlight=False, legacy_windows=False)
+    drawn = screen(Scene(fleet.lights, selected, now, **how), width, height)
+    # As Live has it.
+    console.print(Screen(drawn), end='')
+    return file.getvalue()
+
+
+def bow() -> tuple[Fleet, Light]:
+    """Return a light, alone."""
+    fleet = fleet_of('/bow')
+    return fleet, fleet.lights[0]
+
+
+class TestScreen:
+    @pytest.mark.parametrize('text', [
+        '/bow', 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
+        'thermal throttling', 'dimmed because it is hot', 'maker torch', 'no. T-1',
+        'agreed: 90 %', 'up 5 min', '1 light: 1 ON', '30.0 to 41.5'])
+    def test_it_has_all_that_is_known(self, text: str) -> None:
+        assert text in shown(fleet_of('/bow'))
+
+    @pytest.mark.parametrize(('width', 'height'), SIZES)
+    @pytest.mark.parametrize('count', [0, 1, 3, 40])
+    @pytest.mark.parametrize('show_help', [False, True])
+    def test_it_fits_every_terminal(
+        self, width: int, height: int, count: int, show_help: bool,
+    ) -> None:
+        names = [f'/vehicle_{number:02}/illuminator' for number in range(count)]
+
+        lines = shown(fleet_of(*names), width, height, selected=names[-1] if names else None,
+                      show_help=show_help).splitlines()
+
+        assert len(lines) <= height
+        assert max(map(len, lines), default=0) <= width
+
+    @pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 12), (40, 8)])
+    @pytest.mark.parametrize('at', [0, 17, 39])
+    def test_the_selected_light_is_always_among_those_shown(
+        self, width: int, height: int, at: int,
+    ) -> None:
+        names = [f'/l{number:02}' for number in range(40)]
+
+        text = shown(fleet_of(*names), width, height, selected=names[at])
+
+        assert f'{names[at]} ' in text
+
+    def test_the_narrower_it_is_the_fewer_columns_there_are(self) -> None:
+        titles = [[column.title for column in columns_for(width)] for width in range(1, 250)]
+
+        assert titles[0] == ['LIGHT', 'STATE'][:len(titles[0])]
+        assert all(set(narrow) <= set(wide)
+                   for narrow, wide in zip(titles, titles[1:], strict=False))
+        assert {'STATE', 'BRIGHT', 'TEMP', 'STROBE', 'ERRORS', 'LOSS'} <= set(titles[79])
+        assert {'TREND', 'RTT', 'MODE', 'LAST'} <= set(titles[-1])
+
+    def test_every_key_stands_in_the_help(self) -> None:
+        text = shown(fleet_of('/bow'), show_help=True)
+
+        assert all(key in text for keys, _ in HELP for key in keys)
+
+    def test_without_lights_it_says_so(self) -> None:
+        assert 'no lights in this ROS graph yet' in shown(Fleet())
+
+    def test_what_a_light_has_not_told_is_a_dash(self) -> None:
+        fleet = Fleet()
+        fleet.seen(['/bow'], NOW)
+
+        [row] = [line for line in shown(fleet).splitlines() if ' ? ' in line][1:2]
+
+        assert row.split() == ['/bow', '?', '-', '-', '-', '-', '-', '-']
+
+    @pytest.mark.parametrize(('seconds', 'word'), [(0, 'ON'), (30, 'silent')])
+    def test_the_state_is_a_word_and_not_only_a_colour(self, seconds: int, word: str) -> None:
+        text = shown(fleet_of('/bow'), now=NOW + seconds)
+
+        assert re.search(rf'^/bow +{word} ', text, re.M)
+
+    def test_a_light_that_is_gone_is_marked(self) -> None:
+        fleet = fleet_of('/bow', '/stern')
+        fleet.seen(['/stern'], NOW)
+
+        text = shown(fleet)
+
+        assert re.search('^/bow +gone ', text, re.M)
+        assert '2 lights: 1 ON, 1 gone' in text
+
+    @pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 20)])
+    def test_a_refusal_is_shown_with_its_reason(self, width: int, height: int) -> None:
+        fleet = fleet_of('/bow')
+        fleet.acted('/bow', 'brightness 90 %', Outcome.FAILED,
+                    'refused: MAV_RESULT_DENIED (1 try, 3 ms)', NOW - 3)
+
+        text = ' '.join(shown(fleet, width, height).split())
+
+        assert ('brightness 90 %: FAILED: refused: MAV_RESULT_DENIED (1 try, 3 ms) (3 s ago)'
+                in text)
+
+    def test_names_and_messages_are_not_taken_for_markup(self) -> None:
+        fleet = fleet_of('/bow')
+        fleet.acted('/bow', '[bold]x[/bold]', Outcome.FAILED, '[red]no[/red]', NOW)
+
+        assert '[bold]x[/bold]: FAILED: [red]no[/red]' in shown(fleet)
+
+
+class TestTerminals:
+    def test_with_colours_an_error_is_red(self) -> None:
+        fleet = fleet_of('/bow')
+        fleet.acted('/bow', 'on', Outcome.FAILED, 'no', NOW)
+
+        assert '\x1b[1;31mFAILED' in shown(fleet, color='standard')
+
+    def test_no_color_has_the_same_words_and_no_colour(
+        self, monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        with_colour = shown(fleet_of('/bow'), color='standard')
+        monkeypatch.setenv('NO_COLOR', '1')
+
+        without = shown(fleet_of('/bow'), color='standard')
+
+        colours = r'\x1b\[[\d;]*\b(3\d|4\d|9\d)[\d;]*m'
+        assert re.search(colours, with_colour)
+        assert not re.search(colours, without)
+        strip = re.compile(r'\x1b\[[\d;]*m')
+        assert strip.sub('', with_colour) == strip.sub('', without)
+
+    def test_a_terminal_without_unicode_gets_ascii(self) -> None:
+        assert shown(fleet_of('/bow', '/stern'), ascii_only=True).isascii()
+        assert not shown(fleet_of('/bow', '/stern')).isascii()
+
+
+class TestPlain:
+    def text(self, fleet: Fleet) -> list[str]:
+        console = Console(file=io.StringIO(), width=400, record=True, color_system=None)
+        console.print(plain(Scene(fleet.lights, None, NOW)))
+        return [line.rstrip() for line in console.export_text().splitlines()]
+
+    def test_it_is_a_line_for_each_light_below_a_heading(self) -> None:
+        heading, *rows = self.text(fleet_of('/stern', '/bow'))
+
+        assert heading.split() == ['LIGHT', 'STATE', 'BRIGHT', 'STROBE', 'MODE', 'TEMP', 'LOSS',
+                                   'RTT', 'ERRORS', 'DIAGNOSTICS']
+        assert [re.split(' {2,}', row) for row in rows] == [
+            [name, 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
+             'thermal throttling',
+             'WARN: dimmed because it is hot; WARN: 12 % of the frames lost']
+            for name in ('/bow', '/stern')]
+
+    def test_what_is_fine_or_unknown_is_a_word_too(self) -> None:
+        fleet = fleet_of('/bow')
+        fleet.take('/bow', 'error_flags', 0, NOW)
+        for kind in ('link', 'lamp'):
+            fleet.diagnosed('/bow', kind, Diagnosis(0, 'fine', {}), NOW)
+
+        assert re.split(' {2,}', self.text(fleet)[1])[-4:] == ['-', '-', '-', 'OK']
+
+
+class TestBar:
+    @pytest.mark.parametrize(('value', 'drawn'), [
+        (0.0, '----'), (0.1, '#---'), (50.0, '##--'), (100.0, '####'), (None, '    '),
+        (float('nan'), '    '), (900.0, '####')])
+    def test_it_is_as_long_as_the_share(self, value: float | None, drawn: str) -> None:
+        assert bar(value, 4, ascii_only=True) == drawn
+
+
+class TestSparkline:
+    def test_it_goes_from_the_lowest_to_the_highest(self) -> None:
+        assert sparkline([20.0, 25.0, 30.0, None, 40.0]) == '▁▃▅ █'
+
+    def test_a_tenth_of_a_degree_is_no_mountain(self) -> None:
+        drawn = {BLOCKS.index(block) for block in sparkline([25.0, 25.1, 25.0])}
+
+        assert max(drawn) - min(drawn) <= 1
+
+    def test_without_values_it_is_empty(self) -> None:
+        assert sparkline([None, None]) == '  '

@@ -1,0 +1,198 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The monitor without its terminal, in the test's process, and the terminal of one that runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import fcntl
+import os
+import pty
+import re
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import threading
+from typing import Any
+
+from illuminator_ros.monitor.actions import Ask
+from illuminator_ros.monitor.model import Light, Outcome
+from illuminator_ros.monitor.run import Monitor
+from rclpy.node import Node
+from support.light import eventually
+from support.processes import end_with_parent, environment, ROOT
+from support.ros import Ros
+
+# Cursor movements and colours.
+_CONTROL = re.compile(r'\x1b\[[\d;?]*[A-Za-z]')
+
+
+class Watching:
+    """A monitor that looks at the domain of a ROS client."""
+
+    def __init__(self, ros: Ros) -> None:
+        self._node = Node('monitor', context=ros.context, enable_rosout=False,
+                          start_parameter_services=False)
+        self._monitor = Monitor(self._node)
+
+    def close(self) -> None:
+        """End it."""
+        self._monitor.end()
+        self._node.destroy_node()
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the lights."""
+        return [light.name for light in self._monitor.lights()]
+
+    def light(self, name: str = '/illuminator') -> Light:
+        """Return what is known of a light."""
+        [light] = [light for light in self._monitor.lights() if light.name == name]
+        return light
+
+    def wait(self, condition: Callable[[Light], Any], name: str = '/illuminator',
+             timeout: float = 20.0) -> Light:
+        """Wait until a light is known, and as wanted; return it."""
+        eventually(lambda: name in self.names, timeout)
+        eventually(lambda: condition(self.light(name)), timeout)
+        return self.light(name)
+
+    def wait_names(self, *names: str) -> None:
+        """Wait until these are the lights."""
+        eventually(lambda: self.names == sorted(names), 20.0)
+
+    def ask(self, ask: Ask, name: str = '/illuminator') -> None:
+        """Ask something of a light."""
+        self._monitor.graph.submit(name, ask)
+
+    def outcome(self, text: str, outcome: Outcome, name: str = '/illuminator') -> str:
+        """Wait until a request has come out so, and return the answer."""
+        light = self.wait(lambda light: light.action and light.action.text == text
+                          and light.action.outcome is outcome, name)
+        assert light.action is not None
+        return light.action.answer
+
+    def clear_gone(self) -> None:
+        """Forget the lights that are gone."""
+        self._monitor.graph.clear_gone()
+
+
+class Terminal:
+    """A pseudo-terminal with a program of ours on it."""
+
+    def __init__(self, module: str, *arguments: str, size: tuple[int, int] = (24, 100),
+                 env: dict[str, str] | None = None) -> None:
+        self._master, self._slave = pty.openpty()
+        self.resize(*size)
+        self.before = termios.tcgetattr(self._slave)
+        given = {'TERM': 'xterm-256color', 'LANG': 'C.UTF-8', 'COLUMNS': '', 'LINES': '',
+                 **(env or {})}
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', module, *arguments], cwd=ROOT, env=environment(given),
+            stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
+            preexec_fn=_own_terminal)
+        self._grown = threading.Condition()
+        self._raw = b''
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        while True:
+            try:
+                data = os.read(self._master, 65536)
+            except OSError:
+                return
+            with self._grown:
+                self._raw += data
+                self._grown.notify_all()
+
+    @property
+    def raw(self) -> str:
+        """All that was written so far."""
+        return self._raw.decode('utf-8', errors='replace')
+
+    def resize(self, lines: int, columns: int) -> None:
+        """Have another size."""
+        fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
+
+    def type(self, text: str) -> None:
+        """Press keys."""
+        os.write(self._master, text.encode())
+
+    def forget(self) -> None:
+        """Forget what was written so far."""
+        with self._grown:
+            self._raw = b''
+
+    def wait_for(self, pattern: str, timeout: float = 20.0) -> None:
+        """Wait until text like this has been written, spaces being as good as any number."""
+        def found() -> bool:
+            return bool(re.search(pattern, ' '.join(_CONTROL.sub('', self.raw).split())))
+
+        with self._grown:
+            assert self._grown.wait_for(found, timeout), f'no {pattern!r} in {self.raw[-3000:]}'
+
+    def send(self, number: int) -> None:
+        """Send a signal to the program."""
+        self._process.send_signal(number)
+
+    def wait(self) -> int:
+        """Wait for the end and return the exit status."""
+        return self._process.wait(20.0)
+
+    @property
+    def restored(self) -> bool:
+        """Whether the terminal behaves as it did before, and shows what it showed."""
+        now = termios.tcgetattr(self._slave)
+        return now == self.before and self.raw.rindex('\x1b[?1049l') > self.raw.rindex(
+            '\x1b[?1049h') and self.raw.rindex('\x1b[?25h') > self.raw.rindex('\x1b[?25l')
+
+    def close(self) -> None:
+        """End it all."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGKILL)
+            self._process.wait(20.0)
+        os.close(self._slave)
+        self._reader.join(20.0)
+        os.close(self._master)
+
+
+def _own_terminal() -> None:
+    """Have the keys of the terminal send signals to this program, and end it with its parent."""
+    end_with_parent()
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
+@contextlib.contextmanager
+def terminal(*arguments: str, **how: Any) -> Iterator[Terminal]:
+    """Run the monitor on a terminal."""
+    made = Terminal('illuminator_ros.monitor', *arguments, **how)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+@contextlib.contextmanager
+def watching(ros: Ros) -> Iterator[Watching]:
+    """Watch the lights in the domain of a ROS client."""
+    made = Watching(ros)
+    try:
+        yield made
+    finally:
+        made.close()

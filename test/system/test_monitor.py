@@ -1,0 +1,132 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``monitor`` as a process: on a terminal, without one, and where something is missing."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+from support.light import eventually, free_port, ServedLight
+from support.monitors import terminal
+from support.processes import environment, ROOT, run
+from support.ros import Ros, running_bridge
+
+MONITOR = 'illuminator_ros.monitor'
+
+
+def domain(ros: Ros) -> dict[str, str]:
+    return {'ROS_DOMAIN_ID': str(ros.domain)}
+
+
+class TestOnATerminal:
+    def test_keys_switch_and_dim_the_light(self, own_ros: Ros, port: int) -> None:
+        with (running_bridge(own_ros.domain, port), ServedLight(port) as light,
+              terminal(env=domain(own_ros)) as screen):
+            screen.wait_for('/illuminator off')
+
+            screen.type(' ')
+            screen.wait_for('on: done')
+            screen.type('\x1b[D')
+            screen.wait_for('brightness 90 %: done')
+
+            assert (light.fake.fields['enable'], light.fake.fields['brightness']) == (1, 90.0)
+
+    @pytest.mark.parametrize('way', ['q', '\x03', '\x04', 'SIGINT', 'SIGTERM'])
+    def test_it_leaves_the_terminal_as_it_was(self, own_ros: Ros, way: str) -> None:
+        with terminal(env=domain(own_ros)) as screen:
+            screen.wait_for('no lights in this ROS graph yet')
+
+            if way.startswith('SIG'):
+                screen.send(signal.Signals[way])
+            else:
+                screen.type(way)
+
+            assert screen.wait() == 0
+            eventually(lambda: screen.restored)
+            assert 'Traceback' not in screen.raw
+
+    def test_ctrl_z_does_not_leave_a_shell_with_it(self, own_ros: Ros) -> None:
+        with terminal(env=domain(own_ros)) as screen:
+            screen.wait_for('no lights in this ROS graph yet')
+
+            screen.type('\x1a?')
+
+            screen.wait_for('any key goes back')
+
+    def test_it_follows_the_size(self, own_ros: Ros) -> None:
+        with terminal(env=domain(own_ros), size=(24, 100)) as screen:
+            screen.wait_for('a all off')
+
+            screen.forget()
+            screen.resize(5, 30)
+
+            screen.wait_for('space on/off [+]/- brightness …')
+
+    def test_without_colours_there_are_none(self, own_ros: Ros) -> None:
+        with terminal(env={**domain(own_ros), 'NO_COLOR': '1'}) as screen:
+            screen.wait_for('no lights in this ROS graph yet')
+
+            assert '\x1b[3' not in screen.raw
+            assert ';3' not in screen.raw
+
+    def test_a_terminal_that_cannot_be_drawn_on_gets_a_table(self, own_ros: Ros) -> None:
+        with terminal('--wait', '0.1', env={**domain(own_ros), 'TERM': 'dumb'}) as screen:
+            assert screen.wait() == 1
+            screen.wait_for('monitor: no lights found')
+
+
+class TestWithoutATerminal:
+    def test_it_prints_a_table_and_ends(self, own_ros: Ros) -> None:
+        port = free_port()
+        with (running_bridge(own_ros.domain, port), ServedLight(port, brightness=30.0)):
+            outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
+
+        heading, row = outcome.stdout.splitlines()
+        assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
+        assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
+        assert (outcome.returncode, outcome.stderr) == (0, '')
+
+    def test_without_lights_it_fails_and_says_so(self, own_ros: Ros) -> None:
+        outcome = run(MONITOR, '--once', '--wait', '0.1', env=domain(own_ros))
+
+        assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
+            1, '', 'monitor: no lights found\n')
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['--banana'], 'unrecognized arguments: --banana'),
+    (['--wait', '0'], 'argument --wait: 0 is outside 0.1 to 3600'),
+    (['--ros-args', '--banana'], "wrong ROS arguments: ['--banana']"),
+    (['--ros-args', '-r', '1st:=x'], "Couldn't parse remap rule: '-r 1st:=x'"),
+])
+def test_what_is_wrong_with_an_argument_is_told_in_one_line(
+    arguments: list[str], text: str,
+) -> None:
+    outcome = run(MONITOR, *arguments)
+
+    [line] = outcome.stderr.splitlines()
+    assert line.startswith('monitor: ')
+    assert text in line
+    assert (outcome.returncode, outcome.stdout) == (2, '')
+
+
+def test_the_bridge_neither_has_nor_needs_rich() -> None:
+    done = subprocess.run(
+        [sys.executable, '-c', 'import sys; import illuminator_ros.ros.process; '
+         'print("rich" in sys.modules)'],
+        cwd=ROOT, env=environment(), text=True, capture_output=True, timeout=30)
+
+    assert done.stdout == 'False\n', done.stderr
