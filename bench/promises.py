@@ -65,7 +65,7 @@ class Row:
     limit: float
     tries: int
     p50: float
-    max: float
+    max: float  # noqa: A003
 
     @property
     def met(self) -> bool:
@@ -139,7 +139,7 @@ class Bench:
         client = self.ros._client(type_, f'/illuminator/{service}')
         return Watch(client.call_async(request)).seconds()
 
-    def set(self, **values: float) -> float:
+    def set(self, **values: float) -> float:  # noqa: A003
         """Return how long a set of parameters takes."""
         from rcl_interfaces.srv import SetParameters
         from rclpy.parameter import Parameter

@@ -34,12 +34,11 @@ import time
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
+from bench.traffic import frames  # noqa: E402
 from illuminator_ros.illuminator.device import DeviceProperties, Devices  # noqa: E402
 from illuminator_ros.mavlink.dialect import decode_payload, HANDLED  # noqa: E402
 from illuminator_ros.mavlink.framing import Decoder  # noqa: E402
 from support.frames import frame_of  # noqa: E402
-
-from bench.traffic import frames  # noqa: E402
 
 BITS = 10
 
@@ -64,7 +63,7 @@ class Wire:
             done.append(self._queue.popleft()[1])
         return b''.join(done)
 
-    def next(self) -> float:
+    def next(self) -> float:  # noqa: A003
         """Return when something comes out."""
         return self._queue[0][0] if self._queue else float('inf')
 

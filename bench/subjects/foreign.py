@@ -52,7 +52,7 @@ class Receiver:
 
     @property
     def at_rest(self) -> float:
-        """What it takes when nothing comes, % of a core."""
+        """Return what it takes when nothing comes, % of a core."""
         return 100 * self._idle
 
     def measure(self, prepared: list[bytes], rate: int, count: int) -> None:

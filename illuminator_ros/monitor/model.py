@@ -146,12 +146,12 @@ class Light:
 
     @property
     def flags(self) -> list[str]:
-        """The names of its error flags."""
+        """Return the names of its error flags."""
         return flag_names(self.values.get('error_flags') or 0)
 
     @property
     def level(self) -> int:
-        """The worst of what the diagnostics say of it."""
+        """Return the worst of what the diagnostics say of it."""
         return max((one.level for one in (self.link, self.lamp) if one), default=0)
 
 
@@ -163,7 +163,7 @@ class Fleet:
 
     @property
     def lights(self) -> list[Light]:
-        """The lights, sorted by their names."""
+        """Return the lights, sorted by their names."""
         return [self._lights[name] for name in sorted(self._lights)]
 
     def get(self, name: str | None) -> Light | None:

@@ -164,5 +164,3 @@ def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int
         # Whoever reads has seen enough; and the interpreter would say so again at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
-
-

@@ -49,6 +49,7 @@ def test_switching_off_is_off_whatever_the_light_shows(enabled: bool | None) -> 
 
 
 class TestDim:
+
     def dimmed(self, one: Light, step: float) -> float:
         request = dim(one, step)
         assert request is not None
@@ -81,6 +82,7 @@ class TestDim:
 
 
 class TestStrobe:
+
     def test_a_steady_light_is_to_strobe_once_a_second(self) -> None:
         assert strobe(light(strobe_period=0.0, strobe_duty_cycle=0.0)).value == {
             'strobe_period': 1.0, 'strobe_duty_cycle': 50.0}

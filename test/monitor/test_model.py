@@ -83,6 +83,7 @@ class TestState:
 
 
 class TestFleet:
+
     def test_new_lights_are_told_once_and_stand_in_the_order_of_their_names(self) -> None:
         fleet = Fleet()
 
@@ -147,6 +148,7 @@ class TestFleet:
 
 
 class TestTrend:
+
     def test_it_has_the_newest_value_of_each_step(self) -> None:
         trend = Trend(step=2.0, size=10)
         for now, value in ((0.0, 20.0), (1.9, 21.0), (2.0, 22.0), (4.5, 23.0)):

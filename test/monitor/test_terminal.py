@@ -41,6 +41,7 @@ def line() -> Iterator[tuple[int, int]]:
 
 
 class TestKeyboard:
+
     @pytest.fixture
     def keyboard(self, line: tuple[int, int]) -> Iterator[Keyboard]:
         """Return the keyboard of a terminal that passes on each key."""
@@ -76,6 +77,7 @@ class TestKeyboard:
 
 
 class TestUnbuffered:
+
     def test_a_terminal_is_as_before_whatever_happens(self, line: tuple[int, int]) -> None:
         before = termios.tcgetattr(line[1])
 

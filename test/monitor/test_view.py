@@ -160,6 +160,7 @@ class TestScreen:
 
 
 class TestTerminals:
+
     def test_with_colours_an_error_is_red(self) -> None:
         fleet = fleet_of('/bow')
         fleet.acted('/bow', 'on', Outcome.FAILED, 'no', NOW)
@@ -186,6 +187,7 @@ class TestTerminals:
 
 
 class TestPlain:
+
     def text(self, fleet: Fleet) -> list[str]:
         console = Console(file=io.StringIO(), width=400, record=True, color_system=None)
         console.print(plain(Scene(fleet.lights, None, NOW)))
@@ -220,6 +222,7 @@ class TestBar:
 
 
 class TestSparkline:
+
     def test_it_goes_from_the_lowest_to_the_highest(self) -> None:
         assert sparkline([20.0, 25.0, 30.0, None, 40.0]) == '▁▃▅ █'
 

@@ -154,6 +154,7 @@ def test_somebody_else_with_our_address_is_an_error(
 
 
 class TestNoLight:
+
     def test_it_is_an_error_after_a_grace_of_ten_seconds(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
             diagnostics = Diagnostics(own_ros)

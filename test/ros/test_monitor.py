@@ -59,6 +59,7 @@ def darker(light: Light) -> Request | None:
 
 
 class TestWhatItShows:
+
     def test_the_light_is_found_by_its_interface(self, monitor: Watching) -> None:
         assert monitor.names == ['/illuminator']
         monitor.wait(lambda light: light.state(light.heard_at) is State.OFF)

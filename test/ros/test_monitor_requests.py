@@ -73,14 +73,14 @@ class Bench:
 
     @property
     def sets(self) -> list[dict[str, Any]]:
-        """The parameters of each set that was sent."""
+        """Return the parameters of each set that was sent."""
         return [{parameter.name: parameter_value_to_python(parameter.value)
                  for parameter in request.parameters}
                 for request, _ in self.clients['/bow/set_parameters_atomically'].calls]
 
     @property
     def switches(self) -> list[bool]:
-        """What the light was switched to."""
+        """Return what the light was switched to."""
         return [request.data for request, _ in self.clients['/bow/enable'].calls]
 
     def answer_set(self, reason: str = '') -> None:

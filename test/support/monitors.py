@@ -57,7 +57,7 @@ class Watching:
 
     @property
     def names(self) -> list[str]:
-        """The names of the lights."""
+        """Return the names of the lights."""
         return [light.name for light in self._monitor.lights()]
 
     def light(self, name: str = '/illuminator') -> Light:
@@ -130,7 +130,7 @@ class Terminal:
         """Have another size."""
         fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
 
-    def type(self, text: str) -> None:
+    def type(self, text: str) -> None:  # noqa: A003
         """Press keys."""
         os.write(self._master, text.encode())
 

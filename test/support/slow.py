@@ -62,7 +62,7 @@ class SlowClock:
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """What tells another process of this clock."""
+        """Return what tells another process of this clock."""
         return {VARIABLE: str(self.path)}
 
 
@@ -94,6 +94,7 @@ def pass_time_until(condition: Callable[[], Any], step: float = 1.0) -> None:
 
 
 class _SlowSelector(selectors.DefaultSelector):
+
     def select(self, timeout: float | None = None) -> Any:
         seconds = LOOK_INTERVAL if timeout is None else timeout / SPEED
         return super().select(min(seconds, LOOK_INTERVAL))

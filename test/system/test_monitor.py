@@ -32,6 +32,7 @@ def domain(ros: Ros) -> dict[str, str]:
 
 
 class TestOnATerminal:
+
     def test_keys_switch_and_dim_the_light(self, own_ros: Ros, port: int) -> None:
         with (running_bridge(own_ros.domain, port), ServedLight(port) as light,
               terminal(env=domain(own_ros)) as screen):
@@ -89,6 +90,7 @@ class TestOnATerminal:
 
 
 class TestWithoutATerminal:
+
     def test_it_prints_a_table_and_ends(self, own_ros: Ros) -> None:
         port = free_port()
         with (running_bridge(own_ros.domain, port), ServedLight(port, brightness=30.0)):
