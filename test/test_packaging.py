@@ -109,7 +109,7 @@ def test_what_the_package_imports_is_declared() -> None:
 def test_what_the_tests_import_is_declared() -> None:
     package = parse_package(str(ROOT))
     declared = {depend.name for depend in package.exec_depends + package.test_depends}
-    own = {path.stem for path in ROOT.glob('*/*') if path != (ROOT / 'illuminator_ros')}
+    own = {path.stem for path in (*ROOT.glob('*'), *ROOT.glob('*/*'))} - {PACKAGE}
 
     needed = {KEYS.get(name, name) for name in imported(ROOT / 'test') - own - {PACKAGE}}
 

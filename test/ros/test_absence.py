@@ -17,8 +17,9 @@
 from types import SimpleNamespace
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.signing import SigningCounters
-from illuminator_ros.mavlink.statistics import Traffic
+from illuminator_ros.mavlink.statistics import SequenceCounter, Traffic
 from illuminator_ros.ros.diagnostics import why_nothing_is_heard
 import pytest
 
@@ -26,14 +27,14 @@ import pytest
 @pytest.mark.parametrize(('traffic', 'signing', 'reason'), [
     ({}, {}, 'nothing comes in'),
     ({'bytes_received': 90}, {}, '90 bytes came and no good frame, as with a wrong baud rate'),
-    ({'bytes_received': 90, 'frames_received': 4}, {},
+    ({'bytes_received': 90, 'sources': {Source(1, 1): SequenceCounter(received=4)}}, {},
      '4 frames came, none from an illuminator'),
     ({'bytes_received': 90}, {'bad': 3},
      '3 frames refused for their signature, made with another key'),
     ({'bytes_received': 90}, {'unsigned': 2}, '2 frames refused because they are not signed'),
 ])
 def test_the_likeliest_reason_is_named(
-    traffic: dict[str, int], signing: dict[str, int], reason: str,
+    traffic: dict[str, Any], signing: dict[str, int], reason: str,
 ) -> None:
     state: Any = SimpleNamespace(
         traffic=Traffic(**traffic), signing=SigningCounters(**signing))

@@ -36,11 +36,13 @@ class TestEnable:
         assert command.param1 == float(on)
 
     def test_of_what_comes_while_it_switches_only_the_newest_is_done(
-        self, ros: Ros, light: ServedLight,
+        self, ros: Ros, light: ServedLight, parameters: Parameters,
     ) -> None:
         light.fake.delays[ON_OFF] = math.inf
         ros.publish(Bool, '/illuminator/cmd/enable', *[True] * 50, False)
         light.wait_for(ON_OFF)
+        # The node has taken what came before it answers.
+        parameters.get('frame_id')
 
         light.release(ON_OFF)
 
