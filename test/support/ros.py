@@ -70,7 +70,7 @@ class Ros:
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = rclpy.create_node('tester', context=self.context)
-        self._clients: dict[str, Any] = {}
+        self._clients: dict[str, tuple[Any, set[bytes]]] = {}
         self._publishers: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
@@ -138,12 +138,23 @@ class Ros:
         self.node.destroy_client(client)
 
     def _client(self, type_: Any, service: str) -> Any:
-        client = self._clients.get(service)
-        if client is None:
-            client = self._clients[service] = self.node.create_client(type_, service)
+        node = service.rpartition('/')[0]
+        client, met = self._clients.get(service, (None, set()))
+        now = self._incarnations(node)
+        if client is None or not now or not now <= met:
+            if client is not None:
+                self.node.destroy_client(client)
+            client = self.node.create_client(type_, service)
             eventually(client.service_is_ready)
-            self._meet(service.rpartition('/')[0])
+            self._meet(node)
+            self._clients[service] = (client, self._incarnations(node))
         return client
+
+    def _incarnations(self, node: str) -> set[bytes]:
+        """Return what tells the nodes of this name from one that had it before a restart."""
+        return {bytes(info.endpoint_gid)
+                for info in self.node.get_publishers_info_by_topic('/rosout')
+                if f'{info.node_namespace.rstrip("/")}/{info.node_name}' == node}
 
     def start(self, type_: Any, service: str, request: Any) -> Call:
         """Call a service, once it is there, without waiting for the answer."""
