@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import threading
 from typing import Any
 
@@ -97,7 +98,7 @@ class BeamOutput(LightObserver):
         with self._lock:
             now = self._clock()
             look, change = self._beam.look(now), self._beam.changes_in(now)
-            if look.alpha or change <= REFRESH:
+            if look.alpha or change < math.inf:
                 self._ring(round((min(change, REFRESH) + MARGIN) * 1e9))
             else:
                 self._timer.cancel()
