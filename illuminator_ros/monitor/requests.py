@@ -145,9 +145,12 @@ class Requests:
         self._asked = None
         if future.exception() is None and future.result() is not None:
             values = [parameter_value_to_python(value) for value in future.result().values]
-            if values and isinstance(values[0], float):
-                with self._lock:
-                    self._fleet.agreed(self._name, values[0])
+            with self._lock:
+                light = self._fleet.get(self._name)
+                # What an event has told meanwhile is newer, or a newer event will follow.
+                if (light is not None and light.setpoint is None and values
+                        and isinstance(values[0], float)):
+                    light.setpoint = values[0]
 
     def _note(self, request: Request, outcome: Outcome, answer: str) -> None:
         with self._lock:

@@ -22,8 +22,8 @@ from illuminator_ros.monitor.model import Fleet, Outcome
 from illuminator_ros.monitor.requests import ANSWER_LIMIT, Requests
 import pytest
 from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.parameter import parameter_value_to_python
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 from std_srvs.srv import SetBool
 
@@ -102,6 +102,18 @@ def darker(light: Any) -> Any:
 @pytest.fixture
 def bench() -> Bench:
     return Bench()
+
+
+def test_what_an_event_tells_is_not_undone_by_an_older_answer(bench: Bench) -> None:
+    bench.light.setpoint = None
+    bench.requests.poll()
+    [(_, answer)] = bench.clients['/bow/get_parameters'].calls
+
+    bench.fleet.agreed('/bow', 60.0)
+    answer.set_result(GetParameters.Response(
+        values=[Parameter('brightness', value=50.0).get_parameter_value()]))
+
+    assert bench.light.setpoint == 60.0
 
 
 def test_sets_that_come_during_one_go_out_as_one(bench: Bench) -> None:
