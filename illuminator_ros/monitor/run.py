@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import copy
 import os
 import sys
@@ -51,12 +52,17 @@ PLAIN_WIDTH = 400
 
 
 class Monitor:
-    """The lights as a node sees them, in a thread of its own."""
+    """
+    The lights as a node sees them, in a thread of its own.
 
-    def __init__(self, node: Node) -> None:
+    :ivar clock: returns the time, s.
+    """
+
+    def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
         self._fleet = Fleet()
         self._lock = threading.Lock()
-        self.graph = Graph(node, self._fleet, self._lock, time.monotonic)
+        self.graph = Graph(node, self._fleet, self._lock, clock)
         self._spinner = Spinner(node)
         self._thread = threading.Thread(target=self._spinner.run, name='ros', daemon=True)
         self._thread.start()
@@ -122,12 +128,12 @@ def _watch(
         while not operator.quit:
             lights = monitor.lights()
             operator.look(lights)
-            scene = Scene(lights, operator.selected, time.monotonic(), operator.show_help,
+            scene = Scene(lights, operator.selected, monitor.clock(), operator.show_help,
                           ascii_only=ascii_only)
             live.update(screen(scene, console.width, console.height), refresh=True)
             data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, stop)
             for key in decoder.feed(data):
-                operator.press(key, lights, time.monotonic())
+                operator.press(key, lights, monitor.clock())
     keyboard.close()
     return 0
 
@@ -155,7 +161,7 @@ def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int
         return 1
     console = Console(width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True)
     with console.capture() as captured:
-        console.print(plain(Scene(lights, None, time.monotonic())))
+        console.print(plain(Scene(lights, None, monitor.clock())))
     try:
         for line in captured.get().splitlines():
             print(line.rstrip())

@@ -17,22 +17,17 @@
 from collections.abc import Iterator
 import threading
 
-from illuminator_ros.monitor import requests
 from illuminator_ros.monitor.actions import dim, refresh, Request, strobe, switch, switch_off
 from illuminator_ros.monitor.graph import lights_among, TOPICS, type_name
 from illuminator_ros.monitor.model import Light, Outcome, State
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from std_srvs.srv import SetBool
-from support.light import CONFIGURE, free_port, MavResult, ServedLight, Source
+from support.light import CONFIGURE, eventually, free_port, MavResult, ServedLight, Source
 from support.monitors import Watching, watching
 from support.ros import Ros, running_bridge, STATE
-
-
-@pytest.fixture(scope='module')
-def settings() -> dict[str, object]:
-    """Have a light that is lost found out soon."""
-    return {'heartbeat_timeout': 1.5, 'command_timeout': 0.2}
+from support.slow import pass_time_until
+from support.waiting import PATIENCE
 
 
 @pytest.fixture(scope='module')
@@ -68,13 +63,11 @@ class TestWhatItShows:
         light.report(enable=1, brightness=30.0, temp_c=61.5, error_status=1, strobe_period=0.5,
                      strobe_duty_cycle=20.0, mode=2)
 
-        shown = monitor.wait(lambda light: light.value('temperature') == 61.5 and light.flags
-                             and light.value('mode') == 'external_sync')
-
-        assert [shown.value(name) for name in (
-            'connected', 'enabled', 'brightness', 'strobe_period', 'strobe_duty_cycle')] == [
-                True, True, 30.0, 0.5, 20.0]
-        assert shown.flags == ['thermal throttling']
+        wanted = {'temperature': 61.5, 'mode': 'external_sync', 'connected': True,
+                  'enabled': True, 'brightness': 30.0, 'strobe_period': 0.5,
+                  'strobe_duty_cycle': 20.0}
+        monitor.wait(lambda light: all(light.value(name) == wanted[name] for name in wanted)
+                     and light.flags == ['thermal throttling'])
         light.report(mode=1)
 
     def test_link_quality_and_identity_are_those_of_the_diagnostics(
@@ -100,11 +93,11 @@ class TestWhatItShows:
     def test_a_light_that_is_lost_is_marked_and_one_that_returns_is_not(
         self, light: ServedLight, monitor: Watching,
     ) -> None:
-        light.vanish()
-        monitor.wait(lambda light: light.value('connected') is False)
+        light.fake.silent = True
+        pass_time_until(lambda: monitor.light().value('connected') is False)
         assert monitor.light().state(monitor.light().heard_at) is State.LOST
 
-        light.serve()
+        light.behave()
         monitor.wait(lambda light: light.value('connected') is True)
 
 
@@ -116,6 +109,7 @@ class TestWhatItAsks:
 
         assert 'confirmed by ILLUMINATOR_STATUS' in monitor.outcome('on', Outcome.DONE)
         assert light.fake.fields['enable'] == 1
+        monitor.wait(lambda light: light.value('enabled') is True)
 
     def test_steps_add_up_however_fast_they_come(
         self, light: ServedLight, monitor: Watching,
@@ -161,7 +155,7 @@ class TestWhatItAsks:
         monitor.ask(switch_off)
 
         monitor.outcome('off', Outcome.DONE)
-        monitor.wait(lambda light: not light.wanted)
+        pass_time_until(lambda: not monitor.light().wanted, step=0.1)
 
 
 class FakeBridge:
@@ -182,26 +176,28 @@ class FakeBridge:
             self._node.destroy_publisher(publisher)
 
 
-def test_a_service_that_does_not_answer_is_given_up(
-    own_ros: Ros, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(requests, 'ANSWER_LIMIT', 0.2)
+def test_a_service_that_does_not_answer_is_given_up(own_ros: Ros) -> None:
     release = threading.Event()
     own_ros.node.create_service(
-        SetBool, '/dead/enable', lambda request, response: release.wait(30) and response)
+        SetBool, '/dead/enable',
+        lambda request, response: release.wait(PATIENCE) and response)
     FakeBridge(own_ros, '/dead')
     with watching(own_ros) as monitor:
         monitor.wait(lambda light: light.value('enabled'), '/dead')
         try:
             # Until the service has been found there is nobody to ask.
-            answer = ''
-            while 'nobody serves' in answer or not answer:
+            def sent() -> bool:
                 monitor.ask(switch_off, '/dead')
-                answer = monitor.outcome('off', Outcome.FAILED, '/dead')
+                action = monitor.light('/dead').action
+                return action is not None and action.outcome is Outcome.PENDING
+            eventually(sent)
+
+            def given_up() -> bool:
+                action = monitor.light('/dead').action
+                return action is not None and 'no answer from /dead' in action.answer
+            pass_time_until(given_up)
         finally:
             release.set()
-
-    assert 'no answer from /dead' in answer
 
 
 def test_what_has_no_service_is_told_at_once(own_ros: Ros) -> None:

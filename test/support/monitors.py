@@ -35,20 +35,22 @@ from illuminator_ros.monitor.model import Light, Outcome
 from illuminator_ros.monitor.run import Monitor
 from rclpy.node import Node
 from support.light import eventually
-from support.processes import end_with_parent, environment, ROOT
+from support.processes import end_with_parent, environment, ROOT, slow_environment
 from support.ros import Ros
+from support.slow import CLOCK
+from support.waiting import PATIENCE
 
 # Cursor movements and colours.
 _CONTROL = re.compile(r'\x1b\[[\d;?]*[A-Za-z]')
 
 
 class Watching:
-    """A monitor that looks at the domain of a ROS client."""
+    """A monitor that looks at the domain of a ROS client, by the slow clock."""
 
     def __init__(self, ros: Ros) -> None:
         self._node = Node('monitor', context=ros.context, enable_rosout=False,
                           start_parameter_services=False)
-        self._monitor = Monitor(self._node)
+        self._monitor = Monitor(self._node, CLOCK)
 
     def close(self) -> None:
         """End it."""
@@ -66,7 +68,7 @@ class Watching:
         return light
 
     def wait(self, condition: Callable[[Light], Any], name: str = '/illuminator',
-             timeout: float = 20.0) -> Light:
+             timeout: float = PATIENCE) -> Light:
         """Wait until a light is known, and as wanted; return it."""
         eventually(lambda: name in self.names, timeout)
         eventually(lambda: condition(self.light(name)), timeout)
@@ -74,7 +76,7 @@ class Watching:
 
     def wait_names(self, *names: str) -> None:
         """Wait until these are the lights."""
-        eventually(lambda: self.names == sorted(names), 20.0)
+        eventually(lambda: self.names == sorted(names))
 
     def ask(self, ask: Ask, name: str = '/illuminator') -> None:
         """Ask something of a light."""
@@ -103,7 +105,8 @@ class Terminal:
         given = {'TERM': 'xterm-256color', 'LANG': 'C.UTF-8', 'COLUMNS': '', 'LINES': '',
                  **(env or {})}
         self._process = subprocess.Popen(
-            [sys.executable, '-m', module, *arguments], cwd=ROOT, env=environment(given),
+            [sys.executable, '-m', 'support.slow_program', module, *arguments], cwd=ROOT,
+            env=environment({**slow_environment(), **given}),
             stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
             preexec_fn=_own_terminal)
         self._grown = threading.Condition()
@@ -139,7 +142,7 @@ class Terminal:
         with self._grown:
             self._raw = b''
 
-    def wait_for(self, pattern: str, timeout: float = 20.0) -> None:
+    def wait_for(self, pattern: str, timeout: float = PATIENCE) -> None:
         """Wait until text like this has been written, spaces being as good as any number."""
         def found() -> bool:
             return bool(re.search(pattern, ' '.join(_CONTROL.sub('', self.raw).split())))
@@ -153,22 +156,24 @@ class Terminal:
 
     def wait(self) -> int:
         """Wait for the end and return the exit status."""
-        return self._process.wait(20.0)
+        return self._process.wait(PATIENCE)
 
     @property
     def restored(self) -> bool:
         """Whether the terminal behaves as it did before, and shows what it showed."""
         now = termios.tcgetattr(self._slave)
-        return now == self.before and self.raw.rindex('\x1b[?1049l') > self.raw.rindex(
-            '\x1b[?1049h') and self.raw.rindex('\x1b[?25h') > self.raw.rindex('\x1b[?25l')
+        raw = self.raw
+        # What is not found may be on its way still.
+        return now == self.before and raw.rfind('\x1b[?1049l') > raw.rindex(
+            '\x1b[?1049h') and raw.rfind('\x1b[?25h') > raw.rindex('\x1b[?25l')
 
     def close(self) -> None:
         """End it all."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGKILL)
-            self._process.wait(20.0)
+            self._process.wait(PATIENCE)
         os.close(self._slave)
-        self._reader.join(20.0)
+        self._reader.join(PATIENCE)
         os.close(self._master)
 
 

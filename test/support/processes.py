@@ -150,14 +150,18 @@ def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -
     return Program(sys.executable, '-m', module, *arguments, env=env)
 
 
+def slow_environment() -> dict[str, str]:
+    """Return what :mod:`support.slow_program` needs of an environment."""
+    from support.slow import CLOCK
+    return {'PYTHONPATH': os.pathsep.join(filter(None, (
+        str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))), **CLOCK.environment}
+
+
 def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
     """Start a module of ours that lives by the tests' slow clock, see :mod:`support.slow`."""
-    from support.slow import CLOCK
     return Program(
         sys.executable, '-m', 'support.slow_program', module, *arguments,
-        env={'PYTHONPATH': os.pathsep.join(filter(None, (
-            str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
-             **CLOCK.environment, **(env or {})})
+        env={**slow_environment(), **(env or {})})
 
 
 def run(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Any:

@@ -16,14 +16,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 import signal
 import sys
 from typing import Any
 
-# Where each of them has the link that it makes.
+# Where each of them has what it makes that has a clock: a link, or a monitor.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.process',
-          'illuminator_ros.simulator': 'illuminator_ros.simulator.run'}
+          'illuminator_ros.simulator': 'illuminator_ros.simulator.run',
+          'illuminator_ros.monitor': 'illuminator_ros.monitor.run'}
 
 
 def main(module: str) -> int:
@@ -31,10 +33,13 @@ def main(module: str) -> int:
     # As the module does before it imports anything: of the threads that start meanwhile, none
     # is to take a signal.
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-    from support.slow import SlowLink
+    from support.slow import CLOCK, SlowLink
     from support.waiting import PATIENCE
     place: Any = import_module(PLACES[module])
-    place.Link = SlowLink
+    if hasattr(place, 'Link'):
+        place.Link = SlowLink
+    if hasattr(place, 'Monitor'):
+        place.Monitor = partial(place.Monitor, clock=CLOCK)
     # What it takes to end in order on a busy machine it is to have.
     import_module('illuminator_ros.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):

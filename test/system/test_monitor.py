@@ -93,7 +93,8 @@ class TestWithoutATerminal:
 
     def test_it_prints_a_table_and_ends(self, own_ros: Ros) -> None:
         port = free_port()
-        with (running_bridge(own_ros.domain, port), ServedLight(port, brightness=30.0)):
+        with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port, brightness=30.0)):
+            bridge.wait_for('connected')
             outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
 
         heading, row = outcome.stdout.splitlines()
