@@ -34,8 +34,9 @@ PREPARED = 1024
 COMMON = ('ATTITUDE',) * 5 + ('GLOBAL_POSITION_INT',) * 5 + ('VFR_HUD',) * 3 + (
     'RAW_IMU', 'RAW_IMU', 'SYS_STATUS', 'GPS_RAW_INT', 'GPS_RAW_INT', 'RC_CHANNELS',
     'RC_CHANNELS', 'SERVO_OUTPUT_RAW', 'SERVO_OUTPUT_RAW', 'SCALED_PRESSURE',
-    'LOCAL_POSITION_NED', 'BATTERY_STATUS', 'VIBRATION', 'NAV_CONTROLLER_OUTPUT', 'SYSTEM_TIME',
-    'HEARTBEAT')
+    'LOCAL_POSITION_NED', 'BATTERY_STATUS', 'VIBRATION', 'NAV_CONTROLLER_OUTPUT', 'SYSTEM_TIME')
+# One of them is a heartbeat, which comes once a second.
+HEARTBEAT_EVERY = 512
 # Messages of its own dialect, which other software knows nothing of.
 ARDUPILOT = ('AHRS', 'EKF_STATUS_REPORT')
 # Bytes that may wait in a UDP socket while it is kept busy; less than any system grants.
@@ -49,6 +50,7 @@ def frames(names: Sequence[str] = (*COMMON, *ARDUPILOT), count: int = PREPARED) 
     sender = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)
     order = [names[number % len(names)] for number in range(count)]
     draw.shuffle(order)
+    order[::HEARTBEAT_EVERY] = ['HEARTBEAT'] * len(order[::HEARTBEAT_EVERY])
     made = []
     for number, name in enumerate(order):
         sender.seq = number & 0xFF

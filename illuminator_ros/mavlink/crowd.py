@@ -19,17 +19,22 @@ from __future__ import annotations
 import math
 
 # s for which frames collect on a busy link. Waking up for one costs more than looking at ten.
-COLLECTION = 0.01
+COLLECTION = 0.02
 # s for which every frame is taken at once after something was sent that may be answered.
 HURRY = 1.0
+# Frames that may collect: a UDP socket has room for twice as many wherever Linux is left as it is.
+ROOM = 128
+# s for which nothing collects after more had come than was read at a time.
+FLOOD = 10.0
 
 
 class Crowd:
     """
     Decides whether it is worth waiting for several frames at once.
 
-    It is where frames for others come more often than every two :data:`COLLECTION` and nothing
-    is expected. A light's status may then be late by one of them; an answer never is.
+    It is where frames for others come more often than every two :data:`COLLECTION`, no flood of
+    them, and nothing is expected. A light's status may then be late by one of them; an answer
+    never is.
     """
 
     def __init__(self) -> None:
@@ -37,14 +42,18 @@ class Crowd:
         self._hurry_until = -math.inf
         self._dense = False
 
-    def passed(self, now: float) -> None:
-        """Note that frames for others have come, and nothing else."""
-        self._dense = now - self._passed_at < 2 * COLLECTION
-        self._passed_at = now
+    def passed(self, frames: int, now: float) -> None:
+        """Note that so many frames for others have come, and nothing else."""
+        gap, self._passed_at = now - self._passed_at, now
+        self._dense = gap < 2 * COLLECTION and 0 < frames * COLLECTION < ROOM * gap
+
+    def flooded(self, now: float) -> None:
+        """Note that more has come than was read at a time."""
+        self._hurry_until = max(self._hurry_until, now + FLOOD)
 
     def asked(self, now: float) -> None:
         """Note that something was sent that may be answered."""
-        self._hurry_until = now + HURRY
+        self._hurry_until = max(self._hurry_until, now + HURRY)
 
     def collects(self, now: float) -> bool:
         """Return whether to wait before the next look; asked once before each."""

@@ -220,7 +220,9 @@ LAYOUTS: dict[int, Layout] = {
     for id_, cls in {**_common.mavlink_map, **HANDLED}.items()
 }
 
-# The CRC_EXTRA of those that are not decoded, by the three bytes that hold the id in a frame.
+# As they stand in a frame, three bytes: the ids of what is decoded, and the CRC_EXTRA of what
+# can be checked and is not.
+HANDLED_IDS = frozenset(id_.to_bytes(3, 'little') for id_ in HANDLED)
 FOREIGN: dict[bytes, bytes] = {
     id_.to_bytes(3, 'little'): bytes((layout.crc_extra,))
     for id_, layout in LAYOUTS.items() if id_ not in HANDLED

@@ -29,7 +29,7 @@ import re
 
 from fastcrc.crc16 import mcrf4xx
 
-from .dialect import FOREIGN, Layout, LAYOUTS, Source
+from .dialect import FOREIGN, HANDLED_IDS, Layout, LAYOUTS, Source
 
 STX_V1 = 0xFE
 STX_V2 = 0xFD
@@ -180,24 +180,31 @@ class Decoder:
 
     def _pass_over(self, data: bytes, start: int, known: Known) -> int:
         """
-        Pass over good, whole, unsigned and foreign frames of known sources.
+        Pass over whole, unsigned and foreign frames of known sources, if they are good.
 
-        Most of what a busy link carries is of this kind, so it is made nothing of.
+        Most of what a busy link carries is of this kind, so it is made nothing of. What cannot be
+        checked, since its id is unknown, is searched for a beginning as everywhere.
 
         :param start: where a frame may begin.
         :return: where something else begins.
         """
         size = len(data)
         passed = 0
-        while start < size:
-            end = start + HEADER_V2 + CHECKSUM
-            try:
-                end += data[start + 1]
-                crc_extra = FOREIGN[data[start + 7:start + HEADER_V2]]
-                count = known[data[start + 5:start + 7]]
-            except (IndexError, KeyError):
-                break
-            if (data[start] != STX_V2 or data[start + 2] or end > size
+        while (start_of_payload := start + HEADER_V2) < size and data[start] == STX_V2:
+            id_ = data[start + 7:start_of_payload]
+            crc_extra = FOREIGN.get(id_)
+            if crc_extra is None:
+                if id_ in HANDLED_IDS:
+                    break
+                match = _START.search(data, start + 1)
+                begin = match.start() if match else size
+                self.counters.unknown_ids += 1
+                self.counters.skipped_bytes += begin - start
+                start = begin
+                continue
+            count = known.get(data[start + 5:start + 7])
+            end = start_of_payload + CHECKSUM + data[start + 1]
+            if (count is None or data[start + 2] or end > size
                     or mcrf4xx(data[start + 1:end - CHECKSUM] + crc_extra)
                     != data[end - 2] | data[end - 1] << 8):
                 break

@@ -156,8 +156,8 @@ class Link:
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
         self._stirred = False
-        # Whether something has come, if only for others.
-        self._passed_over = False
+        # Frames that had come, good ones, when it was last looked.
+        self._frames_before = 0
         self._crowd = Crowd()
         self._calls_only = select.poll()
         self._calls_only.register(self._wake_out, select.POLLIN)
@@ -249,9 +249,9 @@ class Link:
         now = self.clock()
         if self._stirred or self._calls or now >= due:
             self._work()
-        elif self._passed_over:
-            self._crowd.passed(now)
-        self._passed_over = False
+        elif frames := self._reception.counters.frames - self._frames_before:
+            self._crowd.passed(frames, now)
+        self._frames_before = self._reception.counters.frames
 
     def _work(self) -> None:
         """Do what others asked for, and what is due."""
@@ -305,6 +305,8 @@ class Link:
                     self._take(self._channel, peer, data)
                     if self._channel is None:
                         return
+                if self._channel.more:
+                    self._crowd.flooded(self.clock())
         except OSError as error:
             self._lost(error)
 
@@ -312,7 +314,6 @@ class Link:
         self._traffic.bytes_received += len(data)
         now = self.clock()
         frames = self._reception.take(peer, data, now, self._wall_clock())
-        self._passed_over = True
         if frames:
             for frame in frames:
                 self._accept(channel, peer, frame, now)
@@ -321,17 +322,18 @@ class Link:
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if self._departure.is_echo(frame, now):
             return
-        self._stirred = True
         if not self._spoken:
-            self._spoken = True
+            self._spoken = self._stirred = True
             self._opener.answered()
             self._announce_again(channel, now)
         self._knock_at = now + SILENCE
         counter = self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
+            self._stirred = True
             self._guarded(self.endpoint.link_opened, now)
         self._routes.heard(frame.source, peer, now)
         if frame.message_id in HANDLED:
+            self._stirred = True
             self._guarded(self.endpoint.receive, frame.source,
                           decode_payload(frame.message_id, frame.payload), now)
         if counter is not None:

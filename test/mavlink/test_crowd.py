@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.crowd import COLLECTION, Crowd, HURRY
+from illuminator_ros.mavlink.crowd import COLLECTION, Crowd, FLOOD, HURRY, ROOM
 import pytest
 
 
@@ -24,8 +24,8 @@ import pytest
 def crowd() -> Crowd:
     """Return a link on which frames for others came at 10 s and just after."""
     one = Crowd()
-    one.passed(10.0)
-    one.passed(10.0 + COLLECTION)
+    one.passed(1, 10.0)
+    one.passed(1, 10.0 + COLLECTION)
     return one
 
 
@@ -35,7 +35,7 @@ def test_nothing_collects_where_nothing_came() -> None:
 
 def test_a_single_frame_makes_no_crowd() -> None:
     crowd = Crowd()
-    crowd.passed(10.0)
+    crowd.passed(1, 10.0)
     assert not crowd.collects(10.0)
 
 
@@ -44,8 +44,15 @@ def test_frames_in_quick_succession_do(crowd: Crowd) -> None:
 
 
 def test_frames_now_and_then_do_not(crowd: Crowd) -> None:
-    crowd.passed(10.0 + 4 * COLLECTION)
+    crowd.passed(1, 10.0 + 4 * COLLECTION)
+    assert not crowd.collects(10.2)
+
+
+def test_frames_that_there_would_be_no_room_for_do_not(crowd: Crowd) -> None:
+    crowd.passed(ROOM // 2, 10.0 + 1.5 * COLLECTION)
     assert not crowd.collects(10.1)
+    crowd.passed(ROOM // 2 - 1, 10.0 + 2 * COLLECTION)
+    assert crowd.collects(10.1)
 
 
 def test_a_wait_in_which_nothing_came_is_the_last(crowd: Crowd) -> None:
@@ -56,6 +63,15 @@ def test_a_wait_in_which_nothing_came_is_the_last(crowd: Crowd) -> None:
 def test_nothing_collects_while_an_answer_may_come(crowd: Crowd) -> None:
     crowd.asked(10.1)
     assert not crowd.collects(10.1 + HURRY - 0.01)
-    crowd.passed(20.0)
-    crowd.passed(20.0)
-    assert crowd.collects(20.0)
+    crowd.passed(1, 20.0)
+    crowd.passed(1, 20.0 + COLLECTION)
+    assert crowd.collects(20.1)
+
+
+def test_nothing_collects_for_a_while_after_a_flood(crowd: Crowd) -> None:
+    crowd.flooded(10.1)
+    crowd.asked(10.1)
+    assert not crowd.collects(10.1 + FLOOD - 0.01)
+    crowd.passed(1, 30.0)
+    crowd.passed(1, 30.0 + COLLECTION)
+    assert crowd.collects(30.1)

@@ -85,6 +85,8 @@ pieces = st.one_of(
     st.integers(0, 255).map(foreign_frame),
     st.integers(0, 255).map(lambda n: foreign_frame(n, LIGHT)),
     st.integers(0, 255).map(lambda n: frame_of(sequence=n, source=AUTOPILOT)),
+    st.binary(min_size=1, max_size=30).map(
+        lambda payload: raw_v2(12345, payload, crc_extra=0, source=AUTOPILOT)),
     st.integers(0, 255).map(lambda n: raw_v1(30, bytes(28), sequence=n, source=AUTOPILOT)),
     st.integers(0, 255).map(lambda n: raw_v2(
         30, bytes(9), sequence=n, source=AUTOPILOT, incompat=FLAG_SIGNED) + bytes(range(13))),

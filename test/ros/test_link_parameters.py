@@ -26,10 +26,6 @@ INTERVAL = MavCmd.SET_MESSAGE_INTERVAL
 STATUS = 440.0
 
 
-def enable(ros: Ros) -> SetBool.Response:
-    return ros.call(SetBool, '/illuminator/enable', SetBool.Request(data=True))
-
-
 def test_our_address_is_1_194_by_default(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port), ServedLight(port) as light:
         light.wait_for(MavCmd.REQUEST_MESSAGE)
@@ -65,7 +61,7 @@ def test_a_light_that_has_restarted_is_asked_again(own_ros: Ros, port: int) -> N
 
 def test_the_light_s_own_interval_is_left_alone_by_default(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port), ServedLight(port) as light:
-        assert enable(own_ros).success
+        Parameters(own_ros).wait(brightness=100.0)
 
         assert light.commands(INTERVAL) == []
 

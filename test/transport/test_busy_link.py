@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from illuminator_ros.mavlink.crowd import COLLECTION
 from illuminator_ros.mavlink.dialect import CommandLong
-from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
+from illuminator_ros.mavlink.transport.udp import BATCH, PEER_EXPIRY
 import pytest
 from support.frames import AUTOPILOT, foreign_frame, LIGHT
 from support.heartbeats import heartbeat_frame
@@ -28,6 +28,8 @@ from support.live_link import BRIDGE, LiveLink, Talker
 from support.simulated_link import SimulatedLink
 
 PEER = ('127.0.0.1', 14550)
+# s between frames.
+GAP = 0.005
 COMMAND = CommandLong(*LIGHT, 512, 0, 440, 0, 0, 0, 0, 0, 0)
 
 
@@ -42,6 +44,7 @@ def link(endpoint: Talker) -> SimulatedLink:
     """Return a link that has just heard two frames for others."""
     one = SimulatedLink(endpoint, lambda data, peer: None)
     for sequence in range(3):
+        one.run(GAP)
         one.receive((foreign_frame(sequence), PEER))
     return one
 
@@ -92,12 +95,32 @@ def test_a_frame_for_us_is_taken_with_them(link: SimulatedLink, endpoint: Talker
     assert [source for source, _ in endpoint.heard] == [LIGHT]
 
 
+def test_nothing_collects_after_more_has_come_than_is_read_at_a_time(link: SimulatedLink) -> None:
+    flood = [(foreign_frame(number & 0xFF), PEER) for number in range(3, 4 + BATCH)]
+    link.receive(*flood)
+    link.collected_at.clear()
+    for sequence in range(10):
+        link.run(GAP)
+        link.receive((foreign_frame(sequence), PEER))
+    assert link.collected_at == []
+
+
+def test_nothing_collects_in_the_midst_of_a_burst(link: SimulatedLink) -> None:
+    link.run(0.5)
+    link.collected_at.clear()
+    for sequence in range(3, 43):
+        link.run(GAP / 100)
+        link.receive((foreign_frame(sequence), PEER))
+    assert link.collected_at == []
+
+
 def test_nothing_collects_once_something_was_asked(
     link: SimulatedLink, endpoint: Talker,
 ) -> None:
     link.ask(lambda now: endpoint.outgoing.append((BRIDGE, COMMAND)))
     link.collected_at.clear()
     for sequence in range(3, 10):
+        link.run(GAP)
         link.receive((foreign_frame(sequence), PEER))
     assert link.collected_at == []
 

@@ -40,10 +40,12 @@ class Channel(ABC):
 
     :ivar name: what it is, for people.
     :ivar dropped: frames that were not sent because the line or the kernel was full.
+    :ivar more: whether there may be more than was read last.
     """
 
     name: str = ''
     dropped: int = 0
+    more: bool = False
 
     @abstractmethod
     def register(self, selector: selectors.BaseSelector) -> None:

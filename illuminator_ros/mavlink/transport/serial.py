@@ -30,7 +30,8 @@ from ..url import SerialUrl
 if TYPE_CHECKING:
     from serial import Serial
 
-READ_SIZE = 4096
+# The kernel keeps no more of what has come.
+READ_SIZE = 4095
 
 
 def open_serial(url: SerialUrl) -> Channel:
@@ -82,6 +83,7 @@ class _SerialChannel(Channel):
             raise ChannelLost(error.errno, error.strerror) from None
         if not data:
             raise ChannelLost('the device is gone')
+        self.more = len(data) == READ_SIZE
         yield None, data
 
     def peers(self, now: float) -> Sequence[Peer]:

@@ -39,7 +39,7 @@ EXPIRY = 10.0
 # We have no descriptors or memory left to accept with.
 NO_ROOM = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
 # Bytes read before other work gets its turn.
-READ_SIZE = 4096
+READ_SIZE = 16 * 1024
 
 
 class _Stream:
@@ -104,6 +104,7 @@ class TcpClient(Channel):
         if data == b'':
             raise ChannelLost('the other side closed the connection')
         if data:
+            self.more = len(data) == READ_SIZE
             yield None, data
 
     def peers(self, now: float) -> Sequence[Peer]:
@@ -197,6 +198,7 @@ class TcpServer(Channel):
         if data == b'':
             self._drop(handle)
         elif data:
+            self.more = len(data) == READ_SIZE
             yield handle, data
 
     def _accept(self) -> None:

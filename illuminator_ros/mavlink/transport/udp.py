@@ -33,7 +33,7 @@ MAX_PEERS = 32
 # s without a checked frame, after which a peer is forgotten. MAVSDK takes 10 s too.
 PEER_EXPIRY = 10.0
 # Datagrams read before other work gets its turn.
-BATCH = 64
+BATCH = 128
 # Bytes of frames in one datagram: what passes an Ethernet in one piece.
 MAX_DATAGRAM = 1400
 # What a flight controller sends at once must fit; the kernel may allow less.
@@ -88,17 +88,33 @@ class UdpChannel(Channel):
     def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         receive = self._socket.recvfrom
+        # What one peer has sent is looked at together: that costs a third of each by itself.
+        sender: Any = None
+        datagrams: list[bytes] = []
+        lost = None
+        self.more = True
         for _ in range(BATCH):
             try:
-                data, peer = receive(65536)
+                datagram, peer = receive(65536)
             except BlockingIOError:
-                return
+                self.more = False
+                break
             except ConnectionError:
                 continue
             except OSError as error:
-                raise ChannelLost(error.errno, error.strerror) from None
-            if self._hears_all or _same_host(peer, self._remote):
-                yield peer, data
+                lost = ChannelLost(error.errno, error.strerror)
+                break
+            if peer != sender:
+                yield from self._heard_of(sender, datagrams)
+                sender, datagrams = peer, []
+            datagrams.append(datagram)
+        yield from self._heard_of(sender, datagrams)
+        if lost:
+            raise lost
+
+    def _heard_of(self, peer: Any, datagrams: list[bytes]) -> Iterator[tuple[Peer, bytes]]:
+        if datagrams and (self._hears_all or _same_host(peer, self._remote)):
+            yield peer, b''.join(datagrams)
 
     def peers(self, now: float) -> Sequence[Peer]:
         """See :meth:`Channel.peers`."""
