@@ -211,6 +211,14 @@ def test_monitor_page_has_the_limits_of_the_code(text: str) -> None:
     assert text in MONITOR
 
 
+def test_design_page_has_each_module() -> None:
+    _, tree, _ = DESIGN.split('```', 2)
+    modules = {path.name for folder in ('', 'conformance', 'illuminator', 'mavlink', 'monitor',
+                                        'ros', 'simulator')
+               for path in (ROOT / 'illuminator_ros' / folder).glob('[!_]*.py')}
+    assert set(re.findall(r'\w+\.py', tree)) == modules
+
+
 def test_design_page_has_the_bounds_of_the_code() -> None:
     constants = [constant for cells in table(DESIGN, 'store')
                  for constant in re.findall(r'`([\w.]+)`', cells[1])]
