@@ -101,6 +101,8 @@ def _wrong(what: str) -> int:
 
 
 def _serve(arguments: list[str], termination: Termination) -> int:
+    import gc
+
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
@@ -120,6 +122,9 @@ def _serve(arguments: list[str], termination: Termination) -> int:
         process = BridgeProcess(node, arguments)
     except ParameterError as error:
         return _wrong(f'parameter {error}')
+    # What is there now stays: to look for garbage among it would only hold up an answer.
+    gc.collect()
+    gc.freeze()
     termination.calls(process.end)
     process.run()
     rclpy.try_shutdown()

@@ -35,8 +35,8 @@ STATUS_TOPICS: dict[str, Any] = {
 }
 
 
-def status_messages(status: Status) -> dict[str, Any]:
-    """Return the message for each topic; none for what is not believable in the status."""
+def status_values(status: Status) -> dict[str, Any]:
+    """Return what goes on each topic; nothing for what is not believable in the status."""
     values = {
         'enabled': status.enabled,
         'brightness': status.brightness,
@@ -46,8 +46,7 @@ def status_messages(status: Status) -> dict[str, Any]:
         'error_flags': status.error_flags,
         'uptime': status.uptime_ms / 1000.0,
     }
-    return {name: STATUS_TOPICS[name](data=value)
-            for name, value in values.items() if value is not None}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def temperature_message(temperature: float, stamp: Any, frame_id: str) -> Temperature:

@@ -27,7 +27,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool
 
-from .conversions import status_messages, STATUS_TOPICS, temperature_message
+from .conversions import STATUS_TOPICS, status_values, temperature_message
 from .parameters import DEVICE_SPECS, period_range
 from ..illuminator.light import Light
 from ..illuminator.model import Configuration, FIELDS, Identity, Limits, Mode, shortest, Status
@@ -114,8 +114,8 @@ class Outputs(LightObserver):
     def status(self, light: Light, status: Status) -> None:
         """See :meth:`LightObserver.status`."""
         self._enabled = status.enabled
-        for name, message in status_messages(status).items():
-            self._publishers[name].publish(message)
+        for name, value in status_values(status).items():
+            self._publishers[name].publish(STATUS_TOPICS[name](data=value))
         temperature = light.temperature
         if temperature is not None:
             stamp = self._node.get_clock().now().to_msg()

@@ -40,7 +40,7 @@ def test_our_address_is_1_194_by_default(own_ros: Ros, port: int) -> None:
 def test_our_address_is_what_system_id_and_component_id_say(own_ros: Ros, port: int) -> None:
     with (running_bridge(own_ros.domain, port, system_id=7, component_id=42),
           ServedLight(port) as light):
-        assert enable(own_ros).success
+        light.wait_for(MavCmd.REQUEST_MESSAGE)
 
         assert light.fake.heard_from == {Source(7, 42)}
 
