@@ -219,6 +219,23 @@ def test_design_page_has_each_module() -> None:
     assert set(re.findall(r'\w+\.py', tree)) == modules
 
 
+def test_design_page_sends_nobody_to_what_is_not_there() -> None:
+    modules = list((ROOT / 'illuminator_ros').rglob('*.py'))
+    code = '\n'.join(path.read_text() for path in modules)
+    files = {path.name for path in (*modules, *(ROOT / 'test').rglob('*.py'))}
+    names = {name for cells in table(DESIGN, 'what | where') for cell in cells
+             for name in re.findall('`([^`]+)`', cell)}
+
+    def is_there(name: str) -> bool:
+        if re.search(r'/|\.py$', name):
+            return name in files or any(
+                (ROOT / folder / name).exists() for folder in ('', 'illuminator_ros'))
+        return re.search(rf'\b{name.rpartition(".")[2]}\b', code) is not None
+
+    assert len(names) > 30
+    assert [name for name in sorted(names) if not is_there(name)] == []
+
+
 def test_design_page_has_the_bounds_of_the_code() -> None:
     constants = [constant for cells in table(DESIGN, 'store')
                  for constant in re.findall(r'`([\w.]+)`', cells[1])]
