@@ -12,4 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The MAVLink illuminator protocol, both sides. No ROS, no sockets, no clock."""
+"""
+The MAVLink illuminator protocol, both sides. No ROS, no sockets, no clock.
+
+Throughout, ``now``, deadlines and limits are s on a monotonic clock.
+https://mavlink.io/en/services/illuminator.html
+"""

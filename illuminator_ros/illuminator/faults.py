@@ -179,7 +179,11 @@ def with_fault(behaviour: Behaviour, text: str) -> Behaviour:
 
 
 def without_fault(behaviour: Behaviour, normal: Behaviour, name: str) -> Behaviour:
-    """Return a behaviour in which one thing is as it normally is."""
+    """
+    Return a behaviour in which one thing is as it normally is.
+
+    :raises FaultError: if there is no such fault.
+    """
     field = find(name).field
     return replace(behaviour, **{field: getattr(normal, field)})
 

@@ -40,8 +40,8 @@ class Settings:
     """
     How lights are treated.
 
-    :param heartbeat_timeout: s without a heartbeat or status, after which a light is lost.
-    :param status_interval: s between statuses to ask the light for; 0 leaves its own.
+    :param heartbeat_timeout: s, > 0, without a heartbeat or status, after which a light is lost.
+    :param status_interval: s, >= 0, between statuses to ask the light for; 0 leaves its own.
     :param restore_configuration: whether a light that has restarted gets the agreed
         configuration again.
     """

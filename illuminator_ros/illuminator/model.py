@@ -105,7 +105,8 @@ class Limits:
     """
     The strobe periods that a light reports to be possible, s.
 
-    Both 0 means that it does not say: ArduSub sends zeros for what it does not know.
+    As sent, so they may be anything: see :attr:`known`. Both 0 means that it does not say: ArduSub
+    sends zeros for what it does not know.
     """
 
     min_strobe_period: float = 0.0
@@ -128,7 +129,7 @@ class Configuration:
     What MAV_CMD_DO_ILLUMINATOR_CONFIGURE carries.
 
     :param brightness: %, 0..100.
-    :param strobe_period: s, >= 0; 0 means no strobe.
+    :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`; 0 means no strobe.
     :param strobe_duty_cycle: %, 0..100.
     """
 
@@ -138,7 +139,7 @@ class Configuration:
     strobe_duty_cycle: float
 
     def with_changes(self, changes: Mapping[str, Any]) -> Configuration:
-        """Return this configuration with some of its fields replaced."""
+        """Return this configuration with some of its fields, already checked, replaced."""
         return replace(self, **changes)
 
     def params(self) -> tuple[float, float, float, float]:
@@ -232,7 +233,7 @@ class Status:
     :param mode_bitmask: as sent; lights differ in what it means.
     :param error_flags: as sent; see :class:`ErrorFlag`.
     :param brightness: %, 0..100.
-    :param strobe_period: s, >= 0.
+    :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.
     :param temperature: degC, as sent: 0 may mean "not measured".
     """

@@ -12,4 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""MAVLink for any payload: framing, commands, transports. No ROS, and nothing about lights."""
+"""
+MAVLink for any payload: framing, commands, transports. No ROS, and nothing about lights.
+
+Throughout, ``now``, deadlines and limits are s on a monotonic clock, and ``unix_time`` is s since
+1970.
+"""

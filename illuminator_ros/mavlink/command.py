@@ -175,6 +175,7 @@ class CommandSender:
     :param identity: our own address, which acknowledgements are matched against.
     :param timeout: s, > 0: the longest wait for the acknowledgement of one try.
     :param retries: resends after the first try, >= 0.
+    :raises ValueError: if one of the two is out of its range.
     """
 
     send: Callable[[Any], None]

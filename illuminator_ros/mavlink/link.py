@@ -174,7 +174,11 @@ class Link:
                 self._thread.start()
 
     def stop(self, timeout: float = 1.0) -> None:
-        """End the thread, s at most, and close the transport; it cannot be started again."""
+        """
+        End the thread and close the transport; it cannot be started again.
+
+        :param timeout: how long to wait for the thread, s.
+        """
         with self._starting:
             self._stopping.set()
             if self._thread.ident is None:

@@ -33,7 +33,7 @@ class RoundTrip:
         self._samples: deque[float] = deque(maxlen=WINDOW)
 
     def add(self, seconds: float) -> None:
-        """Take a sample."""
+        """Take a sample, s."""
         self._samples.append(seconds)
 
     def quantile(self, share: float) -> float | None:
@@ -44,7 +44,11 @@ class RoundTrip:
         return ordered[min(int(share * len(ordered)), len(ordered) - 1)]
 
     def timeout(self, longest: float) -> float:
-        """Return the wait for an acknowledgement: four times the 95th percentile, bounded."""
+        """
+        Return the wait for an acknowledgement, s: four times the 95th percentile, bounded.
+
+        :param longest: s; what it is while less than :data:`ENOUGH` samples are known.
+        """
         slow = self.quantile(0.95)
         if slow is None or len(self._samples) < ENOUGH:
             return longest

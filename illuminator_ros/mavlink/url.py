@@ -77,7 +77,7 @@ class TcpUrl:
 
 @dataclass(frozen=True)
 class SerialUrl:
-    """A serial port: device path, baud rate and RTS/CTS flow control."""
+    """A serial port: device path, rate (Bd, up to :data:`MAX_BAUD`) and RTS/CTS flow control."""
 
     device: str
     baud: int

@@ -16,7 +16,8 @@
 What an operator is told on /diagnostics: two statuses, one for the link and one for the lamp.
 
 Pure functions: from the state of link and light to DiagnosticStatus (REP 107). Keys bear their
-unit, and a value that is a number is nothing but that number, so that it can be plotted.
+unit, and a value that is a number is nothing but that number, so that it can be plotted. ``now``
+and ``started``, when the node was, are s on the link's clock.
 """
 
 from __future__ import annotations
@@ -212,6 +213,6 @@ def lamp_status(node_name: str, hardware_id: str, light: Light, now: float) -> D
 
 
 def hardware_id(light: Light) -> str:
-    """Return the id of a light: its serial number, else its address."""
+    """Return the id of a light: its serial number, else its address as ``mavlink:1/243``."""
     identity = light.identification.identity
     return (identity.serial_number if identity else '') or f'mavlink:{light.source}'

@@ -46,8 +46,10 @@ class ParameterSpec:
     One parameter.
 
     :param default: its type is that of the parameter; for one of the light only the type counts.
-    :param low: and ``high``, the range of a number.
+    :param unit: of the value and of its range, '' for none.
+    :param low: and ``high``, the range of a number, both ends included.
     :param choices: the values of a string, where they are few.
+    :param constraints: what else the value has to be, for people.
     """
 
     name: str
@@ -60,7 +62,11 @@ class ParameterSpec:
     constraints: str = ''
 
     def descriptor(self, *, read_only: bool, high: float | None = None) -> ParameterDescriptor:
-        """Return the descriptor that tools show."""
+        """
+        Return the descriptor that tools show.
+
+        :param high: the upper end of the range where it is another than that of the table.
+        """
         unit = f' [{self.unit}]' if self.unit else ''
         constraints = self.constraints
         if self.choices:
@@ -151,7 +157,7 @@ DEVICE_SPECS = {spec.name: spec for spec in DEVICE_PARAMETERS}
 
 @dataclass(frozen=True)
 class LinkParameters:
-    """The link parameters, checked."""
+    """The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges."""
 
     url: Url
     identity: Source

@@ -23,11 +23,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.embedded import resting_bridge
 from support.light import ServedLight
+from support.processes import ROOT
 from support.recording import Recorder
 from support.ros import Ros, running_bridge, STREAM
 from support.slow import CLOCK
 
 INFORMATION = 396
+PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 # What is text by nature; all other values are one number or true or false.
 TEXTS = {'url', 'address', 'mode', 'agreed', 'vendor', 'model', 'software_version',
          'hardware_version', 'serial_number', 'node'}
@@ -161,6 +163,14 @@ class TestValues:
     @pytest.mark.parametrize(('part', 'keys'), [('link', LINK_KEYS), ('lamp', LAMP_KEYS)])
     def test_the_keys(self, recorder: Recorder, part: str, keys: set[str]) -> None:
         assert set(wait_for(recorder, part)) == keys
+
+    @pytest.mark.parametrize('part', ['link', 'lamp'])
+    def test_the_protocol_page_has_the_keys(self, recorder: Recorder, part: str) -> None:
+        _, _, rest = PROTOCOL.partition(f'| value of `illuminator: {part}` |')
+        rows = rest.partition('\n\n')[0].splitlines()[2:]
+        named = [key for row in rows for key in re.findall('`([^`]+)`', row.split('|')[1])]
+
+        assert sorted(wait_for(recorder, part)) == sorted([*named, 'node'])
 
     @pytest.mark.parametrize('part', ['link', 'lamp'])
     def test_what_is_no_text_is_one_number_or_a_truth_value(

@@ -18,10 +18,17 @@ from importlib import import_module
 from pathlib import Path
 import re
 from typing import Any
+from xml.etree import ElementTree
 
 from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
 from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.mavlink.dialect import (
+    CommandAck,
+    ComponentInformationBasic,
+    IlluminatorStatus,
+    MavCmd,
+)
 from illuminator_ros.monitor import graph, keys, model, requests
 from illuminator_ros.monitor.options import parser
 from illuminator_ros.ros import beam, beam_output, mounting
@@ -62,25 +69,65 @@ def table(document: str, first_heading: str) -> list[list[str]]:
     return found
 
 
-def test_readme_has_each_link_parameter_with_its_default_and_meaning() -> None:
-    def row(spec: ParameterSpec) -> list[str]:
-        default = '' if spec.default in ('', ['']) else f'`{spec.default}`'
-        return [f'`{spec.name}`', f'{default} {spec.unit}'.strip()]
+def range_of(spec: ParameterSpec) -> str:
+    """Return what tools show of the values that a parameter may have, as the README writes it."""
+    descriptor = spec.descriptor(read_only=False)
+    _, found, choices = descriptor.additional_constraints.partition('one of: ')
+    if found:
+        return ', '.join(f'`{choice}`' for choice in choices.split(', '))
+    return ', '.join(f'{limits.from_value:g} to {limits.to_value:g}' for limits in (
+        *descriptor.floating_point_range, *descriptor.integer_range))
 
-    rows = table(README, 'parameter of the link')
-    assert [cells[:2] for cells in rows] == [row(spec) for spec in LINK_PARAMETERS]
+
+def meaning_of(spec: ParameterSpec) -> str:
+    """Return what tools show of the meaning of a parameter, without its choices and unit."""
+    extra = spec.descriptor(read_only=False).additional_constraints
+    return spec.description if not extra or spec.choices else f'{spec.description}; {extra}'
 
 
-def test_readme_has_each_parameter_of_the_light() -> None:
-    rows = table(README, 'parameter of the light')
-    assert [cells[0] for cells in rows] == [f'`{spec.name}`' for spec in DEVICE_PARAMETERS]
-    assert [cells[3] for cells in rows] == [spec.unit for spec in DEVICE_PARAMETERS]
+@pytest.mark.parametrize('spec', LINK_PARAMETERS, ids=lambda spec: spec.name)
+def test_readme_has_each_parameter_of_the_link_as_tools_show_it(spec: ParameterSpec) -> None:
+    rows = {cells[0]: cells[1:] for cells in table(README, 'parameter of the link')}
+    default = '' if spec.default in ('', ['']) else f'`{spec.default}`'
+
+    *cells, meaning = rows[f'`{spec.name}`']
+
+    assert cells == [default, range_of(spec), spec.unit]
+    assert meaning.replace('`', '') == meaning_of(spec)
+
+
+@pytest.mark.parametrize('spec', DEVICE_PARAMETERS, ids=lambda spec: spec.name)
+def test_readme_has_each_parameter_of_the_light_as_tools_show_it(spec: ParameterSpec) -> None:
+    rows = {cells[0]: cells[1:] for cells in table(README, 'parameter of the light')}
+    kind = {float: 'double', str: 'string'}[type(spec.default)]
+
+    assert rows[f'`{spec.name}`'] == [kind, range_of(spec), spec.unit, meaning_of(spec)]
+
+
+@pytest.mark.parametrize(('heading', 'specs'), [
+    ('parameter of the link', LINK_PARAMETERS), ('parameter of the light', DEVICE_PARAMETERS)])
+def test_readme_has_no_other_parameters(heading: str, specs: tuple[ParameterSpec, ...]) -> None:
+    assert [cells[0] for cells in table(README, heading)] == [f'`{spec.name}`' for spec in specs]
 
 
 def test_readme_has_each_status_topic_with_its_type() -> None:
     rows = {cells[0]: cells[1] for cells in table(README, 'published')}
     for name, type_ in STATUS_TOPICS.items():
         assert rows[f'`~/{name}`'] == f'`std_msgs/{type_.__name__}`'
+
+
+@pytest.mark.parametrize(('heading', 'actions'), [
+    ('published', {'publish'}), ('accepted', {'subscribe', 'reply'})])
+def test_readme_has_each_topic_and_service_of_the_policy(
+    heading: str, actions: set[str],
+) -> None:
+    # test_security_policy.py compares the policy with the running node.
+    policy = ElementTree.parse(ROOT / 'config' / 'sros2' / 'illuminator.policy.xml')
+    names = {
+        name.text for rules in policy.iterfind('.//profile[@node="illuminator"]/*')
+        if actions & set(rules.attrib) for name in rules
+        if not re.search('parameter|logger|type_description|rosout|clock', str(name.text))}
+    assert {cells[0].strip('`') for cells in table(README, heading)} == names
 
 
 def test_yaml_has_each_link_parameter_with_its_default() -> None:
@@ -106,6 +153,22 @@ def test_yaml_tells_the_unit(spec: ParameterSpec) -> None:
 @pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)
 def test_help_has_each_parameter(spec: Any) -> None:
     assert re.search(rf'^  {spec.name} +.*{re.escape(spec.description)}', usage(), re.MULTILINE)
+
+
+@pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],
+                         ids=lambda message: message.msgname)
+def test_protocol_page_has_each_field_of_a_message(message: Any) -> None:
+    fields: dict[str, set[str]] = {}
+    name = ''
+    for cells in table(PROTOCOL, 'message'):
+        name = cells[0] or name
+        fields.setdefault(name, set()).update(re.findall('`([^`]+)`', cells[1]))
+    assert fields[message.msgname] == set(message.fieldnames)
+
+
+def test_protocol_page_has_each_command_with_its_number() -> None:
+    rows = {cells[0] for cells in table(PROTOCOL, 'command')}
+    assert rows == {f'MAV_CMD_{command.name} ({command.value})' for command in MavCmd}
 
 
 def test_protocol_page_has_each_flag_with_its_level_and_text() -> None:
@@ -146,6 +209,31 @@ def test_monitor_page_has_each_state() -> None:
         ', `error_flags`', ' and `error_flags`')])
 def test_monitor_page_has_the_limits_of_the_code(text: str) -> None:
     assert text in MONITOR
+
+
+def test_design_page_has_each_module() -> None:
+    _, tree, _ = DESIGN.split('```', 2)
+    modules = {path.name for folder in ('', 'conformance', 'illuminator', 'mavlink', 'monitor',
+                                        'ros', 'simulator')
+               for path in (ROOT / 'illuminator_ros' / folder).glob('[!_]*.py')}
+    assert set(re.findall(r'\w+\.py', tree)) == modules
+
+
+def test_design_page_sends_nobody_to_what_is_not_there() -> None:
+    modules = list((ROOT / 'illuminator_ros').rglob('*.py'))
+    code = '\n'.join(path.read_text() for path in modules)
+    files = {path.name for path in (*modules, *(ROOT / 'test').rglob('*.py'))}
+    names = {name for cells in table(DESIGN, 'what | where') for cell in cells
+             for name in re.findall('`([^`]+)`', cell)}
+
+    def is_there(name: str) -> bool:
+        if re.search(r'/|\.py$', name):
+            return name in files or any(
+                (ROOT / folder / name).exists() for folder in ('', 'illuminator_ros'))
+        return re.search(rf'\b{name.rpartition(".")[2]}\b', code) is not None
+
+    assert len(names) > 30
+    assert [name for name in sorted(names) if not is_there(name)] == []
 
 
 def test_design_page_has_the_bounds_of_the_code() -> None:
