@@ -224,4 +224,5 @@ def _light(bench: Bench) -> str:
         return 'no light'
     identity: Any = Identity.from_message(bench.informations[-1]) if bench.informations else None
     names = [] if identity is None else [identity.vendor, identity.model, identity.serial_number]
-    return f'light {bench.found}: {", ".join(filter(None, names)) or "says nothing of itself"}'
+    told = ', '.join(filter(None, names))
+    return f'light {bench.found}' + (f': {told}' if told else '')
