@@ -43,7 +43,7 @@ class Crowd:
         self._dense = False
 
     def passed(self, frames: int, now: float) -> None:
-        """Note that so many frames for others have come, and nothing else."""
+        """Note that so many frames for others have come."""
         gap, self._passed_at = now - self._passed_at, now
         self._dense = gap < 2 * COLLECTION and 0 < frames * COLLECTION < ROOM * gap
 

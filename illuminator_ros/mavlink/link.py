@@ -156,8 +156,8 @@ class Link:
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
         self._stirred = False
-        # Frames that had come, good ones, when it was last looked.
-        self._frames_before = 0
+        # Good frames that had come when it was last looked, and those for us since.
+        self._frames_seen = 0
         self._crowd = Crowd()
         self._calls_only = select.poll()
         self._calls_only.register(self._wake_out, select.POLLIN)
@@ -251,11 +251,12 @@ class Link:
             elif self._channel is not None:
                 self._serve(key.fileobj, events)
         now = self.clock()
+        frames = self._reception.counters.frames
+        if frames > self._frames_seen:
+            self._crowd.passed(frames - self._frames_seen, now)
+            self._frames_seen = frames
         if self._stirred or self._calls or now >= due:
             self._work()
-        elif frames := self._reception.counters.frames - self._frames_before:
-            self._crowd.passed(frames, now)
-        self._frames_before = self._reception.counters.frames
 
     def _work(self) -> None:
         """Do what others asked for, and what is due."""
@@ -337,6 +338,7 @@ class Link:
             self._guarded(self.endpoint.link_opened, now)
         self._routes.heard(frame.source, peer, now)
         if frame.message_id in HANDLED:
+            self._frames_seen += 1
             self._stirred = True
             self._guarded(self.endpoint.receive, frame.source,
                           decode_payload(frame.message_id, frame.payload), now)

@@ -41,11 +41,12 @@ def endpoint() -> Talker:
 
 @pytest.fixture
 def link(endpoint: Talker) -> SimulatedLink:
-    """Return a link that has just heard two frames for others."""
+    """Return a link that has just heard some frames for others."""
     one = SimulatedLink(endpoint, lambda data, peer: None)
     for sequence in range(3):
         one.run(GAP)
         one.receive((foreign_frame(sequence), PEER))
+    one.collected_at.clear()
     return one
 
 
@@ -111,6 +112,15 @@ def test_nothing_collects_in_the_midst_of_a_burst(link: SimulatedLink) -> None:
     for sequence in range(3, 43):
         link.run(GAP / 100)
         link.receive((foreign_frame(sequence), PEER))
+    assert link.collected_at == []
+
+
+def test_frames_for_us_do_not_collect(link: SimulatedLink) -> None:
+    link.run(0.5)
+    link.collected_at.clear()
+    for sequence in range(10):
+        link.receive((heartbeat_frame(LIGHT, sequence=sequence), PEER))
+        link.run(GAP)
     assert link.collected_at == []
 
 
