@@ -24,7 +24,7 @@ COLLECTION = 0.02
 HURRY = 1.0
 # Frames that may collect: a UDP socket has room for twice as many wherever Linux is left as it is.
 ROOM = 128
-# s for which nothing collects after more had come than was read at a time.
+# s for which nothing collects after there was no room for all that had.
 FLOOD = 10.0
 
 
@@ -39,17 +39,24 @@ class Crowd:
 
     def __init__(self) -> None:
         self._passed_at = -math.inf
+        self._frames = 0
         self._hurry_until = -math.inf
         self._dense = False
 
-    def passed(self, frames: int, now: float) -> None:
-        """Note that so many frames for others have come."""
-        gap, self._passed_at = now - self._passed_at, now
-        self._dense = gap < 2 * COLLECTION and 0 < frames * COLLECTION < ROOM * gap
+    def passed(self, frames: int, now: float, *, more: bool = False) -> None:
+        """
+        Note that so many frames for others have come.
 
-    def flooded(self, now: float) -> None:
-        """Note that more has come than was read at a time."""
-        self._hurry_until = max(self._hurry_until, now + FLOOD)
+        :param more: whether that may not have been all, so that the next look belongs to this.
+        """
+        self._frames += frames
+        if more:
+            return
+        gap, self._passed_at = now - self._passed_at, now
+        self._dense = gap < 2 * COLLECTION and self._frames * COLLECTION < ROOM * gap
+        if self._frames >= 2 * ROOM:
+            self._hurry_until = max(self._hurry_until, now + FLOOD)
+        self._frames = 0
 
     def asked(self, now: float) -> None:
         """Note that something was sent that may be answered."""

@@ -253,7 +253,8 @@ class Link:
         now = self.clock()
         frames = self._reception.counters.frames
         if frames > self._frames_seen:
-            self._crowd.passed(frames - self._frames_seen, now)
+            more = self._channel is not None and self._channel.more
+            self._crowd.passed(frames - self._frames_seen, now, more=more)
             self._frames_seen = frames
         if self._stirred or self._calls or now >= due:
             self._work()
@@ -310,8 +311,6 @@ class Link:
                     self._take(self._channel, peer, data)
                     if self._channel is None:
                         return
-                if self._channel.more:
-                    self._crowd.flooded(self.clock())
         except OSError as error:
             self._lost(error)
 

@@ -68,8 +68,24 @@ def test_nothing_collects_while_an_answer_may_come(crowd: Crowd) -> None:
     assert crowd.collects(20.1)
 
 
+def test_nothing_collects_before_all_has_been_read(crowd: Crowd) -> None:
+    assert crowd.collects(10.1)
+    crowd.passed(ROOM // 2, 10.0 + 2 * COLLECTION, more=True)
+    assert not crowd.collects(10.1)
+    crowd.passed(ROOM // 2 - 1, 10.0 + 2 * COLLECTION)
+    assert crowd.collects(10.1)
+
+
+def test_what_is_read_in_several_looks_needs_room_together(crowd: Crowd) -> None:
+    assert crowd.collects(10.1)
+    crowd.passed(ROOM // 2, 10.0 + 2 * COLLECTION, more=True)
+    crowd.passed(ROOM // 2, 10.0 + 2 * COLLECTION)
+    assert not crowd.collects(10.1)
+
+
 def test_nothing_collects_for_a_while_after_a_flood(crowd: Crowd) -> None:
-    crowd.flooded(10.1)
+    crowd.passed(2 * ROOM - 1, 10.1, more=True)
+    crowd.passed(1, 10.1)
     crowd.asked(10.1)
     assert not crowd.collects(10.1 + FLOOD - 0.01)
     crowd.passed(1, 30.0)
