@@ -88,7 +88,8 @@ class UdpChannel(Channel):
     def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         receive = self._socket.recvfrom
-        # What one peer has sent is looked at together: that costs a third of each by itself.
+        # What one peer has sent is looked at together: that costs a third of each by itself. Not
+        # so the first, which is most often alone, and may be waited for.
         sender: Any = None
         datagrams: list[bytes] = []
         lost = None
@@ -106,8 +107,10 @@ class UdpChannel(Channel):
                 break
             if peer != sender:
                 yield from self._heard_of(sender, datagrams)
+                yield from self._heard_of(peer, [datagram])
                 sender, datagrams = peer, []
-            datagrams.append(datagram)
+            else:
+                datagrams.append(datagram)
         yield from self._heard_of(sender, datagrams)
         if lost:
             raise lost
