@@ -29,11 +29,9 @@ import threading
 import time
 from typing import Any
 
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from std_srvs.srv import SetBool
 from support.processes import Program, python, ROOT
+from support.spun import SpunNode
 
 __all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory',
            'PATIENCE', 'peer', 'PEERS', 'Program', 'python', 'ROOT', 'running', 'settle',
@@ -135,34 +133,18 @@ def _ready(program: Program, text: str) -> Iterator[Program]:
         yield program
 
 
-class Client:
-    """
-    A ROS node that is spun in a thread.
-
-    ``spin_until_future_complete`` would poll, and measure that.
-    """
+class Client(SpunNode):
+    """A ROS node to measure with."""
 
     def __init__(self, domain: int) -> None:
-        self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain)
-        self.node = rclpy.create_node(f'bench_{next(_numbers)}', context=self.context)
+        super().__init__(f'bench_{next(_numbers)}', domain)
         self._clients: dict[str, Any] = {}
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
-
-    def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
-            self._executor.spin()
 
     def __enter__(self) -> Client:
         return self
 
     def __exit__(self, *error: object) -> None:
-        rclpy.try_shutdown(context=self.context)
-        self._thread.join(5.0)
-        self.node.destroy_node()
+        self.close()
 
     def client(self, service: str) -> Any:
         """Return the client of a SetBool service, there or not."""

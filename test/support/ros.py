@@ -20,7 +20,6 @@ from collections.abc import Iterable, Iterator
 import contextlib
 import os
 from pathlib import Path
-import threading
 from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
@@ -32,9 +31,6 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
@@ -43,6 +39,7 @@ from support.ports import claimed_domain
 from support.processes import ended, Program, python, slow_python
 from support.recording import Call, Recorder
 from support.slow import CLOCK
+from support.spun import SpunNode
 from support.waiting import PATIENCE
 
 STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
@@ -62,30 +59,14 @@ def own_domain() -> Iterator[int]:
         yield domain
 
 
-class Ros:
-    """A node of the test's own, spun in a thread: what is waited for comes by itself."""
+class Ros(SpunNode):
+    """A node of the test's own."""
 
     def __init__(self, domain: int) -> None:
         self.domain = domain
-        self.context = Context()
-        rclpy.init(context=self.context, domain_id=domain)
-        self.node = rclpy.create_node('tester', context=self.context)
         self._clients: dict[str, tuple[Any, set[bytes]]] = {}
         self._publishers: dict[str, Any] = {}
-        self._executor = SingleThreadedExecutor(context=self.context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
-
-    def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
-            self._executor.spin()
-
-    def close(self) -> None:
-        """Leave the graph."""
-        rclpy.try_shutdown(context=self.context)
-        self._thread.join(PATIENCE)
-        self.node.destroy_node()
+        super().__init__('tester', domain)
 
     def find_publisher(self, topic: str) -> None:
         """Wait until a topic is published."""
