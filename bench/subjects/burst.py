@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
+from pathlib import Path
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -33,6 +34,8 @@ from ..traffic import COMMON, frames, udp_line
 OURS, RECV_MATCH = 'bridge', 'recv_match'
 BURST, AT_ONCE, INTERVAL = 20_000, 1000, 0.05
 LINK = 'illuminator: link'
+# Bytes that the kernel lets a socket keep at most; the bridge asks for 4 MiB.
+RMEM_MAX = Path('/proc/sys/net/core/rmem_max')
 
 
 def measure(bench: Bench) -> Iterator[Row]:
@@ -69,7 +72,8 @@ def measure(bench: Bench) -> Iterator[Row]:
     yield Row(f'frames lost of bursts of {size:,}, {AT_ONCE:,} per {INTERVAL * 1e3:g} ms', '%',
               one(share[OURS]), {RECV_MATCH: one(share[RECV_MATCH])},
               [at_most(lost[OURS], 0, 'frames')],
-              f'{lost[OURS]:,} and {lost[RECV_MATCH]:,} of {sent[OURS]:,} each')
+              f'{lost[OURS]:,} and {lost[RECV_MATCH]:,} of {sent[OURS]:,} each; '
+              f'net.core.rmem_max is {int(RMEM_MAX.read_text()):,}')
 
 
 def link_values(arrays: list[DiagnosticArray]) -> dict[str, str]:
