@@ -49,6 +49,8 @@ from ..mavlink.endpoint import Heartbeat as HeartbeatTimer
 # s. The developer guide's own tests wait 3 s for an acknowledgement.
 ACK_TIMEOUT = 3.0
 PROGRESS_TIMEOUT = 4.0
+# s after which a command that is still reported to be in progress is not waited for any more.
+PROGRESS_LIMIT = 15.0
 TRIES = 4
 # s in which a message that was requested or a change that was accepted has to show.
 SHOW_TIMEOUT = 1.0
@@ -344,8 +346,8 @@ class Bench(Endpoint):
 
     async def _answered(self, one: Transaction) -> bool:
         """Wait for the result of a try, as long as progress is reported."""
-        timeout = ACK_TIMEOUT
-        while True:
+        timeout, until = ACK_TIMEOUT, self.now + PROGRESS_LIMIT
+        while self.now < until:
             seen = len(one.acks)
             await self.more(one.acks, seen, timeout)
             if one.finals:

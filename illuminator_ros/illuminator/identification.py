@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 # s from the acknowledgement to the message.
 MESSAGE_TIMEOUT = 0.5
+# s after which it is asked for again where something more urgent went before.
+WAY_TIME = 1.0
 # How often a message that was acknowledged and has not come is asked for: it may be lost.
 MAX_QUESTIONS = 3
 # s after which whoever needs an id for the light takes what there is.
@@ -54,6 +56,8 @@ class Identification:
         self._asking = False
         self._questions = 0
         self._first_asked = math.inf
+        self._command: Command | None = None
+        self._gives_way = False
 
     def settled(self, now: float) -> bool:
         """Return whether the identity is known, or will not be known soon."""
@@ -74,9 +78,21 @@ class Identification:
     def _send(self, now: float) -> None:
         self._questions += 1
         self._message_until = math.inf
-        self._light.sender.start(
-            Command(self._light.source, MavCmd.REQUEST_MESSAGE, (float(INFORMATION_ID),)),
-            now, self._answered)
+        self._command = Command(
+            self._light.source, MavCmd.REQUEST_MESSAGE, (float(INFORMATION_ID),))
+        self._light.sender.start(self._command, now, self._answered)
+
+    def give_way(self, now: float) -> None:
+        """
+        Let another message be requested first, and ask again later.
+
+        One request is under way at a time, and a light that does not answer this one would hold
+        up the status that somebody waits for.
+        """
+        if self._command is not None:
+            self._gives_way = True
+            self._light.sender.withdraw(self._command, now)
+            self._gives_way = False
 
     def received(self, identity: Identity, now: float) -> None:
         """Take the message."""
@@ -85,6 +101,10 @@ class Identification:
 
     def _answered(self, outcome: Outcome, now: float) -> None:
         if not self._asking:
+            return
+        if self._gives_way:
+            self._questions -= 1
+            self._message_until = now + WAY_TIME
             return
         if outcome.accepted:
             self._message_until = now + MESSAGE_TIMEOUT

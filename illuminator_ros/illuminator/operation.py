@@ -149,6 +149,7 @@ class Operation(ABC):
 
     def _ask(self, now: float) -> None:
         self._ask_at = now + ASK_INTERVAL
+        self.light.identification.give_way(now)
         self.light.request_status(now)
 
     def status(self, status: Status, sent_by: float, now: float) -> None:

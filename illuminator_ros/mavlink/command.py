@@ -216,6 +216,12 @@ class CommandSender:
         """Return whether a command of this kind is under way."""
         return (target, command) in self._active
 
+    def withdraw(self, command: Command, now: float) -> None:
+        """End a command that is under way, if it is; one of its kind that waits goes out."""
+        entry = self._active.get(command.key)
+        if entry is not None and entry.command is command:
+            self._end(entry, Ending.CANCELLED, now)
+
     def round_trip(self, target: Source) -> RoundTrip:
         """Return the round-trip times of a target's acknowledgements."""
         return self._round_trips.setdefault(target, RoundTrip())

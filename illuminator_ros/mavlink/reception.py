@@ -50,6 +50,8 @@ class _Stream:
         self.decoder = Decoder(counters=counters)
         self.known: dict[bytes, Callable[[int], None]] = {}
         self.renewal = 0.0
+        # Whether anything to be believed has ever come.
+        self.good = False
 
 
 class Reception:
@@ -84,11 +86,16 @@ class Reception:
         frames = decoder.feed(data, stream.known)
         if decoder.incomplete is not None or self._waits:
             self._watch(peer, decoder, now)
-        return self._believed(frames, unix_time) if frames else frames
+        if frames:
+            frames = self._believed(frames, unix_time)
+            stream.good = stream.good or bool(frames)
+        return frames
 
     def _new_stream(self, peer: Peer) -> _Stream:
         if len(self._streams) >= MAX_DECODERS:
-            oldest = next(iter(self._streams))
+            # Garbage from ever new ports takes nothing from those that send good frames.
+            oldest = next((old for old, stream in self._streams.items() if not stream.good),
+                          next(iter(self._streams)))
             del self._streams[oldest]
             self._waits.pop(oldest, None)
         self._streams[peer] = stream = _Stream(self.counters)

@@ -105,6 +105,11 @@ class SequenceCounter:
         """Forget the numbers but not the counts: what comes next follows on nothing."""
         self._newest = self._next = -1
 
+    def forgive(self) -> None:
+        """Have nothing lost lately: the sender has begun to count anew, so numbers are missing."""
+        self._lost_lately = Lately()
+        self._received_lately = Lately()
+
     def recent_loss(self, now: float) -> float:
         """Return the share of frames lost lately, %."""
         lost = self._lost_lately.over(self.lost, now)

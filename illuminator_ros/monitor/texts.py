@@ -26,6 +26,8 @@ BLOCKS = '▁▂▃▄▅▆▇█'
 ASCII_BLOCKS = '_.-=+*%#'
 # K; less than that between coldest and hottest is a flat line: a tenth of a degree is no news.
 SMALLEST_SPAN = 4.0
+# degC that no line has room for.
+HIGHEST = 1e6
 
 
 def bar(value: float | None, width: int, *, ascii_only: bool = False) -> str:
@@ -40,6 +42,8 @@ def bar(value: float | None, width: int, *, ascii_only: bool = False) -> str:
 def sparkline(values: Sequence[float | None], *, ascii_only: bool = False) -> str:
     """Return a line of a character for each value, a space where there is none."""
     blocks = ASCII_BLOCKS if ascii_only else BLOCKS
+    # Anybody can publish a temperature, and the difference of two must be a number.
+    values = [None if value is None else min(max(value, -HIGHEST), HIGHEST) for value in values]
     known = [value for value in values if value is not None]
     if not known:
         return ' ' * len(values)

@@ -23,7 +23,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from .handover import Handover
+from .handover import Handover, Newest
 from ..illuminator.fleet import enable_all
 from ..illuminator.light import Light
 from ..illuminator.operation import Result
@@ -48,6 +48,7 @@ class FleetInputs:
         self._name = name
         self._absent = absent
         self._handover: Handover[Result] = Handover(node, link)
+        self._switching = Newest(self._switch_to)
         group = self._handover.group
         node.create_service(SetBool, '~/enable_all', self._enable_all, callback_group=group)
         node.create_subscription(Bool, '~/cmd/enable_all', self._cmd_enable_all, 10,
@@ -73,7 +74,10 @@ class FleetInputs:
         return response
 
     async def _cmd_enable_all(self, message: Any) -> None:
-        result = await self._ask(message.data)
+        await self._switching.want(bool(message.data))
+
+    async def _switch_to(self, on: bool) -> None:
+        result = await self._ask(on)
         if not result.success:
             self._node.get_logger().warning(
                 f'~/cmd/enable_all: {result.message}', throttle_duration_sec=5.0)

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 import threading
 import time
 from typing import Any, Generic, TypeVar
@@ -35,6 +35,33 @@ PATIENCE = 0.002
 # s for which the link's thread then stands back, so that the answer is on its way before what
 # else a status brings with it: two threads of Python do not run at once.
 COURTESY = 0.001
+
+
+class Newest(Generic[T]):
+    """
+    Does what a topic asks for, one after the other: of what comes meanwhile only the newest.
+
+    For callbacks of one executor's thread.
+
+    :param do: does it, and returns when it is done.
+    """
+
+    def __init__(self, do: Callable[[T], Awaitable[None]]) -> None:
+        self._do = do
+        self._wanted: list[T] = []
+        self._doing = False
+
+    async def want(self, value: T) -> None:
+        """Have a value done, unless a newer one overtakes it."""
+        self._wanted[:] = [value]
+        if self._doing:
+            return
+        self._doing = True
+        try:
+            while self._wanted:
+                await self._do(self._wanted.pop())
+        finally:
+            self._doing = False
 
 
 class _Meeting:

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 
-from .handover import Handover
+from .handover import Handover, Newest
 from .parameter_services import ParameterServices
 from ..illuminator.light import Light
 from ..illuminator.model import checked, InvalidValue
@@ -54,9 +54,7 @@ class Inputs:
         self._handover: Handover[Result] = Handover(node, link)
         self._setpoint: float | None = None
         self._setting = threading.Lock()
-        # The newest on ~/cmd/enable that is still to be done, and whether one is under way.
-        self._switch: bool | None = None
-        self._switching = False
+        self._switching = Newest(self._switch_to)
         group = self._handover.group
         node.create_service(SetBool, '~/enable', self._enable, callback_group=group)
         node.create_service(Trigger, '~/refresh', self._refresh, callback_group=group)
@@ -103,17 +101,7 @@ class Inputs:
         return light.limits if light else None
 
     async def _cmd_enable(self, message: Any) -> None:
-        """Switch; what comes while a switch is under way waits, and only the newest of it."""
-        waiting, self._switch = self._switch, bool(message.data)
-        if waiting is not None or self._switching:
-            return
-        self._switching = True
-        try:
-            while self._switch is not None:
-                on, self._switch = self._switch, None
-                await self._switch_to(on)
-        finally:
-            self._switching = False
+        await self._switching.want(bool(message.data))
 
     async def _switch_to(self, on: bool) -> None:
         result = await self.ask(lambda light, now, done: light.enable(on, now, done))

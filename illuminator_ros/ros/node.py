@@ -80,7 +80,8 @@ class IlluminatorNode(Node):
         for warning in misspelt(self):
             self.get_logger().warning(warning)
         self._beam = BeamOutput(self, mounting, link.clock) if mounting.beam_range else None
-        self.outputs = Outputs(self, mounting.frame_id, self._check_lamp, self._beam)
+        self.outputs = Outputs(
+            self, mounting.frame_id, self._check_lamp, self._beam, self._forgive_loss)
         self.inputs = Inputs(self, link, lambda: self.light, self.absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._period = period
@@ -141,6 +142,12 @@ class IlluminatorNode(Node):
         if light is not None and self._levels[1:] not in (
                 [], [level(lamp_findings(light, self._link.clock()))]):
             self.publish_diagnostics()
+
+    def _forgive_loss(self) -> None:
+        """Take the step back of a restarted light's sequence numbers for no loss of frames."""
+        counter = self.light and self._link.state().traffic.sources.get(self.light.source)
+        if counter:
+            counter.forgive()
 
     def publish_diagnostics(self) -> None:
         """Publish both statuses, or only the link's while it is open who the light is."""

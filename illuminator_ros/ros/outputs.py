@@ -46,16 +46,18 @@ class Outputs(LightObserver):
 
     :param changed: called after anything that diagnostics might have to tell at once.
     :param beam: who also is told what to show, if anybody is.
+    :param begun_anew: called when the light has restarted.
     """
 
     def __init__(
         self, node: Node, frame_id: str, changed: Callable[[], None],
-        beam: LightObserver | None = None,
+        beam: LightObserver | None = None, begun_anew: Callable[[], None] = lambda: None,
     ) -> None:
         self._node = node
         self._beam = beam or LightObserver()
         self._frame_id = frame_id
         self._changed = changed
+        self._begun_anew = begun_anew
         self._publishers = {name: node.create_publisher(type_, f'~/{name}', STATE_QOS)
                             for name, type_ in STATUS_TOPICS.items()}
         self._temperature = node.create_publisher(Temperature, '~/temperature', STREAM_QOS)
@@ -96,6 +98,7 @@ class Outputs(LightObserver):
 
     def restarted(self, light: Light) -> None:
         """See :meth:`LightObserver.restarted`."""
+        self._begun_anew()
         logger = self._node.get_logger()
         logger.info(f'light {light.source} has restarted', throttle_duration_sec=1.0)
         if self._enabled and light.status and light.status.enabled is False:

@@ -161,3 +161,9 @@ def test_the_reason_and_what_was_said_stand_in_the_finding():
 
 def test_a_light_without_faults_behaves_as_the_protocol_says():
     assert DeviceProperties().behaviour == Behaviour()
+
+
+def test_a_change_that_is_in_progress_for_ever_does_not_hold_up_the_run():
+    run = Run(faults=('progress=3600',), only=('on', 'off')).finish()
+    assert run.failed == {'on', 'off'}
+    assert 'no acknowledgement' in run.result('on').detail

@@ -109,6 +109,28 @@ def test_whoever_asks_while_it_is_being_asked_for_waits_for_the_same_answer(fake
     assert answers == [''] * 5
 
 
+class _Nameless(FakeLight):
+    """A light that takes no notice of being asked for its identity."""
+
+    def receive(self, source, message, now):
+        if getattr(message, 'param1', None) != INFORMATION_ID:
+            super().receive(source, message, now)
+
+
+@pytest.mark.parametrize('change', [
+    lambda pair: pair.enable(True), lambda pair: pair.configure(brightness=33.0)])
+def test_it_does_not_hold_up_the_status_that_shows_a_change(change):
+    pair = Pair(_Nameless(stream=0.0))
+    pair.run_until(lambda: pair.controller.lights and pair.light.status)
+    pair.run(0.1)
+    before = len(questions(pair))
+    assert change(pair).success
+    # And it is asked for again.
+    pair.run(10.0)
+    assert len(questions(pair)) > before
+    assert pair.light.identification.failure == 'no acknowledgement'
+
+
 def test_it_is_settled_when_it_is_known(pair):
     assert pair.light.identification.settled(pair.now)
 

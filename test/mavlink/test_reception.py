@@ -121,6 +121,17 @@ def test_a_peer_that_had_to_go_is_heard_again(reception: Reception) -> None:
     assert sources(reception.take(0, heartbeat_frame(), 0.0, UNIX)) == [LIGHT]
 
 
+def test_garbage_of_many_peers_does_not_cost_a_good_one_its_incomplete_frame(
+    reception: Reception,
+) -> None:
+    frame = heartbeat_frame()
+    reception.take('a', frame + frame[:9], 0.0, UNIX)
+    for number in range(10 * MAX_DECODERS):
+        reception.take(number, FALSE_STARTS[0], 0.0, UNIX)
+    assert len(reception) == MAX_DECODERS
+    assert sources(reception.take('a', frame[9:], 0.1, UNIX)) == [LIGHT]
+
+
 def test_what_is_not_to_be_believed_does_not_come_through() -> None:
     reception = Reception(Signing(SigningMode.REQUIRE, bytes(32)))
     assert reception.take('a', heartbeat_frame(), 0.0, UNIX) == []

@@ -233,3 +233,6 @@ class TestSparkline:
 
     def test_without_values_it_is_empty(self) -> None:
         assert sparkline([None, None]) == '  '
+
+    def test_temperatures_that_cannot_be_are_drawn_all_the_same(self) -> None:
+        assert sparkline([-1.7e308, 1.7e308]) == f'{BLOCKS[0]}{BLOCKS[-1]}'

@@ -112,6 +112,19 @@ class TestArray:
             [1000.0 + number * period for number in range(11)], abs=late * tick + 1e-6)
 
 
+def test_a_restart_of_the_light_is_no_loss_of_frames(
+    recorder: Recorder, light: ServedLight,
+) -> None:
+    before = wait_for(recorder, 'lamp')
+    assert wait_for(recorder, 'link')['loss_percent'] == '0'
+
+    light.lose_frames(60)
+    light.restart()
+
+    wait_for(recorder, 'lamp', lambda values: values['restarts'] != before['restarts'])
+    assert wait_for(recorder, 'link')['loss_percent'] == '0'
+
+
 class TestHardwareId:
 
     def test_the_link_s_is_its_url(self, recorder: Recorder) -> None:

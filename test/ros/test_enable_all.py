@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 import contextlib
+import math
 
 import pytest
 from std_msgs.msg import Bool
@@ -23,7 +24,7 @@ from std_srvs.srv import SetBool
 from support.light import eventually, ON_OFF, ServedLight, Source
 from support.ports import free_port
 from support.processes import Program
-from support.ros import Ros, running_bridge
+from support.ros import Parameters, Ros, running_bridge
 
 # s; the default.
 HEARTBEAT_TIMEOUT = 3.0
@@ -110,6 +111,23 @@ def test_a_lost_light_is_named_and_does_not_count(
 def test_the_topic_does_the_same(ros: Ros, lights: list[ServedLight]) -> None:
     ros.publish(Bool, '/illuminator/cmd/enable_all', True)
     eventually(lambda: are_on(lights) == [True] * 3)
+
+
+def test_of_what_comes_on_the_topic_while_it_switches_only_the_newest_is_done(
+    ros: Ros, fleet: tuple[Program, list[ServedLight]], lights: list[ServedLight],
+) -> None:
+    lights[1].fake.delays[ON_OFF] = math.inf
+    ros.publish(Bool, '/illuminator/cmd/enable_all', *[True] * 50)
+    lights[1].wait_for(ON_OFF)
+    ros.publish(Bool, '/illuminator/cmd/enable_all', False)
+    # The node has taken what came before it answers.
+    Parameters(ros).get('frame_id')
+
+    lights[1].release(ON_OFF)
+
+    eventually(lambda: all(light.commands(ON_OFF)[-1:] and not light.commands(ON_OFF)[-1].param1
+                           for light in lights))
+    assert all(len(light.commands(ON_OFF)) < 10 for light in lights)
 
 
 def test_the_topic_warns_of_what_failed(

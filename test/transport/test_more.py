@@ -128,3 +128,16 @@ def test_what_came_before_the_channel_was_lost_is_not_lost(ours: OpenChannel) ->
     with pytest.raises(ChannelLost):
         next(coming)
     channel._socket = real
+
+
+def test_of_large_datagrams_only_a_few_are_read_at_a_time(
+    channel: OpenFunction, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(udp, 'BATCH_SIZE', 10)
+    port = free_port()
+    ours = channel(f'udpin://127.0.0.1:{port}')
+    with bound_socket() as other:
+        for _ in range(SIZE):
+            other.sendto(b'garbage', ('127.0.0.1', port))
+        assert len(ours.receive_bytes(14)) == 14
+        assert ours.channel.more

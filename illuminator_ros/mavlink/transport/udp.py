@@ -32,8 +32,10 @@ from ..url import Address, UdpUrl
 MAX_PEERS = 32
 # s without a checked frame, after which a peer is forgotten. MAVSDK takes 10 s too.
 PEER_EXPIRY = 10.0
-# Datagrams read before other work gets its turn.
+# Datagrams, and bytes of them, read before other work gets its turn. Bytes of the worst kind take
+# a microsecond each to look at: without a bound, garbage would hold up all else for seconds.
 BATCH = 128
+BATCH_SIZE = 64 * 1024
 # Bytes of frames in one datagram: what passes an Ethernet in one piece.
 MAX_DATAGRAM = 1400
 # What a flight controller sends at once must fit; the kernel may allow less.
@@ -94,7 +96,10 @@ class UdpChannel(Channel):
         datagrams: list[bytes] = []
         lost = None
         self.more = True
+        size = 0
         for _ in range(BATCH):
+            if size >= BATCH_SIZE:
+                break
             try:
                 datagram, peer = receive(65536)
             except BlockingIOError:
@@ -105,6 +110,7 @@ class UdpChannel(Channel):
             except OSError as error:
                 lost = ChannelLost(error.errno, error.strerror)
                 break
+            size += len(datagram)
             if peer != sender:
                 yield from self._heard_of(sender, datagrams)
                 yield from self._heard_of(peer, [datagram])
