@@ -175,6 +175,7 @@ class CommandSender:
     :param identity: our own address, which acknowledgements are matched against.
     :param timeout: s, > 0: the longest wait for the acknowledgement of one try.
     :param retries: resends after the first try, >= 0.
+    :ivar unanswering: the targets whose last command went without any acknowledgement.
     :raises ValueError: if one of the two is out of its range.
     """
 
@@ -183,6 +184,7 @@ class CommandSender:
     timeout: float = 0.5
     retries: int = 3
     counters: CommandCounters = field(default_factory=CommandCounters)
+    unanswering: set[Source] = field(default_factory=set)
     _active: dict[tuple[Source, int], _Entry] = field(default_factory=dict)
     _waiting: dict[tuple[Source, int], deque[_Entry]] = field(default_factory=dict)
     _round_trips: dict[Source, RoundTrip] = field(default_factory=dict)
@@ -238,6 +240,7 @@ class CommandSender:
         if (ack.target_system not in (0, ours.system)
                 or ack.target_component not in (0, ours.component)):
             return
+        self.unanswering.discard(source)
         if entry is None:
             self.counters.unexpected_acks += 1
             return
@@ -318,6 +321,7 @@ class CommandSender:
     def forget(self, target: Source) -> None:
         """Drop what is known of a target that is no longer served."""
         self._round_trips.pop(target, None)
+        self.unanswering.discard(target)
 
     def _begin(self, entry: _Entry, now: float) -> None:
         self._active[entry.command.key] = entry
@@ -356,7 +360,9 @@ class CommandSender:
                 late.append(following)
         if not waiting:
             self._waiting.pop(key, None)
-        self.counters.unanswered += ending is Ending.NO_ANSWER
+        if ending is Ending.NO_ANSWER:
+            self.counters.unanswered += 1
+            self.unanswering.add(entry.command.target)
         entry.done(Outcome(
             ending, entry.result, entry.tries, now - entry.first_sent, entry.progress,
             result_param2), now)

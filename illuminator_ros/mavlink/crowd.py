@@ -34,7 +34,7 @@ class Crowd:
 
     It is where frames for others come more often than every two :data:`COLLECTION`, no flood of
     them, and nothing is expected. A light's status may then be late by one of them; an answer
-    never is.
+    only where it takes longer than :data:`HURRY`.
     """
 
     def __init__(self) -> None:

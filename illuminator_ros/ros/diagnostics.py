@@ -100,7 +100,7 @@ def link_findings(
         severity = WARN if now - started < DISCOVERY_GRACE else ERROR
         findings.append((severity, f'no illuminator heard for {format_seconds(now - started)}: '
                                    f'{why_nothing_is_heard(state)}'))
-    if state.signing.unchecked and controller.sender.counters.unanswered:
+    if state.signing.unchecked and light and light.source in controller.sender.unanswering:
         findings.append((WARN, 'commands go unanswered, and the others sign their frames while '
                                'signing_mode is off'))
     if controller.passed_over:

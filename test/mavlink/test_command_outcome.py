@@ -21,7 +21,7 @@ import math
 from illuminator_ros.mavlink.command import CommandSender, format_seconds
 from illuminator_ros.mavlink.dialect import Source
 import pytest
-from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, OURS, Rig
+from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, OURS, Rig
 
 
 @pytest.mark.parametrize('timeout', [0.0, -0.5, math.nan, math.inf])
@@ -58,6 +58,23 @@ def test_result_param2_is_kept() -> None:
     run = rig.start()
     rig.ack(DENIED, result_param2=-7)
     assert run.outcome.result_param2 == -7
+
+
+def test_who_leaves_a_command_unanswered_is_known_until_it_answers_one() -> None:
+    rig = Rig(retries=0)
+    rig.ended()
+    assert rig.sender.unanswering == {LIGHT}
+    rig.start()
+    assert rig.sender.unanswering == {LIGHT}
+    rig.ack(DENIED)
+    assert not rig.sender.unanswering
+
+
+def test_nothing_is_known_of_who_is_forgotten() -> None:
+    rig = Rig(retries=0)
+    rig.ended()
+    rig.sender.forget(LIGHT)
+    assert not rig.sender.unanswering
 
 
 def test_counters_tell_first_tries_resends_and_silence() -> None:
