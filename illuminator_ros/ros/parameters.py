@@ -61,6 +61,20 @@ class ParameterSpec:
     choices: tuple[str, ...] = ()
     constraints: str = ''
 
+    @property
+    def shown_default(self) -> str:
+        """Return the default as it is written in YAML, '' for none."""
+        if self.default in ('', ['']):
+            return ''
+        return str(self.default).lower() if isinstance(self.default, bool) else str(self.default)
+
+    @property
+    def shown_range(self) -> str:
+        """Return the range for people, ``1 to 255``, or the choices; '' if there is none."""
+        if self.low is None or self.high is None:
+            return ', '.join(self.choices)
+        return f'{self.low:g} to {self.high:g}'
+
     def descriptor(self, *, read_only: bool, high: float | None = None) -> ParameterDescriptor:
         """
         Return the descriptor that tools show.

@@ -88,7 +88,7 @@ def meaning_of(spec: ParameterSpec) -> str:
 @pytest.mark.parametrize('spec', LINK_PARAMETERS, ids=lambda spec: spec.name)
 def test_readme_has_each_parameter_of_the_link_as_tools_show_it(spec: ParameterSpec) -> None:
     rows = {cells[0]: cells[1:] for cells in table(README, 'parameter of the link')}
-    default = '' if spec.default in ('', ['']) else f'`{spec.default}`'
+    default = spec.shown_default and f'`{spec.shown_default}`'
 
     *cells, meaning = rows[f'`{spec.name}`']
 
@@ -152,7 +152,9 @@ def test_yaml_tells_the_unit(spec: ParameterSpec) -> None:
 
 @pytest.mark.parametrize('spec', [*LINK_PARAMETERS, *DEVICE_PARAMETERS], ids=lambda s: s.name)
 def test_help_has_each_parameter(spec: Any) -> None:
-    assert re.search(rf'^  {spec.name} +.*{re.escape(spec.description)}', usage(), re.MULTILINE)
+    limits = f'{range_of(spec)} {spec.unit}'.replace('`', '').strip()
+    shown = re.escape(spec.description + (f' ({limits})' if limits else ''))
+    assert re.search(rf'^  {spec.name} +.*{shown}$', usage(), re.MULTILINE)
 
 
 @pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],
