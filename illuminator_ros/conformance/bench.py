@@ -100,6 +100,8 @@ class Transaction:
     :param sent: when, s, for each try.
     :param acks: what was acknowledged, and when.
     :param expected: whether it counts as a command that every light has to answer.
+    :param not_shown: the fields in which the status does not show the change that was accepted.
+    :param disagreement: what is wrong then, None if nothing is.
     """
 
     text: str
@@ -108,6 +110,8 @@ class Transaction:
     sent: list[float] = field(default_factory=list)
     acks: list[tuple[float, Any]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
+    not_shown: list[str] = field(default_factory=list)
+    disagreement: Finding | None = None
 
     @property
     def finals(self) -> list[tuple[float, Any]]:
@@ -132,6 +136,16 @@ class Transaction:
     def finding(self, what: str = '') -> Finding:
         """Return what is wrong with the answer, and the lines that show it."""
         return f'{self.text}: {what or self.answer}', self.lines
+
+    def unmet(self, *names: str) -> Finding | None:
+        """
+        Return why a change has not been made, None if it has, or no status says otherwise.
+
+        :param names: the fields of the status that matter here.
+        """
+        if not self.accepted:
+            return self.finding()
+        return self.disagreement if set(names) & set(self.not_shown) else None
 
 
 class Bench(Endpoint):
@@ -419,9 +433,11 @@ class Bench(Endpoint):
             if self.now - since >= SHOW_TIMEOUT:
                 break
             await self.sleep(0.1)
-        self.disagreements.append((
-            f'{one.text}: then {" and ".join(differ(status))} in {status_text(status)}',
-            one.lines + self.log[begun:][-2:]))
+        one.not_shown = differ(status)
+        one.disagreement = (
+            f'{one.text}: {one.answer}, but then {" and ".join(one.not_shown)} in '
+            f'{status_text(status)}', one.lines + self.log[begun:][-2:])
+        self.disagreements.append(one.disagreement)
 
     async def refused(self, command: int, params: tuple[float, ...]) -> Finding | None:
         """Send what has to be denied; return what is wrong with the answer, None if nothing."""
