@@ -155,6 +155,8 @@ class Bench(Endpoint):
     :param target: the light; None takes the first that is heard.
     :param consent: whether the light may strobe and shine at 100 %.
     :param heat: s at 100 % in which it may get hot.
+    :param checksum_errors: returns how many frames had a wrong checksum.
+    :param link_fault: returns why the link is not open, '' if it is.
     :ivar found: the light, once it is heard.
     :ivar rest: the statuses that came before anything was asked for.
     :ivar transactions: all commands, in order.
@@ -166,12 +168,14 @@ class Bench(Endpoint):
     def __init__(
         self, identity: Source, *, target: Source | None = None, consent: bool = True,
         heat: float = 5.0, checksum_errors: Callable[[], int] = lambda: 0,
+        link_fault: Callable[[], str] = lambda: '',
     ) -> None:
         super().__init__()
         self.identity = identity
         self.consent = consent
         self.heat = heat
         self.checksum_errors = checksum_errors
+        self.link_fault = link_fault
         self.found: Source | None = None
         self.now = 0.0
         self.heard: set[Source] = set()
@@ -184,7 +188,7 @@ class Bench(Endpoint):
         self.disobediences: list[Finding] = []
         self.log: list[str] = []
         self.tidying = False
-        self._target = target
+        self.target = target
         self._began: float | None = None
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
@@ -226,8 +230,8 @@ class Bench(Endpoint):
         self._advance()
 
     def _is_light(self, source: Source, message: Any) -> bool:
-        if self._target is not None:
-            return source == self._target
+        if self.target is not None:
+            return source == self.target
         return (isinstance(message, IlluminatorStatus)
                 or isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR)
 

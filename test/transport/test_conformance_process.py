@@ -117,6 +117,16 @@ def test_without_a_light_it_is_exit_status_1(url, programs):
     assert '0 passed, 1 failed' in conformance.log
 
 
+def test_a_link_that_cannot_be_opened_is_the_verdict_in_a_few_lines(programs):
+    conformance = programs('conformance', 'tcp://127.0.0.1:1', '--wait', '0.5')
+    assert conformance.wait() == 1
+    *_, light, summary = conformance.log.splitlines()
+    assert light.startswith('no light: link not open: tcp://127.0.0.1:1: ')
+    assert summary.startswith('0 passed, 1 failed')
+    assert f'SKIPPED {len(REQUIREMENTS) - 1} requirements: ' in conformance.log
+    assert len(conformance.log.splitlines()) < 12
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     ([], 'the connection URL is missing'),
     (['udp:x:y'], "port 'y' is not a number"),
