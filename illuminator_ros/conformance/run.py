@@ -107,9 +107,12 @@ def _consent(options: argparse.Namespace) -> bool:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
     try:
-        return input(QUESTION.format(heat=options.heat)).strip().lower() in ('y', 'yes')
+        answer = input(QUESTION.format(heat=options.heat)).strip()
     except EOFError:
         return False
+    if answer.lower() not in ('y', 'yes', '', 'n', 'no'):
+        _print(f'{answer!r} is neither y nor n: taken as no')
+    return answer.lower() in ('y', 'yes')
 
 
 class _Signals:

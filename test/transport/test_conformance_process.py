@@ -184,6 +184,13 @@ def test_on_a_terminal_it_asks_before_it_dazzles(url, programs):
     assert status == 0
 
 
+def test_an_answer_that_is_neither_yes_nor_no_is_said_to_be_taken_as_no(url):
+    _, seen = conversation(
+        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
+        answers=[('[y/N]', 'maybe')])
+    assert "'maybe' is neither y nor n: taken as no" in seen
+
+
 def test_the_simulator_is_operated_on_a_terminal(url):
     status, seen = conversation(
         'illuminator_ros.simulator', f'udpin://{url}', '--light', '1/7=bow',
