@@ -439,8 +439,9 @@ class Bench(Endpoint):
             await self.sleep(0.1)
         one.not_shown = differ(status)
         one.disagreement = (
-            f'{one.text}: {one.answer}, but then {" and ".join(one.not_shown)} in '
-            f'{status_text(status)}', one.lines + self.log[begun:][-2:])
+            f'{one.text}: {one.answer}, but then the status differs in '
+            f'{" and ".join(one.not_shown)}: {status_text(status)}',
+            one.lines + self.log[begun:][-2:])
         self.disagreements.append(one.disagreement)
 
     async def refused(self, command: int, params: tuple[float, ...]) -> Finding | None:
