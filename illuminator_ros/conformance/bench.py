@@ -100,6 +100,8 @@ class Transaction:
     :param sent: when, s, for each try.
     :param acks: what was acknowledged, and when.
     :param expected: whether it counts as a command that every light has to answer.
+    :param not_shown: the fields in which the status does not show the change that was accepted.
+    :param disagreement: what is wrong then, None if nothing is.
     """
 
     text: str
@@ -108,6 +110,8 @@ class Transaction:
     sent: list[float] = field(default_factory=list)
     acks: list[tuple[float, Any]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
+    not_shown: list[str] = field(default_factory=list)
+    disagreement: Finding | None = None
 
     @property
     def finals(self) -> list[tuple[float, Any]]:
@@ -133,6 +137,16 @@ class Transaction:
         """Return what is wrong with the answer, and the lines that show it."""
         return f'{self.text}: {what or self.answer}', self.lines
 
+    def unmet(self, *names: str) -> Finding | None:
+        """
+        Return why a change has not been made, None if it has, or no status says otherwise.
+
+        :param names: the fields of the status that matter here.
+        """
+        if not self.accepted:
+            return self.finding()
+        return self.disagreement if set(names) & set(self.not_shown) else None
+
 
 class Bench(Endpoint):
     """
@@ -141,6 +155,8 @@ class Bench(Endpoint):
     :param target: the light; None takes the first that is heard.
     :param consent: whether the light may strobe and shine at 100 %.
     :param heat: s at 100 % in which it may get hot.
+    :param checksum_errors: returns how many frames had a wrong checksum.
+    :param link_fault: returns why the link is not open, '' if it is.
     :ivar found: the light, once it is heard.
     :ivar rest: the statuses that came before anything was asked for.
     :ivar transactions: all commands, in order.
@@ -152,12 +168,14 @@ class Bench(Endpoint):
     def __init__(
         self, identity: Source, *, target: Source | None = None, consent: bool = True,
         heat: float = 5.0, checksum_errors: Callable[[], int] = lambda: 0,
+        link_fault: Callable[[], str] = lambda: '',
     ) -> None:
         super().__init__()
         self.identity = identity
         self.consent = consent
         self.heat = heat
         self.checksum_errors = checksum_errors
+        self.link_fault = link_fault
         self.found: Source | None = None
         self.now = 0.0
         self.heard: set[Source] = set()
@@ -170,7 +188,7 @@ class Bench(Endpoint):
         self.disobediences: list[Finding] = []
         self.log: list[str] = []
         self.tidying = False
-        self._target = target
+        self.target = target
         self._began: float | None = None
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
@@ -212,8 +230,8 @@ class Bench(Endpoint):
         self._advance()
 
     def _is_light(self, source: Source, message: Any) -> bool:
-        if self._target is not None:
-            return source == self._target
+        if self.target is not None:
+            return source == self.target
         return (isinstance(message, IlluminatorStatus)
                 or isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR)
 
@@ -419,9 +437,12 @@ class Bench(Endpoint):
             if self.now - since >= SHOW_TIMEOUT:
                 break
             await self.sleep(0.1)
-        self.disagreements.append((
-            f'{one.text}: then {" and ".join(differ(status))} in {status_text(status)}',
-            one.lines + self.log[begun:][-2:]))
+        one.not_shown = differ(status)
+        one.disagreement = (
+            f'{one.text}: {one.answer}, but then the status differs in '
+            f'{" and ".join(one.not_shown)}: {status_text(status)}',
+            one.lines + self.log[begun:][-2:])
+        self.disagreements.append(one.disagreement)
 
     async def refused(self, command: int, params: tuple[float, ...]) -> Finding | None:
         """Send what has to be denied; return what is wrong with the answer, None if nothing."""

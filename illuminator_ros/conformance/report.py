@@ -83,6 +83,35 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
     return text
 
 
+class Table:
+    """
+    Turns results into lines for people: one line for all in a row that were not come to.
+
+    :param verbose: as in :func:`lines`.
+    """
+
+    def __init__(self, *, verbose: bool = False) -> None:
+        self._verbose = verbose
+        self._unreached: list[Result] = []
+
+    def add(self, result: Result) -> list[str]:
+        """Take a result, and return the lines that can be shown now."""
+        if not result.reached:
+            ended = []
+            if self._unreached and self._unreached[0].detail != result.detail:
+                ended = self.end()
+            self._unreached.append(result)
+            return ended
+        return [*self.end(), *lines(result, verbose=self._verbose)]
+
+    def end(self) -> list[str]:
+        """Return what has been held back."""
+        held, self._unreached = self._unreached, []
+        if len(held) < 2:
+            return [text for one in held for text in lines(one, verbose=self._verbose)]
+        return [f'{Verdict.SKIPPED.value:8}{len(held)} requirements: {held[0].detail}']
+
+
 def section(one: Requirement) -> str:
     """Return which part of the specification a requirement follows."""
     return f'{one.specification.title}, "{one.section}": {one.specification.url}'

@@ -104,6 +104,7 @@ class Result:
 
     :param detail: what is wrong, why it was skipped, or what was measured.
     :param exchange: what was sent and what came, a line each.
+    :param reached: whether there was a light to check when its turn came.
     """
 
     requirement: Requirement
@@ -111,6 +112,7 @@ class Result:
     detail: str = ''
     exchange: list[str] = field(default_factory=list)
     seconds: float = 0.0
+    reached: bool = True
 
 
 # In the order in which they are checked.

@@ -30,7 +30,7 @@ from types import FrameType
 from typing import Any
 
 from .bench import Bench
-from .report import as_json, as_junit, catalogue, lines, Report
+from .report import as_json, as_junit, catalogue, Report, Table
 from .requirement import REQUIREMENTS
 from .suite import FIND_TIMEOUT, Suite
 from .. import __version__
@@ -107,9 +107,12 @@ def _consent(options: argparse.Namespace) -> bool:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
     try:
-        return input(QUESTION.format(heat=options.heat)).strip().lower() in ('y', 'yes')
+        answer = input(QUESTION.format(heat=options.heat)).strip()
     except EOFError:
         return False
+    if answer.lower() not in ('y', 'yes', '', 'n', 'no'):
+        _print(f'{answer!r} is neither y nor n: taken as no')
+    return answer.lower() in ('y', 'yes')
 
 
 class _Signals:
@@ -135,6 +138,16 @@ def _print(*texts: str) -> None:
     # Whoever reads it through a pipe wants to have it now; who does not, does not.
     with contextlib.suppress(BrokenPipeError):
         print(*texts, sep='\n', flush=True)
+
+
+def _put(texts: _Texts, lines: list[str]) -> None:
+    if lines:
+        texts.put('\n'.join(lines))
+
+
+def _link_fault(link: Link) -> str:
+    state = link.state()
+    return '' if state.is_open else f'{state.name}: {state.reason}'
 
 
 def _show(texts: _Texts, event: LinkEvent) -> None:
@@ -180,22 +193,25 @@ def run(args: list[str] | None = None) -> int:
         return 2
     consent = _consent(options)
     bench = Bench(identity, target=options.target, consent=consent, heat=options.heat,
-                  checksum_errors=lambda: link.state().decoding.crc_errors)
+                  checksum_errors=lambda: link.state().decoding.crc_errors,
+                  link_fault=lambda: _link_fault(link))
     # Whoever does not read what is written must not hold up the link, which has times to keep.
     texts: _Texts = queue.SimpleQueue()
     link = Link(url, bench, label=options.url, on_event=functools.partial(_show, texts),
                 signing=signs, store=store)
+    table = Table(verbose=options.verbose)
     suite = Suite(bench, only=options.only, find_timeout=options.wait,
-                  on_result=lambda result: texts.put(
-                      '\n'.join(lines(result, verbose=options.verbose))))
-    return _conduct(options, link, bench, suite, texts)
+                  on_result=lambda result: _put(texts, table.add(result)))
+    return _conduct(options, link, bench, suite, table, texts)
 
 
 def _conduct(
-    options: argparse.Namespace, link: Link, bench: Bench, suite: Suite, texts: _Texts,
+    options: argparse.Namespace, link: Link, bench: Bench, suite: Suite, table: Table,
+    texts: _Texts,
 ) -> int:
     def look(now: float) -> None:
         if not bench.running:
+            _put(texts, table.end())
             texts.put(None)
 
     _Signals(lambda: link.call(bench.interrupt))
@@ -212,16 +228,16 @@ def _conduct(
             break
         _print(text)
     link.stop()
-    report = Report(options.url, _light(bench), tuple(suite.results), suite.restored,
+    report = Report(options.url, _light(bench, suite), tuple(suite.results), suite.restored,
                     link.clock() - begun, suite.passed)
     _print('', report.light, report.summary)
     written = [_write(options.junit, as_junit(report)), _write(options.json, as_json(report))]
     return 0 if suite.passed and all(written) else 1
 
 
-def _light(bench: Bench) -> str:
+def _light(bench: Bench, suite: Suite) -> str:
     if bench.found is None:
-        return 'no light'
+        return f'no light: {suite.missing}' if suite.missing else 'no light'
     identity: Any = Identity.from_message(bench.informations[-1]) if bench.informations else None
     names = [] if identity is None else [identity.vendor, identity.model, identity.serial_number]
     told = ', '.join(filter(None, names))

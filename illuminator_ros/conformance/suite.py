@@ -40,11 +40,18 @@ FIND_TIMEOUT = 10.0
 REST = 4.5
 RESTORE_TIMEOUT = 10.0
 
+# Others on the link that are named where the light is not heard.
+MAX_NAMED = 8
+
 NOT_FOUND = 'no light was heard'
 NO_CONSENT = 'it would strobe or shine at 100 %: not agreed to; see --yes'
 NO_STATUS = 'the light does not say how it is, so that could not be restored'
 
 _log = logging.getLogger(__name__)
+
+
+class _Unreached(Skipped):
+    """There is no light to check."""
 
 
 class Suite:
@@ -58,6 +65,7 @@ class Suite:
     :ivar restored: what became of the light, for people.
     :ivar left_changed: whether it is not known to be as it was.
     :ivar interrupted: whether the run was ended from outside.
+    :ivar missing: why there is no light to check, for people; '' if there is one.
     """
 
     def __init__(
@@ -69,6 +77,7 @@ class Suite:
         self.restored = 'nothing was changed'
         self.left_changed = False
         self.interrupted = False
+        self.missing = ''
         self._only = only
         self._find_timeout = find_timeout
         self._on_result = on_result
@@ -98,7 +107,7 @@ class Suite:
         except Interrupted:
             self.interrupted = True
             for one in chosen[len(self.results):]:
-                self._enter(Result(one, Verdict.SKIPPED, 'interrupted'))
+                self._enter(Result(one, Verdict.SKIPPED, 'interrupted', reached=False))
         finally:
             self.bench.tidying = True
             if self._changed:
@@ -111,22 +120,40 @@ class Suite:
     async def _find(self) -> None:
         bench = self.bench
         if not await bench.until(lambda: bench.found, self._find_timeout):
-            self._gone = NOT_FOUND
+            self._gone = f'{bench.target} was not heard' if bench.target else NOT_FOUND
+            self.missing = self._what_was_heard()
             return
         await bench.sleep(REST)
         bench.rest = list(bench.statuses)
         if len(bench.rest) > 1:
             self._period = median(periods([at for at, _ in bench.rest]))
 
+    def _what_was_heard(self) -> str:
+        bench, text = self.bench, f'{self._gone} within {self._find_timeout:g} s'
+        if fault := bench.link_fault():
+            return f'link not open: {fault}'
+        others = sorted(bench.heard)
+        texts = [str(one) for one in others[:MAX_NAMED]]
+        if len(others) > MAX_NAMED:
+            texts.append(f'{len(others) - MAX_NAMED} more')
+        *most, last = texts or ['nobody else']
+        heard = f'{", ".join(most)} and {last} were' if most else f'{last} was'
+        if bench.target is None:
+            text += ': neither HEARTBEAT with MAV_TYPE_ILLUMINATOR nor ILLUMINATOR_STATUS'
+        return f'{text}; {heard}'
+
     async def _check(self, one: Requirement) -> Result:
         bench = self.bench
         begun, line = bench.now, len(bench.log)
-        verdict, detail, evidence = Verdict.PASS, '', None
+        verdict, detail, evidence, reached = Verdict.PASS, '', None, True
         try:
+            self._must_be_reachable(one)
             await self._prepare(one)
             detail = await one.check(bench) or ''
         except Failed as error:
             verdict, detail, evidence = Verdict.FAIL, str(error), error.evidence
+        except _Unreached as error:
+            verdict, detail, reached = Verdict.SKIPPED, str(error), False
         except Skipped as error:
             verdict, detail = Verdict.SKIPPED, str(error)
         except LightGone:
@@ -136,20 +163,21 @@ class Suite:
             _log.exception('internal error in the check %s', one.name)
             verdict, detail = Verdict.FAIL, f'internal error in this check: {error!r}'
         lines = bench.log[line:][-MAX_LINES:] if evidence is None else evidence[:MAX_LINES]
-        return Result(one, verdict, detail, lines, bench.now - begun)
+        return Result(one, verdict, detail, lines, bench.now - begun, reached)
 
-    async def _prepare(self, one: Requirement) -> None:
-        """See that a check can be made at all."""
-        bench = self.bench
+    def _must_be_reachable(self, one: Requirement) -> None:
         # What shows over the whole of a run shows for a light that is gone, too.
         over_all = one.check.__module__.endswith('.totals')
-        if self._gone == NOT_FOUND:
+        if self.missing:
             if one.name != 'heartbeat':
-                raise Skipped(NOT_FOUND)
-            raise Failed(f'{NOT_FOUND} within {self._find_timeout:g} s: neither HEARTBEAT with '
-                         'MAV_TYPE_ILLUMINATOR nor ILLUMINATOR_STATUS')
+                raise _Unreached(self._gone)
+            raise Failed(self.missing)
         if self._gone and not over_all:
-            raise Skipped(self._gone)
+            raise _Unreached(self._gone)
+
+    async def _prepare(self, one: Requirement) -> None:
+        """See that a check may be made, and that the light can be brought back from it."""
+        bench = self.bench
         if one.dazzles and not bench.consent:
             raise Skipped(NO_CONSENT)
         if one.changes:

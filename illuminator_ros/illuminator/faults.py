@@ -104,6 +104,12 @@ class Fault:
             return self.default.name.lower()
         return 'for ever' if self.default == math.inf else f'{self.default:g}'
 
+    def value_text(self, value: Any) -> str:
+        """Return a value as it is typed; '' where none is."""
+        if self.read is None or value == math.inf:
+            return ''
+        return value.name.lower() if isinstance(value, MavResult) else f'{value}'
+
 
 FAULTS = {
     'silence': Fault('silence', 'neither hears nor says anything for S seconds',
@@ -192,6 +198,13 @@ def active(behaviour: Behaviour, normal: Behaviour) -> list[str]:
     """Return the names of what goes wrong, beside what is normal for a light."""
     return [name for name, fault in FAULTS.items()
             if getattr(behaviour, fault.field) != getattr(normal, fault.field)]
+
+
+def as_typed(behaviour: Behaviour, normal: Behaviour) -> list[str]:
+    """Return what goes wrong as :func:`with_fault` takes it, with values."""
+    values = [(name, FAULTS[name].value_text(getattr(behaviour, FAULTS[name].field)))
+              for name in active(behaviour, normal)]
+    return [f'{name}={value}' if value else name for name, value in values]
 
 
 def find(name: str) -> Fault:

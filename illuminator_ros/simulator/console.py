@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from .view import glance
 from ..illuminator.device import Device
-from ..illuminator.faults import active, FaultError, FAULTS, with_fault, without_fault
+from ..illuminator.faults import as_typed, FaultError, FAULTS, with_fault, without_fault
 from ..illuminator.faults import describe as describe_faults
 from ..illuminator.model import InvalidValue
 
@@ -113,8 +113,8 @@ def _status(device: Device, words: list[str], now: float) -> str:
 
 
 def _faults(device: Device, words: list[str], now: float) -> str:
-    names = active(device.behaviour, device.properties.normal)
-    return f'{device.source}: {", ".join(names) or "no fault"}'
+    texts = as_typed(device.behaviour, device.properties.normal)
+    return f'{device.source}: {", ".join(texts) or "no fault"}'
 
 
 COMMANDS = {
@@ -159,6 +159,10 @@ def execute(line: str, devices: Sequence[Device], now: float) -> str:
     name, *rest = words
     if name == 'help':
         return f'{describe_commands()}\nfaults:\n{describe_faults()}'
+    # The option's way to name a light, which has a place of its own here.
+    light, colon, fault = words[-1].rpartition(':')
+    if colon and words[:-1] in ([], ['fault'], ['--fault']):
+        return f'for one light: {light} fault {fault}'
     # So that a fault that was seen in --help works as it stands there.
     if name.partition('=')[0] in FAULTS and name not in COMMANDS:
         name, rest = 'fault', [name, *rest]

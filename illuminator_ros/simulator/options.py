@@ -63,7 +63,8 @@ def parser() -> argparse.ArgumentParser:
                     'Without arguments it finds a bridge that was started without arguments.',
         epilog=_epilog())
     result.add_argument('url', nargs='?',
-                        help=f'where the drone is (default: {DEFAULT_URL})')
+                        help='the link to a bridge, router or autopilot: UDP, TCP or serial '
+                             f'(default: {DEFAULT_URL})')
     result.add_argument('--version', action='version', version=__version__)
     result.add_argument('--file', metavar='FILE', help='read url, settings and lights from YAML')
     result.add_argument('--count', type=integer(1, 200), default=1, metavar='N',

@@ -54,6 +54,11 @@ def test_the_sample_report_has_every_requirement():
     assert found == [one.name for one in REQUIREMENTS]
 
 
+def test_the_sample_report_is_of_its_command():
+    asked, begun = re.findall(r'(?:\$ conformance|checking the light on) (\S+)', CONFORMANCE)
+    assert asked == begun
+
+
 def test_the_readme_counts_the_requirements():
     assert f'for {len(REQUIREMENTS)} requirements' in README
 

@@ -17,12 +17,13 @@
 from dataclasses import replace
 import math
 
+from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Identity, Limits
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.dialect import MavCmd, Source
 import pytest
 from support.conformance_run import Run
 
@@ -41,7 +42,8 @@ SEEDED = {
     'progress': {'finished'},
     'busy': {'not-busy'},
     'slow': {'acknowledged-promptly'},
-    'lie': {'status-agrees'},
+    # It is off, and in internal control, when it is told to be.
+    'lie': ACCEPTED_CHANGES - {'off', 'mode-internal'} | {'status-agrees'},
     'heartbeat': {'heartbeat-rate'},
     'type': {'heartbeat-type'},
     'autopilot': {'heartbeat-autopilot'},
@@ -142,6 +144,48 @@ def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
         assert len(one.finals) <= 2
     assert 'on-off-values' not in run.failed
     assert all(len(one.finals) == 2 for one in run.bench.transactions if one.expected)
+
+
+@pytest.mark.parametrize(('name', 'contradiction'), [
+    ('on', 'in enable: off'), ('mode-external', 'in mode and brightness: off'),
+    ('brightness', 'in brightness: off')])
+def test_a_change_that_is_accepted_but_not_shown_is_found_where_it_was_asked_for(
+        name, contradiction):
+    result = Run(faults=('lie',), only=(name,), consent=False).finish().result(name)
+    assert result.verdict is Verdict.FAIL
+    assert ('MAV_RESULT_ACCEPTED, but then the status differs ' + contradiction) in result.detail
+    assert '< ILLUMINATOR_STATUS off' in result.exchange[-1]
+
+
+def test_a_light_that_stays_on_is_not_switched_off():
+    run = Run(faults=('lie',), only=('on', 'off'))
+    run.light.press(run.link.now, enabled=True)
+    run.finish()
+    assert run.failed == {'off'}
+    assert 'could not be switched off before' in run.result('on').detail
+
+
+def test_that_a_light_was_off_anyway_does_not_count_as_switched_off():
+    result = Run(faults=('lie',), only=('off',)).finish().result('off')
+    assert result.verdict is Verdict.SKIPPED
+    assert 'could not be switched on before' in result.detail
+
+
+@pytest.mark.parametrize('name', ['on', 'off', 'brightness'])
+def test_one_requirement_alone_is_met_by_a_light_that_meets_it(name):
+    assert Run(only=(name,)).finish().result(name).verdict is Verdict.PASS
+
+
+def test_what_a_light_accepts_counts_as_done_where_it_reports_no_status():
+    run = Run(DeviceProperties(status_interval=0.0), faults=('lie',), only=('on',))
+    asked = run.bench.command
+
+    async def last_status_before(command, *params, **options):
+        if command == MavCmd.ILLUMINATOR_ON_OFF and params == (1.0,):
+            run.fault('no-request')
+        return await asked(command, *params, **options)
+    run.bench.command = last_status_before
+    assert run.finish().result('on').verdict is Verdict.PASS
 
 
 def test_thermal_flags_that_go_with_the_temperature_are_in_order():

@@ -17,10 +17,18 @@
 import json
 from xml.etree import ElementTree
 
-from illuminator_ros.conformance.report import as_json, as_junit, catalogue, lines, Report
+from illuminator_ros.conformance.report import (
+    as_json,
+    as_junit,
+    catalogue,
+    lines,
+    Report,
+    Table,
+)
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.mavlink.dialect import Source
 import pytest
 from support.conformance_run import Run
 
@@ -85,6 +93,48 @@ def test_the_table_says_of_what_is_not_met_what_is_wrong_what_was_said_and_the_s
 
 def test_the_table_says_why_something_was_skipped(run):
     assert 'no flag; try a longer --heat' in lines(run.result('thermal-flags'))[1]
+
+
+def shown(run):
+    table = Table()
+    return [line for one in run.suite.results for line in table.add(one)] + table.end()
+
+
+def test_without_a_light_the_table_has_one_line_for_all_that_was_not_checked():
+    run = Run(target=Source(9, 9)).finish()
+    assert shown(run)[:2] == lines(run.result('heartbeat'))[:2]
+    assert shown(run)[-1] == 'SKIPPED 47 requirements: 9/9 was not heard'
+    assert len(shown(run)) == 4
+    assert len(run.suite.results) == len(REQUIREMENTS)
+
+
+def test_after_an_interruption_the_table_has_one_line_for_the_rest():
+    run = Run(consent=False)
+    run.link.run_until(lambda: len(run.suite.results) == 10, within=100.0)
+    run.bench.interrupt(run.link.now)
+    run.finish()
+    assert len(shown(run)) == 11
+    assert shown(run)[-1] == 'SKIPPED 38 requirements: interrupted'
+
+
+def test_a_light_that_falls_silent_leaves_one_line_for_what_was_not_checked():
+    run = Run()
+    run.link.run(8.0)
+    run.fault('silence')
+    run.finish()
+    (line,) = [line for line in shown(run) if 'requirements: ' in line]
+    assert line.endswith('the light has fallen silent')
+    assert any('FAIL    acknowledged ' in line for line in shown(run))
+
+
+def test_what_was_skipped_for_a_reason_of_its_own_keeps_its_lines():
+    run = Run(consent=False).finish()
+    assert sum('not agreed to' in line for line in shown(run)) == 6
+
+
+def test_one_requirement_that_was_not_checked_is_named():
+    run = Run(target=Source(9, 9), only=('on',)).finish()
+    assert shown(run) == lines(run.result('on'))
 
 
 def test_the_summary_counts(report):

@@ -18,6 +18,7 @@ from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
+import pytest
 from support.conformance_run import Run
 
 FIRST, SECOND = Source(1, 243), Source(1, 244)
@@ -60,4 +61,30 @@ def test_without_a_light_there_is_one_finding_and_nothing_is_said_to_be_met():
     run = Run(DeviceProperties(source=FIRST), target=SECOND).finish()
     assert run.failed == {'heartbeat'}
     assert not run.suite.passed
-    assert run.result('on').detail == 'no light was heard'
+    assert run.result('on').detail == '1/244 was not heard'
+
+
+@pytest.mark.parametrize(('target', 'said'), [
+    (Source(9, 9), '9/9 was not heard within 10 s; 1/243 and 1/244 were'),
+    (None, 'no light was heard within 10 s: neither HEARTBEAT with MAV_TYPE_ILLUMINATOR nor '
+           'ILLUMINATOR_STATUS; 1/243 and 1/244 were')])
+def test_who_was_heard_instead_of_the_light_is_said(target, said):
+    other_components = with_fault(with_fault(Behaviour(), 'type=18'), 'no-request')
+    run = Run(*[DeviceProperties(source=one, behaviour=other_components, status_interval=0.0)
+                for one in (FIRST, SECOND)], target=target).finish()
+    assert run.result('heartbeat').detail == run.suite.missing == said
+
+
+def test_of_a_crowd_that_was_heard_instead_of_the_light_some_are_named():
+    run = Run(*[DeviceProperties(source=Source(1, n)) for n in range(1, 12)], target=Source(9, 9))
+    assert run.finish().suite.missing.endswith('1/7, 1/8 and 3 more were')
+
+
+def test_that_nobody_was_heard_is_said():
+    run = Run(DeviceProperties(behaviour=with_fault(Behaviour(), 'silence'))).finish()
+    assert run.suite.missing.endswith('nor ILLUMINATOR_STATUS; nobody else was')
+
+
+def test_a_link_that_is_not_open_is_the_reason_for_no_light():
+    run = Run(target=SECOND, link_fault=lambda: '/dev/tty: No such file').finish()
+    assert run.result('heartbeat').detail == 'link not open: /dev/tty: No such file'

@@ -20,6 +20,7 @@ from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import Device, DeviceProperties
 from illuminator_ros.illuminator.faults import (
     active,
+    as_typed,
     describe,
     FaultError,
     FAULTS,
@@ -238,6 +239,12 @@ def test_a_fault_can_begin_and_end_while_the_light_runs():
 def test_faults_that_are_active_are_known():
     behaviour = with_fault(with_fault(Behaviour(), 'lie'), 'drop=0.1')
     assert active(behaviour, Behaviour()) == ['drop', 'lie']
+
+
+@pytest.mark.parametrize('text', [
+    'silence', 'silence=5.0', 'drop=0.2', 'refuse=failed', 'busy=1000000', 'flags=128', 'nan'])
+def test_faults_are_described_as_they_are_typed(text):
+    assert as_typed(with_fault(Behaviour(), text), Behaviour()) == [text]
 
 
 @pytest.mark.parametrize('name', FAULTS)

@@ -93,7 +93,7 @@ def test_an_empty_line_is_nothing(bench):
 @pytest.mark.parametrize('line', ['fault refuse=failed', 'refuse=failed'])
 def test_a_fault_begins_and_ends(bench, line):
     bench.enter(f'bow {line}')
-    assert bench.enter('faults') == '1/243: refuse\n1/244: no fault'
+    assert bench.enter('faults') == '1/243: refuse=failed\n1/244: no fault'
     bench.enter('clear refuse')
     assert bench.enter('bow faults') == '1/243: no fault'
 
@@ -108,7 +108,21 @@ def test_all_faults_end_at_once(bench):
 @pytest.mark.parametrize('name', [name for name in FAULTS if name != 'reboot'])
 def test_every_fault_can_be_typed(bench, name):
     assert bench.enter(f'fault {name}') == 'done'
-    assert bench.enter('bow faults') == f'1/243: {name}'
+    _, _, shown = bench.enter('bow faults').partition(': ')
+    assert shown.partition('=')[0] == name
+    typed = bench.bow.behaviour
+    bench.enter('bow clear')
+    bench.enter(f'bow fault {shown}')
+    assert bench.bow.behaviour == typed
+
+
+@pytest.mark.parametrize(('line', 'meant'), [
+    ('fault bow:drop=0.2', 'bow fault drop=0.2'), ('--fault bow:drop', 'bow fault drop'),
+    ('1/243:refuse=failed', '1/243 fault refuse=failed')])
+def test_who_names_a_light_as_in_the_option_is_shown_how_to_do_it_here(bench, line, meant):
+    assert bench.enter(line) == f'for one light: {meant}'
+    assert bench.bow.behaviour == DeviceProperties().behaviour
+    assert bench.enter(meant) == 'done'
 
 
 @pytest.mark.parametrize('line', ['reboot', 'fault reboot'])

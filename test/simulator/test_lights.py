@@ -183,6 +183,11 @@ def test_every_setting_is_an_option_and_in_the_help():
         assert f'--{name.replace("_", "-")}' in text
 
 
+def test_the_help_says_what_is_at_the_other_end_of_the_link():
+    text = ' '.join(parser().format_help().split())
+    assert 'url the link to a bridge, router or autopilot: UDP, TCP or serial (default:' in text
+
+
 def test_a_yaml_file_is_read(tmp_path):
     path = tmp_path / 'lights.yaml'
     path.write_text('url: udpin://127.0.0.1:1\nlights:\n  - {id: 1/9, ambient: 3}\n')

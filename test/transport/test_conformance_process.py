@@ -117,6 +117,16 @@ def test_without_a_light_it_is_exit_status_1(url, programs):
     assert '0 passed, 1 failed' in conformance.log
 
 
+def test_a_link_that_cannot_be_opened_is_the_verdict_in_a_few_lines(programs):
+    conformance = programs('conformance', 'tcp://127.0.0.1:1', '--wait', '0.5')
+    assert conformance.wait() == 1
+    *_, light, summary = conformance.log.splitlines()
+    assert light.startswith('no light: link not open: tcp://127.0.0.1:1: ')
+    assert summary.startswith('0 passed, 1 failed')
+    assert f'SKIPPED {len(REQUIREMENTS) - 1} requirements: ' in conformance.log
+    assert len(conformance.log.splitlines()) < 12
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     ([], 'the connection URL is missing'),
     (['udp:x:y'], "port 'y' is not a number"),
@@ -172,6 +182,13 @@ def test_on_a_terminal_it_asks_before_it_dazzles(url, programs):
     assert 'seizures' in seen
     assert 'SKIPPED strobe' in seen
     assert status == 0
+
+
+def test_an_answer_that_is_neither_yes_nor_no_is_said_to_be_taken_as_no(url):
+    _, seen = conversation(
+        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
+        answers=[('[y/N]', 'maybe')])
+    assert "'maybe' is neither y nor n: taken as no" in seen
 
 
 def test_the_simulator_is_operated_on_a_terminal(url):

@@ -88,6 +88,8 @@ async def command_int(bench: Bench) -> str:
     one = await bench.switch(True, as_int=True)
     if not one.accepted and one.result != MavResult.COMMAND_LONG_ONLY:
         raise Failed(f'COMMAND_INT {one.text}: {one.answer}', one.lines)
+    if one.disagreement:
+        fail_if([one.disagreement])
     return one.answer
 
 

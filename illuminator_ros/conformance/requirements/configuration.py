@@ -23,11 +23,12 @@ from ...mavlink.dialect import MavCmd, MavResult
 
 CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 INTERNAL = float(Mode.INTERNAL_CONTROL)
+STROBE = ('strobe_period', 'strobe_duty_cycle')
 NAN, INF = float('nan'), float('inf')
 
 
-def _all_accepted(transactions: list[Transaction]) -> None:
-    fail_if([one.finding() for one in transactions if not one.accepted])
+def _all_made(transactions: list[Transaction], *names: str) -> None:
+    fail_if([one.unmet(*names) for one in transactions])
 
 
 async def _all_refused(bench: Bench, values: list[tuple[float, ...]]) -> None:
@@ -39,7 +40,7 @@ async def _all_refused(bench: Bench, values: list[tuple[float, ...]]) -> None:
 async def internal(bench: Bench) -> None:
     """Configure it to that mode."""
     await bench.baseline()
-    _all_accepted([await bench.configure(Mode.INTERNAL_CONTROL)])
+    _all_made([await bench.configure(Mode.INTERNAL_CONTROL)], 'mode')
 
 
 @requirement('mode-external', 'takes external sync, if mode_bitmask has it', ILLUMINATOR,
@@ -53,7 +54,7 @@ async def external(bench: Bench) -> None:
     # Lights differ in whether 2 stands for this mode or, as 1 << 1, for the other.
     if one.result == MavResult.DENIED and bitmask not in (3, 6):
         raise Skipped(f'denied, and mode_bitmask 0x{bitmask:x} need not mean that it has it')
-    _all_accepted([one])
+    _all_made([one], 'mode')
 
 
 @requirement('mode-values', 'denies mode 0 (unknown), and those that do not exist', MESSAGES,
@@ -68,7 +69,7 @@ async def brightness(bench: Bench) -> str:
     """Try some, 100 % only if that may be."""
     await bench.baseline()
     values = (50.0, 100.0, 33.3) if bench.consent else (5.0, 20.0)
-    _all_accepted([await bench.configure(brightness=value) for value in values])
+    _all_made([await bench.configure(brightness=value) for value in values], 'brightness')
     return ', '.join(f'{value:g} %' for value in values)
 
 
@@ -97,10 +98,10 @@ async def strobe(bench: Bench) -> str:
     """Try two periods and duty cycles, and the end of it."""
     await bench.baseline()
     first, second = _usable(await _limits(bench))
-    _all_accepted([
+    _all_made([
         await bench.configure(period=first, duty=50.0),
         await bench.configure(period=second, duty=25.0),
-        await bench.configure()])
+        await bench.configure()], *STROBE)
     return f'{first:g} s, {second:g} s'
 
 
@@ -111,7 +112,8 @@ async def strobe_limits(bench: Bench) -> str:
     await bench.baseline()
     limits = await _limits(bench)
     periods = [one for one in (limits.min_strobe_period, limits.max_strobe_period) if one]
-    _all_accepted([await bench.configure(period=period, duty=50.0) for period in periods])
+    _all_made([await bench.configure(period=period, duty=50.0) for period in periods],
+              'strobe_period')
     return ', '.join(f'{period:g} s' for period in periods)
 
 
@@ -133,7 +135,8 @@ async def duty(bench: Bench) -> None:
     """Try both ends."""
     await bench.baseline()
     period, _ = _usable(await _limits(bench))
-    _all_accepted([await bench.configure(period=period, duty=value) for value in (0.0, 100.0)])
+    _all_made([await bench.configure(period=period, duty=value) for value in (0.0, 100.0)],
+              'strobe_duty_cycle')
 
 
 @requirement('duty-cycle-values', 'denies a strobe duty cycle that is not 0 to 100 %', MESSAGES,

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from ..bench import Bench
-from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement
+from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
 from ...mavlink.dialect import MavCmd
 
 
@@ -25,17 +25,27 @@ from ...mavlink.dialect import MavCmd
 async def on(bench: Bench) -> None:
     """Switch it on at low brightness."""
     await bench.baseline()
-    one = await bench.switch(True)
-    if not one.accepted:
-        fail_if([one.finding()])
+    await _switch(bench, True)
 
 
 @requirement('off', 'is switched off', ILLUMINATOR, 'ON/OFF', changes=True)
 async def off(bench: Bench) -> None:
-    """Switch it off."""
-    one = await bench.switch(False)
-    if not one.accepted:
-        fail_if([one.finding()])
+    """Switch it off, from on: nothing is seen of it in a light that is off."""
+    status = await bench.status()
+    if status is not None and not status.enabled:
+        await bench.baseline()
+        await bench.switch(True)
+    await _switch(bench, False)
+
+
+async def _switch(bench: Bench, on: bool) -> None:
+    before = await bench.status()
+    one = await bench.switch(on)
+    fail_if([one.unmet('enable')])
+    if before is not None and before.enabled is on:
+        state, other = ('on', 'off') if on else ('off', 'on')
+        raise Skipped(f'accepted, but it was {state} already and could not be switched {other} '
+                      'before')
 
 
 @requirement('on-off-values', 'denies to be switched to anything but 0 and 1', MESSAGES,
