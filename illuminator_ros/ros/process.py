@@ -203,7 +203,6 @@ class BridgeProcess:
         for thread in self._threads:
             thread.join(max(deadline - time.monotonic(), 0))
 
-
     def _switch_off(self) -> None:
         """Switch the lights off and say which may still be on; takes 0.6 s at most."""
         served = [(node, node.light) for node in self.nodes if node.light]

@@ -134,7 +134,7 @@ def test_a_hot_light_agrees_to_what_it_was_asked_for(fake, faked):
     result = faked.configure(brightness=80)
     assert result.success
     assert result.message.startswith(
-        'brightness 80, confirmed by ILLUMINATOR_STATUS, but thermal throttling: ')
+        'brightness 80 %, confirmed by ILLUMINATOR_STATUS, but thermal throttling: ')
     assert faked.light.agreement.agreed.brightness == 80.0
 
 
