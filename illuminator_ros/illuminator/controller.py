@@ -37,6 +37,8 @@ from ..mavlink.endpoint import Endpoint, Heartbeat
 
 # Lights that are kept apart; one more is passed over, so that memory is bounded.
 MAX_LIGHTS = 128
+# Lights outside the target that are remembered, to name them where the target is not there.
+MAX_LEFT_ALONE = 8
 # Lost lights that are looked for at once, so that a slow line is not filled.
 MAX_ASKED = 8
 # s for which a message from our own address counts as a clash.
@@ -53,7 +55,9 @@ class Controller(Endpoint):
     :param identity: our own address.
     :param on_light: called with each light when it is first heard.
     :param wanted: tells whether a light at an address is of interest; others are left alone.
+    :param link_failure: returns why the link is not open, for people; '' while it is.
     :ivar lights: those found so far, by address, in the order in which they were found.
+    :ivar left_alone: the first lights that are not wanted, by address.
     :ivar clash_at: when somebody else was last heard from our own address.
     :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
     """
@@ -62,15 +66,18 @@ class Controller(Endpoint):
         self, identity: Source, settings: Settings, *, command_timeout: float = 0.5,
         command_retries: int = 3, on_light: Callable[[Light], None] = lambda light: None,
         wanted: Callable[[Source], bool] = lambda source: True,
+        link_failure: Callable[[], str] = lambda: '',
     ) -> None:
         super().__init__()
         self.identity = identity
         self.settings = settings
         self.lights: dict[Source, Light] = {}
+        self.left_alone: dict[Source, None] = {}
         self.clash_at = -math.inf
         self.passed_over = False
         self._on_light = on_light
         self._wanted = wanted
+        self._link_failure = link_failure
         self._heartbeat = Heartbeat(identity, MavType.ONBOARD_CONTROLLER)
         self._link_open = False
         self._agenda: Agenda[Source] = Agenda()
@@ -140,7 +147,10 @@ class Controller(Endpoint):
                 return None
             light = self.lights[source] = Light(source, self.sender, self.settings)
             light.changed = lambda: self._schedule(source)
+            light.link_failure = self._link_failure
             self._on_light(light)
+        elif light is None and len(self.left_alone) < MAX_LEFT_ALONE:
+            self.left_alone[source] = None
         return light
 
     def clashes(self, now: float) -> bool:

@@ -63,6 +63,7 @@ class Light:
     :ivar sharing: whether it is several lights in truth.
     :ivar measures_temperature: whether it has ever sent a temperature other than 0.
     :ivar changed: called when a request may have changed :meth:`next_deadline`.
+    :ivar link_failure: returns why the link is not open, for people; '' while it is.
     """
 
     def __init__(
@@ -81,6 +82,7 @@ class Light:
         self.restarts = 0
         self.measures_temperature = False
         self.changed: Callable[[], None] = lambda: None
+        self.link_failure: Callable[[], str] = lambda: ''
         self.identification = Identification(self)
         self.agreement = Agreement(self)
         self.sharing = Sharing()
@@ -189,8 +191,10 @@ class Light:
         """Return why requests cannot reach the light, for people; '' if they can."""
         if self.connected:
             return ''
-        absence = format_seconds(now - self.heard_at)
-        return f'light {self.source} is lost: no heartbeat for {absence}'
+        # Without a link nothing can be heard: that is the reason, and silence its consequence.
+        reason = (self.link_failure()
+                  or f'no heartbeat for {format_seconds(now - self.heard_at)}')
+        return f'light {self.source} is lost: {reason}'
 
     # Requests
 

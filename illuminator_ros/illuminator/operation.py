@@ -121,6 +121,11 @@ class Operation(ABC):
         """Return how far a status that does not contradict shows the change, for people."""
         return 'confirmed by ILLUMINATOR_STATUS'
 
+    def dimmed_proof(self, status: Status) -> str:
+        """Return the proof of a change that heat keeps from being seen, for people."""
+        dimmed = ' and '.join(flag_names(status.error_flags & DIMMING_FLAGS))
+        return Operation.proof(self, status) + (f', but {dimmed}' if dimmed else '')
+
     @property
     def confirming(self) -> bool:
         """Whether the light has accepted, and the status is awaited."""
@@ -253,6 +258,10 @@ class Enable(Operation):
     def accepted(self, status: Status | None) -> None:
         """See :meth:`Operation.accepted`."""
 
+    def proof(self, status: Status) -> str:
+        """See :meth:`Operation.proof`."""
+        return self.dimmed_proof(status) if self.on else super().proof(status)
+
     @property
     def wish(self) -> str:
         """See :meth:`Operation.wish`."""
@@ -301,8 +310,10 @@ class Configure(Operation):
         """See :meth:`Operation.proof`."""
         reported = status.configuration(self.wanted)
         hidden = [name for name in self.wanted.differences(reported) if name in self.changes]
-        if not hidden or status.error_flags & DIMMING_FLAGS:
+        if not hidden:
             return super().proof(status)
+        if status.error_flags & DIMMING_FLAGS:
+            return self.dimmed_proof(status)
         return f'accepted (ILLUMINATOR_STATUS shows {reported.describe(hidden)})'
 
     def accepted(self, status: Status | None) -> None:

@@ -96,6 +96,11 @@ class LinkState:
     decoding: DecoderCounters
     signing: SigningCounters
 
+    @property
+    def failure(self) -> str:
+        """Return what is not open and why, for people; '' while the link is open."""
+        return '' if self.is_open else f'{self.name} is not open: {self.reason}'
+
 
 class Link:
     """

@@ -87,6 +87,25 @@ def why_nothing_is_heard(state: LinkState) -> str:
     return 'nothing comes in'
 
 
+def why_no_light(state: LinkState, controller: Controller) -> str:
+    """Return why the node has no light, for people."""
+    if state.failure:
+        return state.failure
+    others = ', '.join(map(str, [*controller.lights, *controller.left_alone][:8]))
+    if others:
+        return f'{others} heard, none of which is the target'
+    return f'none heard yet on {state.name}: {why_nothing_is_heard(state)}'
+
+
+def flag_findings(flags: int) -> dict[int, Finding]:
+    """Return what error flags mean, by flag; the unknown ones are one."""
+    found: dict[int, Finding] = {
+        flag: finding for flag, finding in FLAG_LEVELS.items() if flags & flag}
+    if unknown := flags & ~KNOWN_FLAGS:
+        found[~KNOWN_FLAGS] = (WARN, flag_names(unknown)[0])
+    return found
+
+
 def link_findings(
     state: LinkState, controller: Controller, light: Light | None, *, now: float, started: float,
 ) -> list[Finding]:
@@ -98,8 +117,10 @@ def link_findings(
         findings.append((ERROR, f'another sender uses our address {controller.identity}'))
     if light is None:
         severity = WARN if now - started < DISCOVERY_GRACE else ERROR
-        findings.append((severity, f'no illuminator heard for {format_seconds(now - started)}: '
-                                   f'{why_nothing_is_heard(state)}'))
+        # A link that is not open has been found above.
+        why = f': {why_no_light(state, controller)}' if state.is_open else ''
+        findings.append(
+            (severity, f'no light connected for {format_seconds(now - started)}{why}'))
     if state.signing.unchecked and light and light.source in controller.sender.unanswering:
         findings.append((WARN, 'commands go unanswered, and the others sign their frames while '
                                'signing_mode is off'))
@@ -160,10 +181,7 @@ def lamp_findings(light: Light, now: float) -> list[Finding]:
     findings: list[Finding] = []
     status = light.status
     if status is not None:
-        findings += [finding for flag, finding in FLAG_LEVELS.items()
-                     if status.error_flags & flag]
-        if status.error_flags & ~KNOWN_FLAGS:
-            findings.append((WARN, flag_names(status.error_flags & ~KNOWN_FLAGS)[0]))
+        findings += flag_findings(status.error_flags).values()
         silence = now - light.status_at
         if silence > max(STATUS_SILENCE, 3 * light.settings.status_interval):
             findings.append((WARN, f'no status for {format_seconds(silence)}'))

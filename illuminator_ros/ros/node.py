@@ -30,7 +30,7 @@ from .diagnostics import (
     level,
     link_findings,
     link_status,
-    why_nothing_is_heard,
+    why_no_light,
 )
 from .inputs import Inputs
 from .mounting import Mounting
@@ -103,14 +103,7 @@ class IlluminatorNode(Node):
 
     def absence(self) -> str:
         """Return why there is no light, for people."""
-        state = self._link.state()
-        if not state.is_open:
-            return f'no light connected: {state.name} is not open: {state.reason}'
-        others = ', '.join(map(str, list(self._controller.lights)[:8]))
-        if others:
-            return f'no light connected: {others} heard, none of which is the target'
-        return (f'no light connected: none heard yet on {state.name}: '
-                f'{why_nothing_is_heard(state)}')
+        return f'no light connected: {why_no_light(self._link.state(), self._controller)}'
 
     def poll(self, tolerance: float) -> None:
         """

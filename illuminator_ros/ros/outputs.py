@@ -28,6 +28,8 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool
 
 from .conversions import STATUS_TOPICS, status_values, temperature_message
+from .diagnostics import ERROR, WARN
+from .flag_log import FlagLog
 from .parameters import DEVICE_SPECS, period_range
 from ..illuminator.light import Light
 from ..illuminator.model import Configuration, FIELDS, Identity, Limits, Mode, shortest, Status
@@ -67,6 +69,7 @@ class Outputs(LightObserver):
         self._enabled: bool | None = None
         self._limits = Limits()
         self._shared = False
+        self._flags = FlagLog()
         self._mirroring = threading.RLock()
         self._mirrored_by: int | None = None
         node.add_on_set_parameters_callback(self._may_set)
@@ -130,8 +133,21 @@ class Outputs(LightObserver):
         if status.limits != self._limits:
             self._limits = status.limits
             self._fit()
+        self._tell_flags(light, status)
         self._beam.status(light, status)
         self._changed()
+
+    def _tell_flags(self, light: Light, status: Status) -> None:
+        logger = self._node.get_logger()
+        for severity, text in self._flags.take(status.error_flags, light.status_at):
+            line = f'light {light.source}: {text}'
+            # One call each: rclpy refuses another severity from the same line.
+            if severity == ERROR:
+                logger.error(line)
+            elif severity == WARN:
+                logger.warning(line)
+            else:
+                logger.info(line)
 
     def configured(
         self, light: Light, configuration: Configuration, names: list[str], cause: Cause,

@@ -16,8 +16,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import logging
 import math
+import queue
 import threading
 import time
 from typing import Any
@@ -31,6 +34,8 @@ from .parameters import declare_link_parameters, LinkParameters, ParameterError
 from .spinner import Spinner
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings
+from ..illuminator.operation import Result
+from ..mavlink.command import format_seconds
 from ..mavlink.dialect import Source
 from ..mavlink.link import Link, LinkEvent
 from ..mavlink.signing import Signing, SigningMode
@@ -67,7 +72,8 @@ class BridgeProcess:
                 parameters.restore_configuration),
             command_timeout=parameters.command_timeout,
             command_retries=parameters.command_retries, on_light=self._found,
-            wanted=self._selected if parameters.only_target else lambda source: True)
+            wanted=self._selected if parameters.only_target else lambda source: True,
+            link_failure=lambda: self.link.state().failure)
         signing, store = _signing(parameters)
         self.link = Link(
             parameters.url, self.controller, label=parameters.connection_url,
@@ -121,6 +127,13 @@ class BridgeProcess:
         if self.node.light is None and self._selected(light.source):
             self.node.bind(light, self.link.clock())
             return
+        if self._selected(light.source):
+            first = self.node.light
+            assert first is not None
+            self.node.get_logger().info(
+                f'light {light.source} is there besides {first.source}, which '
+                f'{self.node.get_fully_qualified_name()} serves since it was heard first; '
+                'target_system and target_component choose', once=True)
         # Making a node takes long: not here, where all lights would wait for it.
         thread = threading.Thread(
             target=self._run_further, args=(light,), name=f'light {light.source}', daemon=True)
@@ -183,23 +196,41 @@ class BridgeProcess:
     def _stop(self) -> None:
         """Switch the lights off if that is wanted, and end all; takes 0.85 s at most."""
         if self.parameters.off_on_shutdown:
-            lights = [node.light for node in self.nodes if node.light and node.light.connected]
-            answers = threading.Semaphore(0)
-
-            def off(now: float) -> None:
-                for light in lights:
-                    light.cancel(now)
-                    light.enable(False, now, lambda result, now: answers.release())
-
-            self.link.call(off)
-            deadline = time.monotonic() + OFF_LIMIT
-            for _ in lights:
-                answers.acquire(timeout=max(deadline - time.monotonic(), 0))
+            self._switch_off()
         self.link.stop(STOP_LIMIT)
         self.end()
         deadline = time.monotonic() + THREADS_LIMIT
         for thread in self._threads:
             thread.join(max(deadline - time.monotonic(), 0))
+
+    def _switch_off(self) -> None:
+        """Switch the lights off and say which may still be on; takes 0.6 s at most."""
+        served = [(node, node.light) for node in self.nodes if node.light]
+        answers: queue.SimpleQueue[tuple[Light, Result]] = queue.SimpleQueue()
+
+        def answer(light: Light, result: Result, now: float) -> None:
+            answers.put((light, result))
+
+        def off(now: float) -> None:
+            for _, light in served:
+                light.cancel(now)
+                light.enable(False, now, functools.partial(answer, light))
+
+        self.link.call(off)
+        deadline = time.monotonic() + OFF_LIMIT
+        results: dict[Light, Result] = {}
+        with contextlib.suppress(queue.Empty):
+            while len(results) < len(served):
+                light, result = answers.get(timeout=max(deadline - time.monotonic(), 0))
+                results[light] = result
+        late = Result(False, f'no confirmation within {format_seconds(OFF_LIMIT)}')
+        for node, light in served:
+            result = results.get(light, late)
+            logger = node.get_logger()
+            if result.success:
+                logger.info(f'light {light.source} is dark: {result.message}')
+            else:
+                logger.error(f'light {light.source} may still be on: {result.message}')
 
 
 def without_node_name(arguments: list[str]) -> list[str]:

@@ -131,7 +131,10 @@ def test_a_light_that_rounds_to_its_steps_agrees_to_what_it_shows(fake, faked):
 def test_a_hot_light_agrees_to_what_it_was_asked_for(fake, faked):
     fake.applies = False
     fake.fields |= {'brightness': 30.0, 'error_status': 1}
-    assert faked.configure(brightness=80).success
+    result = faked.configure(brightness=80)
+    assert result.success
+    assert result.message.startswith(
+        'brightness 80 %, confirmed by ILLUMINATOR_STATUS, but thermal throttling: ')
     assert faked.light.agreement.agreed.brightness == 80.0
 
 

@@ -198,6 +198,13 @@ def test_it_fails_at_once_where_the_light_is_lost(fake, faked):
     assert len(faked.commands()) == before
 
 
+def test_without_a_link_that_is_the_reason_and_not_the_silence(fake, faked):
+    faked.close()
+    faked.light.link_failure = lambda: '/dev/light is not open: no such file'
+    answer = faked.ask_enable(True)
+    assert answer.result.message == 'light 1/243 is lost: /dev/light is not open: no such file'
+
+
 def test_it_fails_when_the_link_is_lost_on_the_way(fake, faked):
     fake.results[ON_OFF] = None
     answer = faked.ask_enable(True)
@@ -205,6 +212,21 @@ def test_it_fails_when_the_link_is_lost_on_the_way(fake, faked):
     faked.close()
     faked.run(0.01)
     assert answer.result.message.startswith('the link was lost (1 try, ')
+
+
+@pytest.mark.parametrize(('flags', 'shown'), [
+    (0, ''), (1, ', but thermal throttling'), (2, ', but over temperature shutdown'),
+    (3, ', but thermal throttling and over temperature shutdown'), (4, '')])
+def test_a_success_says_what_keeps_the_lamp_dark_or_dim(fake, faked, flags, shown):
+    fake.fields['error_status'] = flags
+    result = faked.enable(True)
+    assert result.success
+    assert result.message.startswith(f'on, confirmed by ILLUMINATOR_STATUS{shown}: MAV_RESULT_')
+
+
+def test_heat_is_nothing_to_tell_whoever_wants_it_dark(fake, faked):
+    fake.fields |= {'error_status': 2, 'enable': 1}
+    assert faked.enable(False).message.startswith('off, confirmed by ILLUMINATOR_STATUS: ')
 
 
 def test_a_light_that_restarts_meanwhile_does_not_confirm(fake, faked):

@@ -17,10 +17,14 @@
 from types import SimpleNamespace
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.illuminator.controller import Controller
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
+from illuminator_ros.mavlink.framing import DecoderCounters
+from illuminator_ros.mavlink.link import LinkState
 from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import SequenceCounter, Traffic
-from illuminator_ros.ros.diagnostics import why_nothing_is_heard
+from illuminator_ros.ros.diagnostics import link_findings, WARN, why_no_light, why_nothing_is_heard
 import pytest
 
 
@@ -39,3 +43,39 @@ def test_the_likeliest_reason_is_named(
     state: Any = SimpleNamespace(
         traffic=Traffic(**traffic), signing=SigningCounters(**signing))
     assert why_nothing_is_heard(state) == reason
+
+
+def state(reason: str = '') -> LinkState:
+    """Return the state of a link, open if nothing speaks against it."""
+    return LinkState(not reason, 0.0, 'the link', reason, 1, 1, Traffic(), DecoderCounters(),
+                     SigningCounters())
+
+
+def controller(*lights: Source, only_target: bool = False) -> Controller:
+    """Return one that has heard these lights."""
+    one = Controller(Source(1, 194), Settings(), wanted=lambda source: not only_target)
+    for source in lights:
+        one.receive(source, heartbeat(MavType.ILLUMINATOR), 0.0)
+    return one
+
+
+@pytest.mark.parametrize('only_target', [False, True])
+def test_lights_outside_the_target_are_named(only_target: bool) -> None:
+    heard = controller(Source(1, 243), Source(1, 244), only_target=only_target)
+    assert why_no_light(state(), heard) == '1/243, 1/244 heard, none of which is the target'
+
+
+def test_only_some_lights_outside_the_target_are_remembered() -> None:
+    heard = controller(*(Source(1, one) for one in range(1, 100)), only_target=True)
+    assert len(heard.left_alone) == 8
+
+
+def test_diagnostics_and_answers_give_the_same_reason() -> None:
+    heard = controller(Source(1, 243))
+    found = link_findings(state(), heard, None, now=7.3, started=0.0)
+    assert found == [(WARN, f'no light connected for 7.30 s: {why_no_light(state(), heard)}')]
+
+
+def test_a_link_that_is_not_open_is_the_reason_before_all_others() -> None:
+    assert why_no_light(state('no such file'), controller(Source(1, 243))) == (
+        'the link is not open: no such file')

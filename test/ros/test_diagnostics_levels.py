@@ -160,15 +160,15 @@ class TestNoLight:
             diagnostics = Diagnostics(own_ros)
 
             CLOCK.forward(8.0)
-            diagnostics.wait('link', WARN, 'no illuminator heard for 8')
+            diagnostics.wait('link', WARN, 'no light connected for 8')
             CLOCK.forward(2.0)
-            diagnostics.wait('link', ERROR, 'no illuminator heard for 10')
+            diagnostics.wait('link', ERROR, 'no light connected for 10')
 
     def test_the_warning_tells_how_long(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
             diagnostics = Diagnostics(own_ros)
             CLOCK.forward(1.0)
-            diagnostics.wait('link', WARN, 'no illuminator heard for ')
+            diagnostics.wait('link', WARN, 'no light connected for ')
 
     def test_there_is_no_lamp_yet(self, own_ros: Ros, port: int) -> None:
         with running_bridge(own_ros.domain, port):
@@ -186,7 +186,7 @@ class TestNoLight:
                 CLOCK.forward(1.0)
                 diagnostics.wait(
                     'link', ERROR, f'not open: cannot listen on 127.0.0.1:{port}: Address '
-                    'already in use; no illuminator heard')
+                    'already in use; no light connected')
 
     def test_a_lost_one_is_an_error_and_not_stale(self, own_ros: Ros, port: int) -> None:
         with (running_bridge(own_ros.domain, port) as bridge,

@@ -90,6 +90,27 @@ def test_a_light_that_says_nothing_does_not_hold_the_node(own_ros: Ros, port: in
         assert ends(program)
 
 
+@pytest.mark.parametrize(('result', 'limit', 'line'), [
+    (MavResult.ACCEPTED, PATIENCE, '[INFO] light 1/243 is dark: off, confirmed'),
+    (MavResult.DENIED, PATIENCE,
+     '[ERROR] light 1/243 may still be on: refused: MAV_RESULT_DENIED (1 try, '),
+    (None, 0.0, '[ERROR] light 1/243 may still be on: no confirmation within 0 ms'),
+])
+def test_the_log_says_what_became_of_it(
+    own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
+    result: int | None, limit: float, line: str,
+) -> None:
+    monkeypatch.setattr(process_module, 'OFF_LIMIT', limit)
+    with (ServedLight(port, enable=1) as light,
+          embedded_bridge(own_ros.domain, port, off_on_shutdown=True)):
+        Parameters(own_ros).wait(brightness=100.0)
+        light.fake.results[ON_OFF] = result
+
+    severity, text = line.split(' ', 1)
+    assert [found for found in ''.join(capfd.readouterr()).splitlines()
+            if found.startswith(severity) and text in found]
+
+
 def test_requests_that_the_light_takes_long_for_do_not_hold_it_up(
     own_ros: Ros, port: int,
 ) -> None:
@@ -116,3 +137,4 @@ def test_a_lost_light_is_not_waited_for(own_ros: Ros, port: int) -> None:
         assert ends(program)
 
         assert light.commands(ON_OFF) == []
+        assert program.count('light 1/243 may still be on: light 1/243 is lost: no heartbeat')

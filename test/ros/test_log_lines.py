@@ -1,0 +1,96 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the log says while lights are found, lost and too hot."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
+from illuminator_ros.ros.process import BridgeProcess
+import pytest
+from support.embedded import resting_bridge
+from support.fake_light import LIGHT, status_message
+
+NOW = 1000.0
+OTHER = Source(1, 244)
+
+
+@pytest.fixture
+def parameters() -> dict[str, Any]:
+    return {}
+
+
+@pytest.fixture
+def process(domain: int, parameters: dict[str, Any]) -> Iterator[BridgeProcess]:
+    """Return a bridge to which a test gives what it hears, and that makes no further nodes."""
+    with resting_bridge(domain, lambda: NOW, **parameters) as process:
+        process._ended.set()
+        yield process
+
+
+def hear(process: BridgeProcess, *sources: Source) -> None:
+    for source in sources:
+        process.controller.receive(source, heartbeat(MavType.ILLUMINATOR), NOW)
+
+
+@pytest.mark.parametrize(('flags', 'severity', 'text'), [
+    (1, 'WARN', 'thermal throttling: dimmed because it is hot'),
+    (2, 'ERROR', 'over temperature shutdown: switched off because it is too hot'),
+    (8, 'WARN', 'unknown flags 0x8'),
+])
+def test_error_flags_are_logged_until_they_are_cleared(
+    process: BridgeProcess, capfd: pytest.CaptureFixture[str], flags: int, severity: str,
+    text: str,
+) -> None:
+    process.controller.receive(LIGHT, status_message(100_000, error_status=flags), NOW)
+    process.controller.receive(LIGHT, status_message(100_010, error_status=flags), NOW + 0.01)
+    process.controller.receive(LIGHT, status_message(110_000), NOW + 10.0)
+
+    first, last = [line for line in ''.join(capfd.readouterr()).splitlines()
+                   if '1/243: ' in line]
+    assert first.startswith(f'[{severity}]')
+    assert first.endswith(f'light 1/243: {text}')
+    assert last.startswith('[INFO]')
+    assert last.endswith(f'light 1/243: {text.partition(":")[0]} cleared')
+
+
+def test_a_second_light_and_no_target_are_told_once(
+    process: BridgeProcess, capfd: pytest.CaptureFixture[str],
+) -> None:
+    hear(process, LIGHT)
+    assert 'besides' not in ''.join(capfd.readouterr())
+
+    hear(process, OTHER, Source(1, 245))
+
+    [line] = [line for line in ''.join(capfd.readouterr()).splitlines() if 'besides' in line]
+    assert line.endswith(
+        'light 1/244 is there besides 1/243, which /illuminator serves since it was heard first; '
+        'target_system and target_component choose')
+
+
+@pytest.mark.parametrize('parameters', [{'target_component': 243}])
+def test_where_the_target_chooses_nothing_is_told(
+    process: BridgeProcess, capfd: pytest.CaptureFixture[str],
+) -> None:
+    hear(process, OTHER, LIGHT)
+    assert 'besides' not in ''.join(capfd.readouterr())
+
+
+def test_requests_to_a_lost_light_tell_why_the_link_is_not_open(process: BridgeProcess) -> None:
+    hear(process, LIGHT)
+    light = process.controller.lights[LIGHT]
+    light.lose('the link was lost')
+    assert light.unreachable(NOW) == (
+        'light 1/243 is lost: memory://rest is not open: not opened yet')
