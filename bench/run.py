@@ -34,6 +34,7 @@ import importlib
 import json
 import os
 from pathlib import Path
+import signal
 import sys
 import tempfile
 import time
@@ -111,6 +112,8 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run it; return the exit status."""
     options = parser().parse_args(arguments)
+    # A shell that runs it in the background has it ignored, also by all that is started here.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     # What is printed with --markdown is the table and nothing else.
     to = sys.stderr if options.markdown else sys.stdout
     about: dict[str, Any]
