@@ -105,6 +105,8 @@ def test_the_bridge_refuses_what_it_does_not_know_in_one_line(
     (['--signing-mode', 'require'], 'no key file is given'),
     (['--signing-mode', 'sign', '--signing-key-file', '/nonexistent'],
      "key file '/nonexistent': No such file or directory"),
+    (['--signing-key-file', '/etc/hostname'],
+     '--signing-key-file is given, but --signing-mode is off'),
     (['--count'], 'argument --count: expected one argument'),
 ])
 def test_the_simulator_refuses_what_is_wrong_in_one_line(
