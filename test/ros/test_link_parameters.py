@@ -17,6 +17,7 @@
 from pathlib import Path
 import re
 
+from illuminator_ros.mavlink.signing import ticks
 from illuminator_ros.mavlink.signing_files import TimestampStore
 import pytest
 from std_srvs.srv import SetBool
@@ -110,8 +111,9 @@ def test_signing_goes_on_from_the_last_time_stamp_with_this_key(
     key = tmp_path / 'key'
     key.write_text('correct horse')
     key.chmod(0o600)
-    TimestampStore(str(key), 'bridge 1/194').store(123_456, last=True)
+    later = ticks(4e9)
+    TimestampStore(str(key), 'bridge 1/194').store(later, last=True)
 
     with resting_bridge(
             domain, lambda: 0.0, signing_mode='sign', signing_key_file=str(key)) as process:
-        assert process.link._signing.timestamp == 123_456
+        assert process.link._signing.timestamp == later

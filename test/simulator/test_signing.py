@@ -19,12 +19,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from illuminator_ros.command_line import signing
-from illuminator_ros.mavlink.signing import Signing, SigningMode
+from illuminator_ros.mavlink.signing import Signing, SigningMode, ticks
 from illuminator_ros.mavlink.signing_files import TimestampStore
 from illuminator_ros.simulator.options import parser
 import pytest
 
 NAME = 'simulator 1/243'
+# Of a run by a clock that was far ahead.
+LATER = ticks(4e9)
 
 
 @pytest.fixture
@@ -54,12 +56,17 @@ def test_the_key_is_that_of_the_file(key_file: str, mode: str) -> None:
 
 
 def test_the_time_stamps_of_the_run_before_are_gone_on_from(key_file: str) -> None:
-    TimestampStore(key_file, NAME).store(123_456, last=True)
+    TimestampStore(key_file, NAME).store(LATER, last=True)
     one, store = options('sign', key_file)
-    assert one.timestamp == 123_456
-    assert store is not None and store.load() == 123_456
+    assert one.timestamp == LATER
+    assert store is not None and store.load() == LATER
 
 
 def test_a_key_that_would_not_be_used_is_refused(key_file: str) -> None:
     with pytest.raises(ValueError, match='--signing-key-file is given, but'):
         options('off', key_file)
+
+
+def test_the_first_run_begins_with_the_clock(key_file: str) -> None:
+    one, _ = options('sign', key_file)
+    assert one.timestamp > 0

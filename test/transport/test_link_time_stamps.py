@@ -27,8 +27,8 @@ import pytest
 from support.live_link import Jump, LiveLink
 from support.waiting import eventually, Log
 
-# 1970: a computer whose clock has not been set.
-NO_CLOCK = 0.0
+# 1970, as a computer has it whose clock has not been set; and 2023. s, Unix time.
+NO_CLOCK, NOW = 0.0, 1.7e9
 
 Run = Callable[[LiveLink], LiveLink]
 
@@ -50,14 +50,16 @@ def store(tmp_path: Path) -> Noting:
     return Noting(tmp_path)
 
 
-def signer(store: TimestampStore) -> Signing:
-    return Signing(SigningMode.SIGN, bytes(32), timestamp=store.load())
+def signer(store: TimestampStore, unix_time: float = NO_CLOCK) -> Signing:
+    return Signing(SigningMode.SIGN, bytes(32), timestamp=store.begin(unix_time))
 
 
-def signing_link(store: Noting, signing: Signing, **options: Any) -> LiveLink:
+def signing_link(
+    store: Noting, signing: Signing, unix_time: float = NO_CLOCK, **options: Any,
+) -> LiveLink:
     """Return a link that has sent something signed."""
     link = LiveLink('memory://time_stamps', signing=signing, store=store,
-                    wall_clock=lambda: NO_CLOCK, **options)
+                    wall_clock=lambda: unix_time, **options)
     link.wait_open()
     link.ask(lambda now: None)
     return link
@@ -93,3 +95,14 @@ def test_a_run_that_ends_without_a_word_repeats_none(run: Run, store: Noting) ->
     eventually(lambda: len(store.stored) > count, 'stored again')
     # What a crash would leave.
     assert store.load() == store.stored[-1] + STORE_MARGIN > signing.timestamp
+
+
+@pytest.mark.parametrize('unix_time', [NO_CLOCK, NOW])
+def test_a_run_that_ends_so_as_soon_as_it_has_begun_repeats_none(
+    run: Run, store: Noting, unix_time: float,
+) -> None:
+    signing = signer(store, unix_time)
+
+    run(signing_link(store, signing, unix_time))
+
+    assert store.load() > signing.timestamp > 0
