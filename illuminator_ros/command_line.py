@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import time
 from typing import NoReturn
 
 from .mavlink.dialect import Source
@@ -81,9 +82,13 @@ def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampS
     Return what the options of message signing ask for.
 
     :param name: whose time stamps are kept.
+    :raises ValueError: if a key is given and not used, which would look like protection.
     """
     mode = SigningMode(options.signing_mode)
     if mode is SigningMode.OFF:
+        if options.signing_key_file:
+            raise ValueError('--signing-key-file is given, but --signing-mode is off')
         return Signing(), None
     store = TimestampStore(options.signing_key_file, name)
-    return Signing(mode, load_key(options.signing_key_file), timestamp=store.load()), store
+    key = load_key(options.signing_key_file)
+    return Signing(mode, key, timestamp=store.begin(time.time())), store

@@ -23,7 +23,7 @@ from pathlib import Path
 import re
 import stat
 
-from .signing import KEY_SIZE, MAX_TICKS, TICKS_PER_SECOND
+from .signing import KEY_SIZE, MAX_TICKS, ticks, TICKS_PER_SECOND
 
 MIN_PASSPHRASE = 8
 MAX_KEY_FILE = 4096
@@ -102,8 +102,16 @@ class TimestampStore:
         tag = hashlib.sha256(f'{os.path.realpath(key_file)}\0{name}'.encode()).hexdigest()[:16]
         self.path = (directory or home / 'illuminator_ros') / f'signing-{tag}'
 
+    def begin(self, unix_time: float) -> int:
+        """
+        Return the time stamp to begin a run with: the stored one or, where it is ahead, the clock.
+
+        So what is stored first, before anything is signed, already holds for a crash.
+        """
+        return max(self.load(), ticks(unix_time))
+
     def load(self) -> int:
-        """Return the time stamp to go on from, 0 where none is stored."""
+        """Return the time stamp that is stored, 0 where none is."""
         try:
             timestamp = int(self.path.read_text())
         except (OSError, ValueError):

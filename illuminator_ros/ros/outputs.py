@@ -105,17 +105,22 @@ class Outputs(LightObserver):
         logger = self._node.get_logger()
         logger.info(f'light {light.source} has restarted', throttle_duration_sec=1.0)
         if self._enabled and light.status and light.status.enabled is False:
-            logger.warning(f'light {light.source} was on before it restarted, and is off now')
+            logger.warning(f'light {light.source} was on before it restarted, and is off now',
+                           throttle_duration_sec=1.0)
 
     def identified(self, light: Light, identity: Identity) -> None:
         """See :meth:`LightObserver.identified`."""
         if identity == self._identity:
             return
-        self._identity = identity
+        before, self._identity = self._identity, identity
         known = ' '.join(filter(None, (identity.vendor, identity.model)))
         serial = f', serial number {identity.serial_number}' if identity.serial_number else ''
-        self._node.get_logger().info(
-            f'light {light.source} is {known or "nameless"}{serial}')
+        line = f'light {light.source} is {known or "nameless"}{serial}'
+        logger = self._node.get_logger()
+        if before is None:
+            logger.info(line)
+        else:
+            logger.info(line, throttle_duration_sec=1.0)
 
     def status(self, light: Light, status: Status) -> None:
         """See :meth:`LightObserver.status`."""
@@ -128,7 +133,8 @@ class Outputs(LightObserver):
             self._temperature.publish(temperature_message(temperature, stamp, self._frame_id))
         if light.sharing.recognised and not self._shared:
             self._node.get_logger().warning(
-                f'several lights answer as {light.source}: parameters stay as they are')
+                f'several lights answer as {light.source}: parameters stay as they are',
+                throttle_duration_sec=5.0)
         self._shared = light.sharing.recognised
         if status.limits != self._limits:
             self._limits = status.limits

@@ -258,7 +258,7 @@ def _signing(parameters: LinkParameters) -> tuple[Signing, TimestampStore | None
     except KeyFileError as error:
         raise ParameterError(f'signing_key_file: {error}') from None
     store = TimestampStore(parameters.signing_key_file, f'bridge {parameters.identity}')
-    return Signing(parameters.signing_mode, key, timestamp=store.load()), store
+    return Signing(parameters.signing_mode, key, timestamp=store.begin(time.time())), store
 
 
 class _LogForwarder(logging.Handler):

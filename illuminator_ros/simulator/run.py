@@ -51,7 +51,7 @@ class _Simulation:
         # What is to be written, with the line that it answers; None ends it all.
         self._texts: queue.SimpleQueue[tuple[str, str | None] | None] = queue.SimpleQueue()
         self._glances: list[Glance] = []
-        live = sys.stdout.isatty() and not options.plain
+        live = sys.stdout is not None and sys.stdout.isatty() and not options.plain
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
         self._endpoint = Devices(described, 0.0)
         self._link = Link(url, self._endpoint, label=label, on_event=self._note,

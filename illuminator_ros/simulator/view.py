@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 from dataclasses import dataclass
 import shutil
 from typing import TextIO
@@ -94,7 +95,9 @@ class PlainView:
     def say(self, text: str, *, typed: str | None = None) -> None:
         """Write something else, unless it is nothing."""
         if text:
-            print(text, file=self._stream, flush=True)
+            # The lights go on where nobody reads what they do any more.
+            with contextlib.suppress(OSError):
+                print(text, file=self._stream, flush=True)
 
 
 class LiveView:
@@ -147,5 +150,6 @@ class LiveView:
             self._write(''.join(f'{line}\x1b[K\r\n' for line in self._lines) + self.PROMPT)
 
     def _write(self, text: str) -> None:
-        self._stream.write(text)
-        self._stream.flush()
+        with contextlib.suppress(OSError):
+            self._stream.write(text)
+            self._stream.flush()

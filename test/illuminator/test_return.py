@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lights that were there before the link was lost."""
+"""Lights that were there before the link, or their own power, was lost."""
 
 from __future__ import annotations
 
 from illuminator_ros.illuminator.controller import MAX_ASKED
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.mavlink.dialect import MavCmd, Source
+import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
 
@@ -53,3 +54,43 @@ def test_lights_that_are_there_are_not_looked_for() -> None:
     pair.controller.link_opened(pair.now)
     pair.turn()
     assert pair.commands(since=pair.now) == []
+
+
+CYCLES = 200
+
+
+def left_behind(pair: Pair) -> dict[str, int]:
+    """Return how much of each thing is kept that comes and goes with requests."""
+    sender, light = pair.controller.sender, pair.light
+    return {
+        'lights': len(pair.controller.lights), 'deadlines': len(pair.controller._agenda._heap),
+        'commands': len(sender._active) + len(sender._waiting),
+        'round trips': len(sender._round_trips), 'refreshes': len(light._refreshes),
+        'wanted': len(light.agreement._wanted), 'changes': int(light.agreement.changing)}
+
+
+@pytest.mark.parametrize(('dark', 'events'), [
+    (0.5, ['restarted']), (4.0, ['lost', 'connected', 'restarted'])],
+    ids=['too short to be lost', 'lost'])
+def test_two_hundred_power_cycles_are_each_told_once_and_configured_and_leave_nothing_behind(
+    fake: FakeLight, dark: float, events: list[str],
+) -> None:
+    pair = Pair(fake).settle()
+    assert pair.configure(brightness=40).success
+    pair.run(10.0)
+    before, begun = left_behind(pair), pair.now
+    pair.recorder.events.clear()
+
+    for _ in range(CYCLES):
+        fake.silent = True
+        pair.run(dark)
+        fake.silent = False
+        fake.restart(pair.now)
+        pair.run(1.0)
+        assert fake.fields['brightness'] == 40.0
+        pair.run(4.0)
+
+    assert [event.partition(':')[0] for event in pair.recorder.events] == CYCLES * events
+    assert len(pair.commands(MavCmd.DO_ILLUMINATOR_CONFIGURE, since=begun)) == CYCLES
+    assert pair.light.restarts == CYCLES
+    assert left_behind(pair) == before

@@ -14,10 +14,14 @@
 
 """What the parameters of the link do (DESIGN.md, 2)."""
 
+from pathlib import Path
 import re
 
+from illuminator_ros.mavlink.signing import ticks
+from illuminator_ros.mavlink.signing_files import TimestampStore
 import pytest
 from std_srvs.srv import SetBool
+from support.embedded import resting_bridge
 from support.light import MavCmd, ON_OFF, params, ServedLight, Source
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until
@@ -98,3 +102,18 @@ def test_heartbeat_timeout_is_the_silence_after_which_a_light_is_lost(
         match = re.search(r'no heartbeat for (\d+)(\.\d+)? s', line)
         assert match is not None
         assert int(match[1]) >= 20
+
+
+def test_signing_goes_on_from_the_last_time_stamp_with_this_key(
+    domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+    key = tmp_path / 'key'
+    key.write_text('correct horse')
+    key.chmod(0o600)
+    later = ticks(4e9)
+    TimestampStore(str(key), 'bridge 1/194').store(later, last=True)
+
+    with resting_bridge(
+            domain, lambda: 0.0, signing_mode='sign', signing_key_file=str(key)) as process:
+        assert process.link._signing.timestamp == later

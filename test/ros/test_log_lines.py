@@ -14,10 +14,15 @@
 
 """What the log says while lights are found, lost and too hot."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
+from illuminator_ros.mavlink.dialect import (
+    ComponentInformationBasic,
+    heartbeat,
+    MavType,
+    Source,
+)
 from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from support.embedded import resting_bridge
@@ -25,6 +30,20 @@ from support.fake_light import LIGHT, status_message
 
 NOW = 1000.0
 OTHER = Source(1, 244)
+FLOOD = 2000
+
+
+def another_identity(step: int) -> Any:
+    return ComponentInformationBasic(0, 0, 0, b'maker', b'', b'', b'', b'%d' % step)
+
+
+def another_life(step: int) -> Any:
+    return status_message(1_000_000 * (step % 2), enable=step % 2)
+
+
+def another_light_now_and_then(step: int) -> Any:
+    odd = step // 20 % 2 and step % 2
+    return status_message(100_000 + 100 * step, brightness=80.0 if odd else 50.0)
 
 
 @pytest.fixture
@@ -94,3 +113,32 @@ def test_requests_to_a_lost_light_tell_why_the_link_is_not_open(process: BridgeP
     light.lose('the link was lost')
     assert light.unreachable(NOW) == (
         'light 1/243 is lost: memory://rest is not open: not opened yet')
+
+
+@pytest.mark.parametrize(('message', 'text'), [
+    (another_identity, 'light 1/243 is maker'),
+    (another_life, 'was on before it restarted'),
+    (another_light_now_and_then, 'several lights answer as 1/243'),
+])
+def test_a_flood_of_frames_is_no_flood_of_lines(
+    process: BridgeProcess, capfd: pytest.CaptureFixture[str], message: Callable[[int], Any],
+    text: str,
+) -> None:
+    hear(process, LIGHT)
+
+    for step in range(FLOOD):
+        process.controller.receive(LIGHT, message(step), NOW + 0.1 * step)
+
+    # One a second at most, and this takes less than one.
+    assert 1 <= ''.join(capfd.readouterr()).count(text) < 20
+
+
+def test_each_new_identity_is_told(
+    process: BridgeProcess, capfd: pytest.CaptureFixture[str],
+) -> None:
+    hear(process, LIGHT)
+
+    for step in range(2):
+        process.controller.receive(LIGHT, another_identity(step), NOW)
+
+    assert ''.join(capfd.readouterr()).count('light 1/243 is maker') == 2

@@ -23,7 +23,8 @@ from illuminator_ros import __version__
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 from illuminator_ros.simulator.options import parser
 import pytest
-from support.processes import environment, ROOT, run
+from support.open_channel import bound_socket
+from support.processes import ended, environment, Program, ROOT, run
 
 BRIDGE, SIMULATOR = 'illuminator_ros.bridge', 'illuminator_ros.simulator'
 MONITOR = 'illuminator_ros.monitor'
@@ -105,6 +106,8 @@ def test_the_bridge_refuses_what_it_does_not_know_in_one_line(
     (['--signing-mode', 'require'], 'no key file is given'),
     (['--signing-mode', 'sign', '--signing-key-file', '/nonexistent'],
      "key file '/nonexistent': No such file or directory"),
+    (['--signing-key-file', '/etc/hostname'],
+     '--signing-key-file is given, but --signing-mode is off'),
     (['--count'], 'argument --count: expected one argument'),
 ])
 def test_the_simulator_refuses_what_is_wrong_in_one_line(
@@ -116,6 +119,17 @@ def test_the_simulator_refuses_what_is_wrong_in_one_line(
     assert line.startswith('simulator: ')
     assert text in line
     assert (outcome.returncode, outcome.stdout) == (2, '')
+
+
+@pytest.mark.parametrize('output', ['>&-', '> /dev/full'], ids=['closed', 'full'])
+def test_the_simulator_goes_on_where_its_output_leads_nowhere(output: str) -> None:
+    with bound_socket() as bridge:
+        url = f'udpout://127.0.0.1:{bridge.getsockname()[1]}'
+        with ended(Program('sh', '-c', f'exec {sys.executable} -m {SIMULATOR} '
+                           f'--status-interval 0.1 {url} {output}')) as simulator:
+            for _ in range(20):
+                assert bridge.recv(300)
+            assert simulator.running
 
 
 class TestMissingPackages:

@@ -30,6 +30,8 @@ from support.open_channel import bound_socket, listening_socket, OpenChannel
 from support.ports import free_port
 
 Run = Callable[[LiveLink], LiveLink]
+# s; so much more than this takes that it tells times apart.
+STEP = 1000.0
 
 
 def test_a_link_that_cannot_be_opened_says_why(run: Run) -> None:
@@ -52,13 +54,29 @@ def test_an_open_link_says_what_it_is(run: Run) -> None:
         True, f'udp 127.0.0.1:{port}', '', 1)
 
 
-def test_it_says_since_when(run: Run) -> None:
+def test_it_says_since_when_it_is_open_or_not(run: Run) -> None:
     clock = Jump()
-    link = run(LiveLink('memory://state', clock=clock))
-    before = clock()
-    link.wait_open()
-    clock.ahead += 100
-    assert link.link.state().since <= before + 50
+    begun = clock()
+    server = listening_socket()
+    port = server.getsockname()[1]
+    server.close()
+    link = run(LiveLink(f'tcp://127.0.0.1:{port}', clock=clock))
+    link.wait_lost()
+    assert link.link.state().since < begun + STEP
+
+    clock.ahead += STEP
+    with listening_socket(port=port) as server:
+        connection, _ = server.accept()
+        connection.sendall(heartbeat_frame())
+        link.wait_open()
+        assert begun + STEP <= link.link.state().since < begun + 2 * STEP
+
+        clock.ahead += STEP
+        # What opens again at once would begin anew.
+        server.close()
+        connection.close()
+        link.wait_lost(2)
+        assert link.link.state().since >= begun + 2 * STEP
 
 
 def test_frames_and_bytes_are_counted_both_ways(
@@ -121,6 +139,18 @@ def test_drops_are_counted_over_all_openings(run: Run) -> None:
                 counts.append(link.link.state().traffic.frames_dropped)
             link.wait_lost(len(counts))
         assert 0 < counts[0] < counts[1]
+
+
+def test_what_was_sent_while_the_link_was_lost_does_not_count_as_lost(run: Run) -> None:
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        for count, sequence in enumerate((10, 100), 1):
+            with server.accept()[0] as connection:
+                connection.sendall(heartbeat_frame(sequence=sequence))
+                link.endpoint.heard.wait_for(lambda heard: True, count=count)
+            link.wait_lost(count)
+    counter = link.link.state().traffic.sources[LIGHT]
+    assert (counter.received, counter.lost) == (2, 0)
 
 
 def test_reading_it_while_everything_changes_is_no_error(

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 import sys
+import termios
 from typing import Any
 
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
@@ -83,6 +84,19 @@ def test_it_can_be_opened_again_once_it_is_closed(
     again = channel(f'serial://{device.path}:57600')
     device.write(b'hello')
     assert again.receive_bytes(5) == b'hello'
+
+
+def test_what_the_line_does_not_take_does_not_hold_up_the_closing(
+    ours: OpenChannel, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # A pseudo-terminal closes at once; a UART under flow control waits for what is still to go.
+    steps: list[object] = []
+    port: Any = ours.channel
+    monkeypatch.setattr(termios, 'tcflush', lambda fd, queue: steps.append((fd, queue)))
+    monkeypatch.setattr(port._port, 'close', lambda: steps.append('closed'))
+    descriptor = port._fd
+    ours.channel.close()
+    assert steps == [(descriptor, termios.TCOFLUSH), 'closed']
 
 
 def test_the_baud_rate_is_the_one_of_the_url(channel: OpenFunction, device: PtyDevice) -> None:
