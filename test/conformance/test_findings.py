@@ -151,7 +151,7 @@ def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
     ('mode-external', 'in mode and brightness: off'), ('brightness', 'in brightness: off')])
 def test_a_change_that_is_accepted_but_not_shown_is_found_where_it_was_asked_for(
         name, contradiction):
-    result = Run(faults=('lie',), only=(name,), consent=False).finish().result(name)
+    result = Run(faults=('lie',), only=(name,)).finish().result(name)
     assert result.verdict is Verdict.FAIL
     assert ('MAV_RESULT_ACCEPTED, but then the status differs ' + contradiction) in result.detail
     assert '< ILLUMINATOR_STATUS off' in result.exchange[-1]

@@ -92,9 +92,17 @@ def test_a_whole_run_ends_and_its_reports_agree(url, programs, tmp_path):
 def test_what_is_found_is_exit_status_1(url, programs):
     simulator = programs('simulator', f'udpin://{url}', '--fault', 'refuse=failed')
     simulator.wait_for('link open')
-    conformance = programs('conformance', f'udpout://{url}', '--only', 'on')
+    conformance = programs('conformance', f'udpout://{url}', '--only', 'brightness')
     assert conformance.wait() == 1
-    assert 'FAIL    on ' in conformance.log
+    assert 'FAIL    brightness ' in conformance.log
+
+
+def test_without_anybody_to_ask_a_light_that_cannot_be_dimmed_is_not_switched_on(url, programs):
+    simulator = programs('simulator', f'udpin://{url}', '--fault', 'refuse=failed')
+    simulator.wait_for('link open')
+    conformance = programs('conformance', f'udpout://{url}', '--only', 'on')
+    conformance.wait()
+    assert 'switched on, it would shine at 100 %' in conformance.log
 
 
 def test_a_signal_ends_it_with_the_light_as_it_was(url, programs):

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from ..bench import Bench, DIM, LOW, same, Transaction
+from ..consent import dark, dimmed
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
 from ...illuminator.model import float32, Limits, Mode
 from ...mavlink.dialect import MavCmd, MavResult
@@ -84,6 +85,7 @@ async def brightness(bench: Bench) -> str:
              'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
 async def brightness_values(bench: Bench) -> None:
     """Try them."""
+    await dark(bench)
     await _all_refused(bench, [(INTERNAL, value, 0.0, 0.0) for value in (-1.0, 101.0)])
 
 
@@ -158,7 +160,8 @@ async def duty_values(bench: Bench) -> None:
              'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
 async def not_a_number(bench: Bench) -> None:
     """Try them one by one: comparisons with NaN are all false, so naive checks let it in."""
-    await bench.baseline()
+    await dark(bench)
+    await dimmed(bench)
     wrong = []
     for value in (NAN, INF, -INF):
         wrong.append(await bench.refused(MavCmd.ILLUMINATOR_ON_OFF, (value,)))
