@@ -27,7 +27,7 @@ from illuminator_ros.conformance.requirements import REQUIREMENTS
 import pytest
 from support.ports import free_port
 from support.processes import environment, Program, ROOT, run
-from support.waiting import PATIENCE
+from support.waiting import eventually, PATIENCE
 
 # Started like this, none of what `pip install` does not bring can be imported.
 WITHOUT_ROS = (
@@ -105,17 +105,19 @@ def test_without_anybody_to_ask_a_light_that_cannot_be_dimmed_is_not_switched_on
     assert 'switched on, it would shine at 100 %' in conformance.log
 
 
-def test_a_signal_ends_it_with_the_light_as_it_was(url, programs):
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     simulator = programs('simulator', f'udpin://{url}')
     simulator.wait_for('link open')
-    conformance = programs('conformance', f'udpout://{url}', '--yes')
-    conformance.wait_for('    brightness ')
-    conformance.send(signal.SIGINT)
+    # It would take two hours.
+    conformance = programs('conformance', f'udpout://{url}', '--yes', '--only', 'brightness',
+                           '--only', 'thermal-flags', '--heat', '3600')
+    simulator.wait_for('ON     100 %')
+    conformance.send(number)
     assert conformance.wait() == 1
     assert conformance.log.rstrip().endswith('the light is as it was')
     assert 'Traceback' not in conformance.log
-    simulator.wait_for('100 %', count=2)
-    assert 'off    100 %  no strobe' in simulator.lines[-1]
+    eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
 
 
 def test_without_a_light_it_is_exit_status_1(url, programs):
