@@ -29,7 +29,7 @@ from rclpy.node import Node
 
 from .fleet_inputs import FleetInputs
 from .light_names import LightNames
-from .mounting import Mounting
+from .mounting import Mounting, not_its_own
 from .node import IlluminatorNode
 from .parameters import declare_link_parameters, LinkParameters, ParameterError
 from .spinner import Spinner
@@ -184,6 +184,8 @@ class BridgeProcess:
                 context=self.node.context, cli_args=self._arguments,
                 use_global_arguments=False)
             self._serve(node, self._mounting.declare(node))
+            for warning in not_its_own(node, self.node):
+                node.get_logger().warning(warning)
         except Exception as error:
             logger.error(f'light {light.source} gets no node: {error}')
             return None

@@ -131,6 +131,19 @@ def test_each_node_has_its_own_section_in_a_parameter_file(
     Parameters(own_ros, '/illuminator_1_244').wait(brightness=40.0, mode='external_sync')
 
 
+def test_a_parameter_of_the_link_in_the_section_of_a_further_light_is_warned_about(
+    own_ros: Ros, start: Start, tmp_path: Path,
+) -> None:
+    file = tmp_path / 'lights.yaml'
+    file.write_text(
+        '/**: {ros__parameters: {heartbeat_timeout: 4, names: ["7/9=nose"], frame_id: hull}}\n'
+        '/illuminator_1_244: {ros__parameters: {status_interval: 0.5, frame_id: stern}}\n')
+    bridge, _ = start('--params-file', str(file))
+    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is of the link, and ignored "
+                    'here: that of /illuminator holds')
+    assert bridge.count('ignored here') == 1
+
+
 def test_a_wrong_parameter_of_a_further_light_is_named_and_the_others_go_on(
     own_ros: Ros, start: Start, tmp_path: Path,
 ) -> None:
