@@ -196,9 +196,17 @@ def test_on_a_terminal_it_asks_before_it_dazzles(url, programs):
 
 def test_an_answer_that_is_neither_yes_nor_no_is_said_to_be_taken_as_no(url):
     _, seen = conversation(
-        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
+        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'strobe',
         answers=[('[y/N]', 'maybe')])
     assert "'maybe' is neither y nor n: taken as no" in seen
+
+
+def test_it_does_not_ask_where_nothing_that_dazzles_is_to_be_checked(url):
+    _, seen = conversation(
+        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
+        '--only', 'on', answers=[])
+    assert 'no light was heard' in seen
+    assert '[y/N]' not in seen
 
 
 def test_the_simulator_is_operated_on_a_terminal(url):
