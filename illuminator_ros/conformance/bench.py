@@ -67,6 +67,8 @@ REJECTION_PAUSE = 0.3
 MAX_LINES = 60
 # The brightness at which a light may be switched on without asking, %.
 LOW = 10.0
+# The brightness that is not exceeded without asking, %.
+DIM = 20.0
 
 T = TypeVar('T')
 

@@ -104,6 +104,8 @@ def _consent(options: argparse.Namespace) -> bool:
     """Ask whether the light may dazzle; nobody there to answer means no."""
     if options.yes:
         return True
+    if options.only and not any(one.dazzles for one in REQUIREMENTS if one.name in options.only):
+        return False
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
     try:

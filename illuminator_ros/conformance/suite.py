@@ -30,6 +30,7 @@ from .bench import (
     median,
     periods,
 )
+from .consent import NOT_AGREED
 from .requirement import Failed, Requirement, Result, Skipped, Verdict
 from .requirements import REQUIREMENTS
 from ..illuminator.model import Configuration, Mode, shortest, Status
@@ -44,7 +45,7 @@ RESTORE_TIMEOUT = 10.0
 MAX_NAMED = 8
 
 NOT_FOUND = 'no light was heard'
-NO_CONSENT = 'it would strobe or shine at 100 %: not agreed to; see --yes'
+NO_CONSENT = f'it would strobe or shine at 100 %: {NOT_AGREED}'
 NO_STATUS = 'the light does not say how it is, so that could not be restored'
 
 _log = logging.getLogger(__name__)

@@ -25,6 +25,20 @@ from .parameters import declare_read_only, LINK_PARAMETERS, LinkParameters
 NAMES = ('frame_id', 'beam_range', 'beam_angle')
 
 
+def not_its_own(node: Node, first: Node) -> list[str]:
+    """
+    Return a warning for each parameter of the link that is given for a further light's node only.
+
+    What is given for all nodes, or as for the first one, is no mistake.
+    """
+    # There is no public way to overrides that nobody declares.
+    given = getattr(node, '_parameter_overrides', {})
+    return [f'parameter {spec.name!r} is of the link, and ignored here: that of '
+            f'{first.get_fully_qualified_name()} holds'
+            for spec in LINK_PARAMETERS if spec.name in given and spec.name not in NAMES
+            and given[spec.name].value != first.get_parameter(spec.name).value]
+
+
 @dataclass(frozen=True)
 class Mounting:
     """

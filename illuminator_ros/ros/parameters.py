@@ -243,6 +243,10 @@ def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
             raise ParameterError(f'names: {entry!r} repeats an address or a name')
         if name == first:
             raise ParameterError(f'names: {entry!r} is the name of the first node')
+        other = re.fullmatch(rf'{first}_([0-9]+)_([0-9]+)', name)
+        if other and other.groups() != (str(source.system), str(source.component)):
+            raise ParameterError(
+                f'names: {entry!r} is the name of light {"/".join(other.groups())}')
         names[source] = name
     return names
 

@@ -28,7 +28,8 @@ from typing import Any
 from rclpy.node import Node
 
 from .fleet_inputs import FleetInputs
-from .mounting import Mounting
+from .light_names import LightNames
+from .mounting import Mounting, not_its_own
 from .node import IlluminatorNode
 from .parameters import declare_link_parameters, LinkParameters, ParameterError
 from .spinner import Spinner
@@ -72,12 +73,15 @@ class BridgeProcess:
                 parameters.restore_configuration),
             command_timeout=parameters.command_timeout,
             command_retries=parameters.command_retries, on_light=self._found,
-            wanted=self._selected if parameters.only_target else lambda source: True,
+            wanted=self._served,
             link_failure=lambda: self.link.state().failure)
         signing, store = _signing(parameters)
         self.link = Link(
             parameters.url, self.controller, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
+        self._names = LightNames(
+            parameters.names, node.get_name(), served=self._served,
+            warn=node.get_logger().warning)
         self._mounting = Mounting.of_first(parameters)
         self._serve(node, self._mounting)
         FleetInputs(node, self.link, self._lights, self._name_of, node.absence)
@@ -93,6 +97,7 @@ class BridgeProcess:
 
     def _poll(self) -> None:
         while not self._ended.wait(self._tick):
+            self._names.look(self.controller.lights, self.link.clock())
             for node in list(self.nodes):
                 try:
                     node.poll(self._tick / 2)
@@ -122,10 +127,14 @@ class BridgeProcess:
         return (target.system in (0, source.system)
                 and target.component in (0, source.component))
 
+    def _served(self, source: Source) -> bool:
+        return not self.parameters.only_target or self._selected(source)
+
     def _found(self, light: Light) -> None:
         """Give a light its node, in the link's thread."""
         if self.node.light is None and self._selected(light.source):
             self.node.bind(light, self.link.clock())
+            self._names.begin(light.source, self.link.clock())
             return
         if self._selected(light.source):
             first = self.node.light
@@ -168,15 +177,15 @@ class BridgeProcess:
             spinner.run()
 
     def _make_node(self, light: Light) -> IlluminatorNode | None:
-        system, component = light.source
-        name = (self.parameters.names.get(light.source)
-                or f'{self.node.get_name()}_{system}_{component}')
         logger = self.node.get_logger()
         try:
             node = IlluminatorNode(
-                name, namespace=self.node.get_namespace(), context=self.node.context,
-                cli_args=self._arguments, use_global_arguments=False)
+                self._names.of(light.source), namespace=self.node.get_namespace(),
+                context=self.node.context, cli_args=self._arguments,
+                use_global_arguments=False)
             self._serve(node, self._mounting.declare(node))
+            for warning in not_its_own(node, self.node):
+                node.get_logger().warning(warning)
         except Exception as error:
             logger.error(f'light {light.source} gets no node: {error}')
             return None

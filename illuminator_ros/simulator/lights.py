@@ -122,6 +122,10 @@ def lights(options: argparse.Namespace, file: Scene) -> list[DeviceProperties]:
     """
     given = _given(options)
     listed = [(*_named(text), dict[str, Any]()) for text in options.light or ()] or file.lights
+    counted = [f'--{name.replace("_", "-")}' for name in ('count', 'system_id', 'component_id')
+               if getattr(options, name) is not None]
+    if listed and counted:
+        raise SettingError(f'{counted[0]} is for lights that neither --light nor a file lists')
     if not listed:
         listed = _counted(options, merged(file.common, given))
     if len(listed) > MAX_LIGHTS:
@@ -142,9 +146,10 @@ def _counted(
     profile = profile_of(settings)
     system = options.system_id or profile.source.system
     first = profile.source.component if options.component_id is None else options.component_id
-    last = first + options.count - 1
+    count = options.count or 1
+    last = first + count - 1
     if last > 255:
-        raise SettingError(f'--count {options.count} from component id {first} reaches {last}; '
+        raise SettingError(f'--count {count} from component id {first} reaches {last}; '
                            'component ids end at 255')
     return [(Source(system, component), '', {}) for component in range(first, last + 1)]
 

@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
                              f'(default: {DEFAULT_URL})')
     result.add_argument('--version', action='version', version=__version__)
     result.add_argument('--file', metavar='FILE', help='read url, settings and lights from YAML')
-    result.add_argument('--count', type=integer(1, 200), default=1, metavar='N',
+    result.add_argument('--count', type=integer(1, 200), metavar='N',
                         help='number of lights, with component ids counted up (default: 1)')
     result.add_argument('--system-id', type=integer(1, 255), metavar='ID',
                         help="MAVLink system id (default: the profile's, mostly 1)")

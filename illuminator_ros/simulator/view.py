@@ -48,7 +48,7 @@ class Glance:
     def __str__(self) -> str:
         """Return the line."""
         parts = [f'{self.name:12}', 'ON ' if self.on else 'off', f'{self.brightness:>5} %',
-                 f'{self.strobe:20}', f'{self.temperature:6.1f} degC']
+                 f'{self.strobe:18}', f'{self.temperature:6.1f} degC']
         parts += filter(None, (self.mode, self.flags, self.faults))
         return '  '.join(parts)
 

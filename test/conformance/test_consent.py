@@ -20,10 +20,22 @@ from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.model import Configuration, Mode
+from illuminator_ros.mavlink.dialect import MavResult
 from illuminator_ros.simulator.settings import properties
 import pytest
 from support.conformance_run import Run
 
+LIGHTS = {
+    'switch': DeviceProperties(),
+    'brightness is the switch': replace(
+        properties({'profile': 'ardusub'}, PROFILES['ardusub'].source), modes=(1, 2)),
+}
+BRIGHT = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
+# What may switch a light on that takes what it must not.
+SWITCHING = ('other-target', 'repeated', 'on', 'on-off-values', 'brightness-values',
+             'not-a-number')
 DAZZLING = {one.name for one in REQUIREMENTS if one.dazzles}
 
 
@@ -47,18 +59,75 @@ def test_without_consent_what_dazzles_is_skipped():
     assert run.suite.passed
 
 
-@pytest.mark.parametrize('light', [
-    DeviceProperties(),
-    replace(properties({'profile': 'ardusub'}, PROFILES['ardusub'].source), modes=(1, 2)),
-], ids=['switch', 'brightness is the switch'])
+def dazzling(seen):
+    # Written so that NaN is, too.
+    return [one for one in seen if not (one.brightness <= 20.0 and one.strobe_period == 0)]
+
+
+@pytest.mark.parametrize('light', LIGHTS.values(), ids=LIGHTS)
 def test_without_consent_it_is_on_at_low_brightness_only(light):
     run = Run(light, consent=False)
     seen = watched(run)
     run.finish()
-    before = run.suite._before
-    ours = [one for one in seen if one.brightness != before.brightness]
-    assert ours
-    assert all(one.brightness <= 20.0 and one.strobe_period == 0 for one in ours)
+    assert seen
+    assert dazzling(seen) == []
+
+
+@pytest.mark.parametrize('fault', FAULTS)
+@pytest.mark.parametrize('light', LIGHTS.values(), ids=LIGHTS)
+def test_without_consent_no_light_dazzles_whatever_is_wrong_with_it(light, fault):
+    run = Run(light, faults=(fault,), consent=False, only=SWITCHING)
+    seen = watched(run)
+    run.finish()
+    assert dazzling(seen) == []
+
+
+class TestALightThatTakesNoConfiguration:
+
+    def run(self, light, configuration, **options):
+        """Return what such a light was like while it was on, and the run."""
+        run = Run(light, **options)
+        run.light.configuration = configuration
+        run.light._configure = lambda params: (MavResult.FAILED, None, [])
+        seen = watched(run)
+        return run.finish(), seen
+
+    @pytest.mark.parametrize('light', LIGHTS.values(), ids=LIGHTS)
+    @pytest.mark.parametrize('configuration', [
+        Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0),
+        Configuration(Mode.INTERNAL_CONTROL, 10.0, 0.5, 50.0),
+        Configuration(Mode.EXTERNAL_SYNC, 10.0, 0.0, 0.0),
+    ], ids=['bright', 'strobing', 'in external sync'])
+    def test_it_is_not_switched_on_without_consent(self, light, configuration):
+        run, seen = self.run(light, configuration, consent=False)
+        assert seen == []
+        for name in ('on', 'off', 'on-off-values', 'other-target', 'command-int', 'repeated'):
+            assert run.result(name).verdict is Verdict.SKIPPED
+            assert 'cannot be changed: not agreed to; see --yes' in run.result(name).detail
+
+    def test_the_reason_has_its_brightness(self):
+        run, _ = self.run(DeviceProperties(), BRIGHT, consent=False, only=('on',))
+        assert run.result('on').detail.startswith('switched on, it would shine at 100 %')
+
+    def test_it_is_all_the_same_told_that_it_takes_none(self):
+        run, _ = self.run(DeviceProperties(), BRIGHT, consent=False)
+        assert {'mode-internal', 'brightness', 'brightness-values'} <= run.failed
+
+    def test_it_is_switched_on_where_it_is_dim(self):
+        run, seen = self.run(DeviceProperties(), replace(BRIGHT, brightness=15.0), consent=False)
+        assert {one.brightness for one in seen} == {15.0}
+        assert run.result('on').verdict is Verdict.PASS
+
+    def test_it_is_switched_on_with_consent(self):
+        run, seen = self.run(DeviceProperties(), BRIGHT, consent=True)
+        assert seen
+        assert run.result('on').verdict is Verdict.PASS
+
+
+def test_a_light_that_brightness_switches_on_gets_no_wrong_one_without_consent():
+    run = Run(LIGHTS['brightness is the switch'], faults=('anything',), consent=False).finish()
+    for name in ('brightness-values', 'not-a-number'):
+        assert 'its brightness switches it on' in run.result(name).detail
 
 
 def test_with_consent_it_strobes_and_shines():

@@ -22,7 +22,7 @@ from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
-from illuminator_ros.illuminator.model import Identity, Limits
+from illuminator_ros.illuminator.model import Identity, Limits, Mode
 from illuminator_ros.mavlink.dialect import MavCmd, Source
 import pytest
 from support.conformance_run import Run
@@ -42,8 +42,8 @@ SEEDED = {
     'progress': {'finished'},
     'busy': {'not-busy'},
     'slow': {'acknowledged-promptly'},
-    # It is off, and in internal control, when it is told to be.
-    'lie': ACCEPTED_CHANGES - {'off', 'mode-internal'} | {'status-agrees'},
+    # It is off when it is told to be.
+    'lie': ACCEPTED_CHANGES - {'off'} | {'status-agrees'},
     'heartbeat': {'heartbeat-rate'},
     'type': {'heartbeat-type'},
     'autopilot': {'heartbeat-autopilot'},
@@ -147,14 +147,33 @@ def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
 
 
 @pytest.mark.parametrize(('name', 'contradiction'), [
-    ('on', 'in enable: off'), ('mode-external', 'in mode and brightness: off'),
-    ('brightness', 'in brightness: off')])
+    ('on', 'in enable: off'), ('mode-internal', 'in brightness: off'),
+    ('mode-external', 'in mode and brightness: off'), ('brightness', 'in brightness: off')])
 def test_a_change_that_is_accepted_but_not_shown_is_found_where_it_was_asked_for(
         name, contradiction):
-    result = Run(faults=('lie',), only=(name,), consent=False).finish().result(name)
+    result = Run(faults=('lie',), only=(name,)).finish().result(name)
     assert result.verdict is Verdict.FAIL
     assert ('MAV_RESULT_ACCEPTED, but then the status differs ' + contradiction) in result.detail
     assert '< ILLUMINATOR_STATUS off' in result.exchange[-1]
+
+
+def test_a_light_that_cannot_be_brought_back_from_external_sync_does_not_take_internal_control():
+    run = Run(only=('mode-internal', 'mode-external'))
+    device, apply = run.light, run.light._apply
+
+    def stuck(change, now):
+        mode = device.configuration.mode
+        apply(change, now)
+        if mode is Mode.EXTERNAL_SYNC:
+            device.configuration = replace(device.configuration, mode=mode)
+    device._apply = stuck
+    assert run.finish().failed == {'mode-internal'}
+    assert 'then the status differs in mode' in run.result('mode-internal').detail
+
+
+def test_a_light_that_knows_internal_control_only_takes_it():
+    run = Run(DeviceProperties(modes=(Mode.INTERNAL_CONTROL,)), only=('mode-internal',))
+    assert run.finish().result('mode-internal').verdict is Verdict.PASS
 
 
 def test_a_light_that_stays_on_is_not_switched_off():

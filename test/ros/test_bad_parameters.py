@@ -138,6 +138,8 @@ def test_it_ends_the_start(outcomes: dict[str, Any], keys: Path, what: str) -> N
     ({'names': ['1/999=belly']}, "names: '1/999=belly' is not of the form 1/244=belly"),
     ({'names': ['1/244=belly', '1/245=belly']}, "'1/245=belly' repeats an address or a name"),
     ({'names': ['1/244=belly', '1/244=nose']}, "'1/244=nose' repeats an address or a name"),
+    ({'names': ['1/244=illuminator_1_250']},
+     "'1/244=illuminator_1_250' is the name of light 1/250"),
     ({'signing_mode': 'require'}, 'signing_key_file: no key file is given'),
 ])
 def test_the_reason_names_what_is_wrong(ros: Ros, given: dict[str, Any], reason: str) -> None:

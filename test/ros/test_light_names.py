@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 import contextlib
 from pathlib import Path
 
+from illuminator_ros.ros.light_names import PATIENCE
 import pytest
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
@@ -25,6 +26,7 @@ from support.light import CONFIGURE, eventually, ServedLight, Source
 from support.ports import free_port
 from support.processes import Program, run
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import CLOCK
 
 FIRST, SECOND, OTHER = Source(1, 243), Source(1, 244), Source(7, 243)
 Start = Callable[..., tuple[Program, list[ServedLight]]]
@@ -129,6 +131,19 @@ def test_each_node_has_its_own_section_in_a_parameter_file(
     Parameters(own_ros, '/illuminator_1_244').wait(brightness=40.0, mode='external_sync')
 
 
+def test_a_parameter_of_the_link_in_the_section_of_a_further_light_is_warned_about(
+    own_ros: Ros, start: Start, tmp_path: Path,
+) -> None:
+    file = tmp_path / 'lights.yaml'
+    file.write_text(
+        '/**: {ros__parameters: {heartbeat_timeout: 4, names: ["7/9=nose"], frame_id: hull}}\n'
+        '/illuminator_1_244: {ros__parameters: {status_interval: 0.5, frame_id: stern}}\n')
+    bridge, _ = start('--params-file', str(file))
+    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is of the link, and ignored "
+                    'here: that of /illuminator holds')
+    assert bridge.count('ignored here') == 1
+
+
 def test_a_wrong_parameter_of_a_further_light_is_named_and_the_others_go_on(
     own_ros: Ros, start: Start, tmp_path: Path,
 ) -> None:
@@ -137,6 +152,33 @@ def test_a_wrong_parameter_of_a_further_light_is_named_and_the_others_go_on(
     bridge, lights = start('--params-file', str(file), unserved=(SECOND,))
     bridge.wait_for('light 1/244 gets no node: brightness 400 % is out of range')
     assert light_of(own_ros, '/illuminator', lights) == FIRST
+
+
+def test_a_name_for_the_light_of_the_first_node_is_said_to_be_of_no_use(start: Start) -> None:
+    bridge, _ = start('-r', '__node:=spot', names='["1/243=bow", "1/244=stern"]')
+    bridge.wait_for('names: 1/243=bow is not used, since light 1/243 is served by the first node, '
+                    'spot: -r __node:=bow names that')
+    bridge.wait_for('light 1/244 is served by /stern')
+    CLOCK.forward(PATIENCE)
+    assert bridge.count('names: ') == 1
+
+
+def test_names_of_lights_that_are_not_there_are_said_to_be_of_no_use(start: Start) -> None:
+    bridge, _ = start(names='["1/244=stern", "1/250=mast", "7/243=nose"]', target_system=1,
+                      only_target=True)
+    assert not bridge.count('names: ')
+    CLOCK.forward(PATIENCE)
+    bridge.wait_for('names: 1/250=mast is not used yet, since no light 1/250 has been heard')
+    bridge.wait_for('names: 7/243=nose is not used, since only_target leaves light 7/243 alone')
+    assert bridge.count('names: ') == 2
+
+
+def test_a_light_that_comes_late_has_its_name_all_the_same(start: Start) -> None:
+    bridge, lights = start(names='["1/244=stern"]', sources=(FIRST,))
+    CLOCK.forward(PATIENCE)
+    bridge.wait_for('names: 1/244=stern is not used yet')
+    with ServedLight(lights[0].port, SECOND):
+        bridge.wait_for('light 1/244 is served by /stern')
 
 
 def test_no_light_can_have_the_name_of_the_first_node(own_ros: Ros) -> None:

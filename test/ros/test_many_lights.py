@@ -18,6 +18,7 @@ from collections.abc import Iterator
 import contextlib
 
 import pytest
+from rclpy.node import NodeNameNonExistentError
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support.light import eventually, MavResult, ON_OFF, ServedLight, Source
@@ -66,11 +67,14 @@ def enable(node: str, ros: Ros) -> SetBool.Response:
 
 
 def interface(ros: Ros, node: str) -> set[tuple[str, str]]:
-    """Return names and types of what a node offers, without its own name."""
+    """Return names and types of what a node offers, without its own name; none before it is."""
     graph, name = ros.node, node.lstrip('/')
-    found = [*graph.get_publisher_names_and_types_by_node(name, '/'),
-             *graph.get_subscriber_names_and_types_by_node(name, '/'),
-             *graph.get_service_names_and_types_by_node(name, '/')]
+    try:
+        found = [*graph.get_publisher_names_and_types_by_node(name, '/'),
+                 *graph.get_subscriber_names_and_types_by_node(name, '/'),
+                 *graph.get_service_names_and_types_by_node(name, '/')]
+    except NodeNameNonExistentError:
+        return set()
     return {(topic.removeprefix(node), types[0]) for topic, types in found}
 
 

@@ -55,6 +55,13 @@ def test_lights_can_be_listed_with_names():
     assert [(str(one.source), one.name) for one in found] == [('1/243', 'bow'), ('2/10', '')]
 
 
+@pytest.mark.parametrize('option', ['--count', '--system-id', '--component-id'])
+@pytest.mark.parametrize('listing', [('--light', '1/2'), None], ids=['by option', 'by file'])
+def test_lights_that_are_listed_are_not_counted_too(option, listing):
+    with pytest.raises(SettingError, match=f'{option} is for lights that neither'):
+        described(option, '3', *(listing or ()), file=None if listing else FILE)
+
+
 def test_a_profile_brings_its_address():
     assert sources(described('--profile', 'reference')) == ['255/0']
     assert sources(described('--profile', 'ardusub', '--count', '2')) == ['1/1', '1/2']

@@ -126,6 +126,12 @@ class TestLiveView:
         assert '32.0 degC' in line
         assert prompt == '> '
 
+    def test_a_light_that_dims_itself_is_seen_to_in_80_columns(self, device, terminal):
+        device.press(0.0, enabled=True)
+        device.heat_to(85.0, 0.0)
+        LiveView(terminal).show([glance(device, 0.0)])
+        assert terminal.screen()[0].endswith('  thermal throttling')
+
     def test_what_is_being_typed_stays(self, device, terminal):
         view = LiveView(terminal)
         view.show([glance(device, 0.0)])

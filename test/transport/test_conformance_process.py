@@ -27,7 +27,7 @@ from illuminator_ros.conformance.requirements import REQUIREMENTS
 import pytest
 from support.ports import free_port
 from support.processes import environment, Program, ROOT, run
-from support.waiting import PATIENCE
+from support.waiting import eventually, PATIENCE
 
 # Started like this, none of what `pip install` does not bring can be imported.
 WITHOUT_ROS = (
@@ -92,22 +92,32 @@ def test_a_whole_run_ends_and_its_reports_agree(url, programs, tmp_path):
 def test_what_is_found_is_exit_status_1(url, programs):
     simulator = programs('simulator', f'udpin://{url}', '--fault', 'refuse=failed')
     simulator.wait_for('link open')
-    conformance = programs('conformance', f'udpout://{url}', '--only', 'on')
+    conformance = programs('conformance', f'udpout://{url}', '--only', 'brightness')
     assert conformance.wait() == 1
-    assert 'FAIL    on ' in conformance.log
+    assert 'FAIL    brightness ' in conformance.log
 
 
-def test_a_signal_ends_it_with_the_light_as_it_was(url, programs):
+def test_without_anybody_to_ask_a_light_that_cannot_be_dimmed_is_not_switched_on(url, programs):
+    simulator = programs('simulator', f'udpin://{url}', '--fault', 'refuse=failed')
+    simulator.wait_for('link open')
+    conformance = programs('conformance', f'udpout://{url}', '--only', 'on')
+    conformance.wait()
+    assert 'switched on, it would shine at 100 %' in conformance.log
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     simulator = programs('simulator', f'udpin://{url}')
     simulator.wait_for('link open')
-    conformance = programs('conformance', f'udpout://{url}', '--yes')
-    conformance.wait_for('    brightness ')
-    conformance.send(signal.SIGINT)
+    # It would take two hours.
+    conformance = programs('conformance', f'udpout://{url}', '--yes', '--only', 'brightness',
+                           '--only', 'thermal-flags', '--heat', '3600')
+    simulator.wait_for('ON     100 %')
+    conformance.send(number)
     assert conformance.wait() == 1
     assert conformance.log.rstrip().endswith('the light is as it was')
     assert 'Traceback' not in conformance.log
-    simulator.wait_for('100 %', count=2)
-    assert 'off    100 %  no strobe' in simulator.lines[-1]
+    eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
 
 
 def test_without_a_light_it_is_exit_status_1(url, programs):
@@ -186,9 +196,17 @@ def test_on_a_terminal_it_asks_before_it_dazzles(url, programs):
 
 def test_an_answer_that_is_neither_yes_nor_no_is_said_to_be_taken_as_no(url):
     _, seen = conversation(
-        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
+        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'strobe',
         answers=[('[y/N]', 'maybe')])
     assert "'maybe' is neither y nor n: taken as no" in seen
+
+
+def test_it_does_not_ask_where_nothing_that_dazzles_is_to_be_checked(url):
+    _, seen = conversation(
+        'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
+        '--only', 'on', answers=[])
+    assert 'no light was heard' in seen
+    assert '[y/N]' not in seen
 
 
 def test_the_simulator_is_operated_on_a_terminal(url):

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from ..bench import Bench
+from ..consent import dimmed
 from ..requirement import COMMAND, fail_if, Failed, MESSAGES, requirement, ROUTING, Skipped
 from ...mavlink.dialect import MavCmd, MavResult, Source, STATUS_ID
 
@@ -61,7 +62,7 @@ async def broadcast(bench: Bench) -> None:
              'Routing Detail', changes=True)
 async def other_target(bench: Bench) -> None:
     """Switch on what does not exist: another component, and another system."""
-    await bench.baseline()
+    await dimmed(bench)
     taken = bench.heard | {bench.identity, bench.light}
     system, component = bench.light
     others = [
@@ -84,7 +85,7 @@ async def other_target(bench: Bench) -> None:
              'Use COMMAND_INT or COMMAND_LONG?', changes=True)
 async def command_int(bench: Bench) -> str:
     """Switch it on with one."""
-    await bench.baseline()
+    await dimmed(bench)
     one = await bench.switch(True, as_int=True)
     if not one.accepted and one.result != MavResult.COMMAND_LONG_ONLY:
         raise Failed(f'COMMAND_INT {one.text}: {one.answer}', one.lines)
@@ -97,7 +98,7 @@ async def command_int(bench: Bench) -> str:
              'COMMAND_LONG sequence', changes=True)
 async def repeated(bench: Bench) -> None:
     """Send what a lost acknowledgement makes everybody send again."""
-    await bench.baseline()
+    await dimmed(bench)
     first = await bench.switch(True)
     if not first.accepted:
         raise Skipped(f'it cannot be switched on: {first.answer}')

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from ..bench import Bench, LOW, Transaction
+from ..bench import Bench, DIM, LOW, same, Transaction
+from ..consent import dark, dimmed
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
 from ...illuminator.model import float32, Limits, Mode
 from ...mavlink.dialect import MavCmd, MavResult
@@ -38,9 +39,16 @@ async def _all_refused(bench: Bench, values: list[tuple[float, ...]]) -> None:
 
 @requirement('mode-internal', 'takes internal control', ILLUMINATOR, 'MODES', changes=True)
 async def internal(bench: Bench) -> None:
-    """Configure it to that mode."""
+    """Configure it to that mode, from the other one if it takes that."""
     await bench.baseline()
-    _all_made([await bench.configure(Mode.INTERNAL_CONTROL)], 'mode')
+    await bench.configure(Mode.EXTERNAL_SYNC)
+    before = await bench.status()
+    # Another brightness, since in a light that knows one mode only the mode would show nothing.
+    one = await bench.configure(Mode.INTERNAL_CONTROL, brightness=DIM)
+    after = await bench.status()
+    if before and after and same(before, after):
+        fail_if([one.disagreement])
+    _all_made([one], 'mode')
 
 
 @requirement('mode-external', 'takes external sync, if mode_bitmask has it', ILLUMINATOR,
@@ -68,7 +76,7 @@ async def modes(bench: Bench) -> None:
 async def brightness(bench: Bench) -> str:
     """Try some, 100 % only if that may be."""
     await bench.baseline()
-    values = (50.0, 100.0, 33.3) if bench.consent else (5.0, 20.0)
+    values = (50.0, 100.0, 33.3) if bench.consent else (5.0, DIM)
     _all_made([await bench.configure(brightness=value) for value in values], 'brightness')
     return ', '.join(f'{value:g} %' for value in values)
 
@@ -77,6 +85,7 @@ async def brightness(bench: Bench) -> str:
              'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
 async def brightness_values(bench: Bench) -> None:
     """Try them."""
+    await dark(bench)
     await _all_refused(bench, [(INTERNAL, value, 0.0, 0.0) for value in (-1.0, 101.0)])
 
 
@@ -151,7 +160,8 @@ async def duty_values(bench: Bench) -> None:
              'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
 async def not_a_number(bench: Bench) -> None:
     """Try them one by one: comparisons with NaN are all false, so naive checks let it in."""
-    await bench.baseline()
+    await dark(bench)
+    await dimmed(bench)
     wrong = []
     for value in (NAN, INF, -INF):
         wrong.append(await bench.refused(MavCmd.ILLUMINATOR_ON_OFF, (value,)))

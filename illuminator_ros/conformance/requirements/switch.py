@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from ..bench import Bench
+from ..consent import dimmed
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
 from ...mavlink.dialect import MavCmd
 
@@ -24,7 +25,7 @@ from ...mavlink.dialect import MavCmd
 @requirement('on', 'is switched on', ILLUMINATOR, 'ON/OFF', changes=True)
 async def on(bench: Bench) -> None:
     """Switch it on at low brightness."""
-    await bench.baseline()
+    await dimmed(bench)
     await _switch(bench, True)
 
 
@@ -33,7 +34,7 @@ async def off(bench: Bench) -> None:
     """Switch it off, from on: nothing is seen of it in a light that is off."""
     status = await bench.status()
     if status is not None and not status.enabled:
-        await bench.baseline()
+        await dimmed(bench)
         await bench.switch(True)
     await _switch(bench, False)
 
@@ -52,6 +53,6 @@ async def _switch(bench: Bench, on: bool) -> None:
              'MAV_CMD_ILLUMINATOR_ON_OFF', changes=True)
 async def values(bench: Bench) -> None:
     """Try what is neither."""
-    await bench.baseline()
+    await dimmed(bench)
     fail_if([await bench.refused(MavCmd.ILLUMINATOR_ON_OFF, (value,))
              for value in (-1.0, 2.0, 0.5, 255.0)])

@@ -1,0 +1,56 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator's process on links of every kind, with the drone's side at the other end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+import socket
+from typing import Any
+
+from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.framing import Decoder
+import pytest
+from support.live_link import Bridge
+from support.ports import free_port
+from support.processes import ended, python
+from support.ptys import PtyDevice
+
+
+@pytest.mark.parametrize(('lights', 'drone'), [
+    ('udp://@127.0.0.1:{}', 'udpin:127.0.0.1:{}'),
+    ('udpin://127.0.0.1:{}', 'udpout://127.0.0.1:{}'),
+    ('tcp://127.0.0.1:{}', 'tcpin:127.0.0.1:{}'),
+    ('tcp-l://127.0.0.1:{}', 'tcpout://127.0.0.1:{}'),
+], ids=['UDP, sends', 'UDP, listens', 'TCP client', 'TCP server'])
+def test_its_lights_are_found_and_switched(
+    run: Callable[..., Any], lights: str, drone: str,
+) -> None:
+    port = free_port(socket.SOCK_STREAM if 'tcp' in lights else socket.SOCK_DGRAM)
+    with ended(python('illuminator_ros.simulator', lights.format(port))):
+        assert run(Bridge(drone.format(port))).enable(True).success
+
+
+def test_it_serves_a_serial_line(tmp_path: Path) -> None:
+    pytest.importorskip('serial', reason='pyserial is not installed')
+    device, decoder = PtyDevice(tmp_path), Decoder()
+    frames: list[Any] = []
+    with ended(python('illuminator_ros.simulator', f'serial://{device.path}:57600')) as simulator:
+        simulator.wait_for('link open')
+        while not frames and (data := device.read()):
+            frames = list(decoder.feed(data))
+    device.pull_out()
+    assert frames[0].source == Source(1, 243)
