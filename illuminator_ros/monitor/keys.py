@@ -38,7 +38,8 @@ HELP: tuple[tuple[tuple[str, ...], str], ...] = (
     (('a',), 'ALL lights off'),
     (('c',), 'clear lights that are gone'),
     (('?', 'h'), 'this help'),
-    (('q', 'ctrl-c', 'ctrl-d'), 'quit'),
+    (('q', 'ctrl-c', 'ctrl-d', 'ctrl-\\'), 'quit'),
+    (('ctrl-z',), 'stop; fg goes on'),
 )
 
 

@@ -18,30 +18,50 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import functools
 import os
 import select
+import signal
 import sys
 import tempfile
 import termios
+import threading
 
 # s after an escape in which what belongs to it must have come.
 ESCAPE_TIMEOUT = 0.05
 
 
 @contextlib.contextmanager
-def unbuffered(descriptor: int) -> Iterator[None]:
-    """Have a terminal pass on each key at once, without showing it."""
+def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
+    """
+    Have a terminal pass on each key at once, without showing it.
+
+    Yield what brings it back without waiting for what is still to be written, for an end by force.
+    """
     before = termios.tcgetattr(descriptor)
     changed = termios.tcgetattr(descriptor)
     changed[3] &= ~(termios.ICANON | termios.ECHO)
     changed[6][termios.VMIN], changed[6][termios.VTIME] = 1, 0
-    # Stopped by ctrl-z it would leave a shell with this terminal.
-    changed[6][termios.VSUSP] = b'\0'
     try:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
-        yield
+        yield functools.partial(termios.tcsetattr, descriptor, termios.TCSANOW, before)
     finally:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+@contextlib.contextmanager
+def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
+    """Have ``on_stop()`` called instead of being stopped, by ctrl-z or SIGTSTP."""
+    before = signal.signal(signal.SIGTSTP, lambda *_: on_stop())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTSTP, before)
+
+
+def suspend() -> None:
+    """Be stopped as ctrl-z stops a program; where no shell could continue it, nothing happens."""
+    signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
 
 
 @contextlib.contextmanager

@@ -137,7 +137,9 @@ def _anything(desk: Desk) -> object:
     return one.selected, one.show_help, one.quit, list(desk.asked), desk.cleared
 
 
-@pytest.mark.parametrize('key', [spelling for keys, _ in HELP for spelling in keys])
+# The terminal makes a signal of ctrl-z: test/system/test_monitor.py.
+@pytest.mark.parametrize('key', [
+    spelling for keys, _ in HELP for spelling in keys if spelling != 'ctrl-z'])
 def test_every_key_of_the_help_does_something(desk: Desk, key: str) -> None:
     desk.press('down')
     before = _anything(desk)

@@ -87,13 +87,21 @@ class TestUnbuffered:
 
         assert termios.tcgetattr(line[1]) == before
 
-    def test_ctrl_c_is_still_a_signal_and_ctrl_z_is_not(self, line: tuple[int, int]) -> None:
+    def test_keys_that_are_signals_are_still_signals(self, line: tuple[int, int]) -> None:
         with unbuffered(line[1]):
             modes, characters = termios.tcgetattr(line[1])[3], termios.tcgetattr(line[1])[6]
 
         assert modes & termios.ISIG
-        assert characters[termios.VINTR] == b'\x03'
-        assert characters[termios.VSUSP] == b'\0'
+        assert [characters[key] for key in (termios.VINTR, termios.VQUIT, termios.VSUSP)] == [
+            b'\x03', b'\x1c', b'\x1a']
+
+    def test_it_can_be_brought_back_from_another_thread(self, line: tuple[int, int]) -> None:
+        before = termios.tcgetattr(line[1])
+
+        with unbuffered(line[1]) as restore:
+            restore()
+
+            assert termios.tcgetattr(line[1]) == before
 
 
 def test_errors_meanwhile_are_shown_afterwards(capfd: pytest.CaptureFixture[str]) -> None:
