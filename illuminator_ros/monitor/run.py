@@ -139,7 +139,7 @@ def _watch(
         with (quiet_errors(), unbuffered(sys.stdin.fileno()) as restore, suspended_by(stop),
               Live(console=console, screen=True, auto_refresh=False) as live):
             termination.calls(end, last=restore)
-            while not (operator.quit or stopped.is_set()):
+            while not (operator.quit or operator.stop or stopped.is_set()):
                 lights = monitor.lights()
                 operator.look(lights)
                 scene = Scene(lights, operator.selected, monitor.clock(), operator.show_help,
@@ -149,7 +149,8 @@ def _watch(
                 for key in decoder.feed(data):
                     operator.press(key, lights, monitor.clock())
         if not operator.quit:
-            suspend()
+            suspend(job=operator.stop)
+            operator.stop = False
     keyboard.close()
     return 0
 

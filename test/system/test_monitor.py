@@ -62,9 +62,16 @@ class TestOnATerminal:
             eventually(lambda: screen.restored)
             assert 'Traceback' not in screen.raw
 
-    @pytest.mark.parametrize('way', ['\x1a', 'SIGTSTP'])
-    def test_it_gives_the_terminal_back_while_it_is_stopped(self, own_ros: Ros, way: str) -> None:
-        shell = '"$@" & echo pid $!; fg; echo in the shell; read line; fg'
+    @pytest.mark.parametrize(('way', 'job'), [
+        ('SIGTSTP', '"$@"'),
+        ('\x1a', '"$@"'),
+        # As "ros2 run" does, another program waits for it in the same job.
+        ('\x1a', '("$@"; exit $?)'),
+    ])
+    def test_it_gives_the_terminal_back_while_it_is_stopped(
+        self, own_ros: Ros, way: str, job: str,
+    ) -> None:
+        shell = f'{job} & echo pid $!; fg; echo in the shell; read line; fg'
         with terminal(env=domain(own_ros), shell=shell) as screen:
             screen.wait_for('no lights in this ROS graph yet')
 
