@@ -57,13 +57,14 @@ connection URLs, each meaning what it means in MAVROS, MAVSDK or pymavlink:
   tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
   serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
 
-exit status: 0 after SIGINT or SIGTERM, 2 if an argument or parameter is wrong.
+exit status: 0 after SIGINT, SIGTERM or SIGHUP; 1 if a package is missing; 2 if an argument or
+parameter is wrong.
 """
 
 
 def main(args: list[str] | None = None) -> int:
     """
-    Run the bridge until SIGINT or SIGTERM; see :func:`usage`.
+    Run the bridge until a signal; see :func:`usage`.
 
     :param args: the command line without the program's name.
     """

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import re
+import signal
 import sys
 
 from .termination import Termination
@@ -32,15 +33,18 @@ _REMEDIES = {
 }
 
 
-def enter(name: str, run: Callable[[Termination], int]) -> int:
+def enter(
+    name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (),
+) -> int:
     """
     Run a program and return its exit status.
 
     :param name: of the program.
     :param run: is to import what it needs itself, so that a signal meanwhile ends the process
         as one later does.
+    :param more: signals that end it too, see :class:`Termination`.
     """
-    termination = Termination()
+    termination = Termination(more)
     status = explained(name, lambda: run(termination))
     termination.finish()
     return status

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ending a process in order, and in time, on SIGINT and SIGTERM."""
+"""Ending a process in order, and in time, on SIGINT, SIGTERM and SIGHUP."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import contextlib
 import os
 import signal
@@ -25,36 +25,44 @@ import threading
 import time
 from typing import NoReturn
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, whatever hangs.
 LIMIT = 0.95
 
 
 class Termination:
     """
-    Takes SIGINT and SIGTERM from its construction on: make it before anything slow is imported.
+    Takes signals from its construction on: make it before anything slow is imported.
 
     A handler would run in the main thread between any two instructions, where an exception ends
     half-done imports and is printed by destructors, and a flag is not seen while C code waits.
     So the signals are blocked, in this thread and all that it starts, and one thread waits for
     them.
+
+    :param more: signals beside SIGINT, SIGTERM and SIGHUP. Under nohup SIGHUP is left ignored.
     """
 
-    def __init__(self) -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    def __init__(self, more: Iterable[signal.Signals] = ()) -> None:
+        # Blocked, it would be waited for although it is ignored.
+        ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
+        self._signals = {*SIGNALS, *more} - ignored
+        signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
         self._lock = threading.Lock()
         self._end: Callable[[], None] | None = None
+        self._last: Callable[[], None] | None = None
         self._signalled = False
         threading.Thread(target=self._wait, name='termination', daemon=True).start()
 
-    def calls(self, end: Callable[[], None]) -> None:
+    def calls(self, end: Callable[[], None], last: Callable[[], None] | None = None) -> None:
         """
         Have ``end()`` called on a signal, once; until now one would have ended the process.
 
         It is called in another thread, and the process ends soon after it even if it hangs.
+
+        :param last: called before that if it hangs; is to be quick.
         """
         with self._lock:
-            self._end = end
+            self._end, self._last = end, last
             signalled = self._signalled
         if signalled:
             end()
@@ -70,7 +78,7 @@ class Termination:
             _exit()
 
     def _wait(self) -> None:
-        signal.sigwait(SIGNALS)
+        signal.sigwait(self._signals)
         with self._lock:
             self._signalled = True
             end = self._end
@@ -79,6 +87,9 @@ class Termination:
             # Not here: whatever it may wait for, the time runs.
             threading.Thread(target=end, name='end', daemon=True).start()
             time.sleep(LIMIT)
+            if self._last is not None:
+                with contextlib.suppress(Exception):
+                    self._last()
         _exit()
 
 

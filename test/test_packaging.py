@@ -116,6 +116,16 @@ def test_what_the_tests_import_is_declared() -> None:
     assert needed - declared == set()
 
 
+def test_the_quality_declaration_has_each_dependency() -> None:
+    keys = {key: module for module, key in KEYS.items() if module != 'fastcrc'}
+    titles = {'serial': 'pyserial', 'yaml': 'PyYAML'}
+    text = (ROOT / 'QUALITY_DECLARATION.md').read_text().partition('5.i ROS')[2]
+
+    for depend in parse_package(str(ROOT)).exec_depends:
+        module = keys.get(depend.name, depend.name)
+        assert titles.get(module, module) in text
+
+
 @pytest.mark.parametrize('linter', ['copyright', 'flake8', 'pep257', 'xmllint'])
 def test_each_linter_of_ros_is_declared_and_run(linter: str) -> None:
     assert f'ament_{linter}' in {each.name for each in parse_package(str(ROOT)).test_depends}

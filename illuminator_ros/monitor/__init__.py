@@ -22,13 +22,15 @@ from the ROS graph, ``terminal`` is the terminal, ``run`` the command line.
 
 from __future__ import annotations
 
+import signal
+
 from ..entry import enter
 from ..termination import Termination
 
 
 def main(args: list[str] | None = None) -> int:
     """
-    Show the lights until ``q``, SIGINT or SIGTERM; see :mod:`~.run`.
+    Show the lights until ``q`` or a signal; see :mod:`~.run`.
 
     :param args: the command line without the program's name.
     """
@@ -36,4 +38,5 @@ def main(args: list[str] | None = None) -> int:
         from .run import run
         return run(args, termination)
 
-    return enter('monitor', start)
+    # Ctrl-\ too: it would leave the terminal without echo.
+    return enter('monitor', start, more=[signal.SIGQUIT])

@@ -23,7 +23,8 @@ _SEQUENCES = {
     '[1~': 'home', '[4~': 'end', '[7~': 'home', '[8~': 'end', '[5~': 'page up',
     '[6~': 'page down',
 }
-_CHARACTERS = {'\r': 'enter', '\n': 'enter', ' ': 'space', '\x03': 'ctrl-c', '\x04': 'ctrl-d'}
+_CHARACTERS = {'\r': 'enter', '\n': 'enter', ' ': 'space', '\x03': 'ctrl-c', '\x04': 'ctrl-d',
+               '\x1a': 'ctrl-z', '\x1c': 'ctrl-\\'}
 
 # What a key does, for people, in the order of the help; the first spelling is the one shown.
 HELP: tuple[tuple[tuple[str, ...], str], ...] = (
@@ -38,7 +39,8 @@ HELP: tuple[tuple[tuple[str, ...], str], ...] = (
     (('a',), 'ALL lights off'),
     (('c',), 'clear lights that are gone'),
     (('?', 'h'), 'this help'),
-    (('q', 'ctrl-c', 'ctrl-d'), 'quit'),
+    (('q', 'ctrl-c', 'ctrl-d', 'ctrl-\\'), 'quit'),
+    (('ctrl-z',), 'stop; fg goes on'),
 )
 
 

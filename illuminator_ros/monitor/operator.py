@@ -24,7 +24,7 @@ from .keys import HELP
 from .model import Light, State
 
 PAGE = 10
-QUIT, ALL_OFF, CLEAR, SHOW_HELP = 'q', 'a', 'c', '?'
+QUIT, STOP, ALL_OFF, CLEAR, SHOW_HELP = 'q', 'ctrl-z', 'a', 'c', '?'
 # The first spelling of each key.
 _SAME = {spelling: keys[0] for keys, _ in HELP for spelling in keys}
 _MOVES = {'up': -1, 'k': -1, 'down': 1, 'j': 1, 'page up': -PAGE, 'page down': PAGE,
@@ -51,6 +51,7 @@ class Operator:
     What is selected and shown, and what keys do to it. No I/O.
 
     :ivar selected: the name of a light, None while there is none.
+    :ivar stop: whether the job is to be stopped, until the shell continues it.
     """
 
     def __init__(self, lights: Lights) -> None:
@@ -58,6 +59,7 @@ class Operator:
         self.selected: str | None = None
         self.show_help = False
         self.quit = False
+        self.stop = False
 
     def look(self, lights: Sequence[Light]) -> None:
         """Take what lights there are: the selection stays, or goes to the nearest one."""
@@ -72,6 +74,8 @@ class Operator:
         meaning = _SAME.get(key)
         if meaning == QUIT:
             self.quit = True
+        elif meaning == STOP:
+            self.stop = True
         elif self.show_help:
             self.show_help = False
         elif key in _MOVES:

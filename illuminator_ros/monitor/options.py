@@ -32,8 +32,8 @@ examples:
   ros2 run illuminator_ros monitor --once | grep LOST
   NO_COLOR=1 ros2 run illuminator_ros monitor
 
-exit status: 0 after q, ctrl-c or SIGTERM, or with a table printed; 1 if no light was found for
-that table, or a package is missing; 2 if an argument is wrong.
+exit status: 0 after q or a signal, or with a table printed; 1 if no light was found for that
+table, or a package is missing; 2 if an argument is wrong.
 """
 
 

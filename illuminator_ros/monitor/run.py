@@ -37,7 +37,14 @@ from .keys import KeyDecoder
 from .model import Fleet, Light
 from .operator import Operator
 from .options import parser
-from .terminal import ESCAPE_TIMEOUT, Keyboard, quiet_errors, unbuffered
+from .terminal import (
+    ESCAPE_TIMEOUT,
+    Keyboard,
+    quiet_errors,
+    suspend,
+    suspended_by,
+    unbuffered,
+)
 from .view import plain, Scene, screen
 from ..entry import one_line
 from ..ros.spinner import Spinner
@@ -116,24 +123,34 @@ def _watch(
     operator = Operator(monitor.graph)
     keyboard = Keyboard(sys.stdin.fileno())
     decoder = KeyDecoder()
+    stopped = threading.Event()
     ascii_only = ascii_only or console.options.ascii_only
 
     def stop() -> None:
+        stopped.set()
+        keyboard.wake()
+
+    def end() -> None:
         operator.quit = True
         keyboard.wake()
 
-    termination.calls(stop)
-    with (quiet_errors(), unbuffered(sys.stdin.fileno()),
-          Live(console=console, screen=True, auto_refresh=False) as live):
-        while not operator.quit:
-            lights = monitor.lights()
-            operator.look(lights)
-            scene = Scene(lights, operator.selected, monitor.clock(), operator.show_help,
-                          ascii_only=ascii_only)
-            live.update(screen(scene, console.width, console.height), refresh=True)
-            data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, stop)
-            for key in decoder.feed(data):
-                operator.press(key, lights, monitor.clock())
+    while not operator.quit:
+        stopped.clear()
+        with (quiet_errors(), unbuffered(sys.stdin.fileno()) as restore, suspended_by(stop),
+              Live(console=console, screen=True, auto_refresh=False) as live):
+            termination.calls(end, last=restore)
+            while not (operator.quit or operator.stop or stopped.is_set()):
+                lights = monitor.lights()
+                operator.look(lights)
+                scene = Scene(lights, operator.selected, monitor.clock(), operator.show_help,
+                              ascii_only=ascii_only)
+                live.update(screen(scene, console.width, console.height), refresh=True)
+                data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
+                for key in decoder.feed(data):
+                    operator.press(key, lights, monitor.clock())
+        if not operator.quit:
+            suspend(job=operator.stop)
+            operator.stop = False
     keyboard.close()
     return 0
 

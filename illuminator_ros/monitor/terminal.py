@@ -18,30 +18,67 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import functools
 import os
 import select
+import signal
 import sys
 import tempfile
 import termios
+import threading
 
 # s after an escape in which what belongs to it must have come.
 ESCAPE_TIMEOUT = 0.05
 
 
 @contextlib.contextmanager
-def unbuffered(descriptor: int) -> Iterator[None]:
-    """Have a terminal pass on each key at once, without showing it."""
+def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
+    """
+    Have a terminal pass on each key at once, without showing it.
+
+    Yield what brings it back without waiting for what is still to be written, for an end by force.
+    """
     before = termios.tcgetattr(descriptor)
     changed = termios.tcgetattr(descriptor)
     changed[3] &= ~(termios.ICANON | termios.ECHO)
     changed[6][termios.VMIN], changed[6][termios.VTIME] = 1, 0
-    # Stopped by ctrl-z it would leave a shell with this terminal.
-    changed[6][termios.VSUSP] = b'\0'
+    # Ctrl-\ and ctrl-z as signals would end or stop "ros2 run" at once, and the shell have the
+    # terminal before it is brought back.
+    changed[6][termios.VQUIT] = changed[6][termios.VSUSP] = b'\0'
     try:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
+        yield functools.partial(termios.tcsetattr, descriptor, termios.TCSANOW, before)
+    finally:
+        # Blocked, it lets a terminal be set that the shell has taken back already.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTTOU])
+        # Or the terminal is gone.
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextlib.contextmanager
+def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
+    """Have ``on_stop()`` called instead of being stopped, by SIGTSTP."""
+    before = signal.signal(signal.SIGTSTP, lambda *_: on_stop())
+    try:
         yield
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        signal.signal(signal.SIGTSTP, before)
+
+
+def suspend(job: bool) -> None:
+    """
+    Be stopped until a shell continues it; where none could, nothing happens.
+
+    :param job: stop the whole job, as ctrl-z does: "ros2 run", too.
+    """
+    if job:
+        before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        os.kill(0, signal.SIGTSTP)
+        signal.signal(signal.SIGTSTP, before)
+    # Not to the process: another thread would take it, and this one have the terminal meanwhile.
+    signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
 
 
 @contextlib.contextmanager

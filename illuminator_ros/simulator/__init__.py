@@ -22,7 +22,7 @@ from ..termination import Termination
 
 def main(args: list[str] | None = None) -> int:
     """
-    Run the simulator until SIGINT or SIGTERM; see :mod:`~.run`.
+    Run the simulator until a signal; see :mod:`~.run`.
 
     :param args: the command line without the program's name.
     """

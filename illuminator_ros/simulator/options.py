@@ -52,7 +52,8 @@ faults, for --fault, the file and the console; several are separated by commas:
 console: lines on standard input, for all lights or, behind its id or name, for one
 {describe_commands()}
 
-exit status: 0 after SIGINT, SIGTERM or quit, 2 if an argument is wrong."""
+exit status: 0 after a signal (SIGINT, SIGTERM, SIGHUP) or quit, 1 if a package is missing, 2 if an
+argument is wrong."""
 
 
 def parser() -> argparse.ArgumentParser:

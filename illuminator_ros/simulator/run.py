@@ -115,7 +115,7 @@ class _Simulation:
 
 def run(args: list[str] | None, termination: Termination) -> int:
     """
-    Run the simulator until SIGINT or SIGTERM, and return the exit status.
+    Run the simulator until a signal or ``quit``, and return the exit status.
 
     :param args: the command line without the program's name; None takes the process's.
     """

@@ -17,14 +17,20 @@
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from support.linters import lint, ROOT
 
 
 @pytest.mark.copyright
 @pytest.mark.linter
-def test_copyright(monkeypatch: pytest.MonkeyPatch) -> None:
-    linter = pytest.importorskip('ament_copyright.main', reason='ament_copyright is not installed')
-    monkeypatch.chdir(ROOT)
+def test_copyright() -> None:
+    status, text = lint('copyright', ROOT)
 
-    assert linter.main(argv=[]) == 0
+    assert status == 0, text
+
+
+def test_a_file_without_a_header_is_found(tmp_path: Path) -> None:
+    (tmp_path / 'planted.py').write_text('import os\n')
+
+    status, text = lint('copyright', tmp_path)
+
+    assert (status, 'planted.py: could not find copyright notice' in text) == (1, True), text

@@ -134,7 +134,7 @@ def test_any_key_leaves_the_help_and_does_nothing_else(desk: Desk) -> None:
 
 def _anything(desk: Desk) -> object:
     one = desk.operator
-    return one.selected, one.show_help, one.quit, list(desk.asked), desk.cleared
+    return one.selected, one.show_help, one.quit, one.stop, list(desk.asked), desk.cleared
 
 
 @pytest.mark.parametrize('key', [spelling for keys, _ in HELP for spelling in keys])

@@ -19,6 +19,7 @@ import math
 import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
+from support.embedded import resting_bridge
 from support.light import ServedLight
 from support.recording import Recorder
 from support.ros import Ros, running_bridge
@@ -32,7 +33,7 @@ STATE = (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL, 1)
 STREAM = (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE, 10)
 
 
-@pytest.mark.parametrize(('topic', 'type_', 'quality'), [
+QUALITIES = [
     ('/illuminator/connected', 'std_msgs/msg/Bool', STATE),
     ('/illuminator/enabled', 'std_msgs/msg/Bool', STATE),
     ('/illuminator/brightness', 'std_msgs/msg/Float32', STATE),
@@ -43,7 +44,10 @@ STREAM = (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE, 10)
     ('/illuminator/uptime', 'std_msgs/msg/Float64', STATE),
     ('/illuminator/temperature', 'sensor_msgs/msg/Temperature', STREAM),
     ('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', STREAM),
-])
+]
+
+
+@pytest.mark.parametrize(('topic', 'type_', 'quality'), QUALITIES)
 def test_type_and_quality_of_service(
     ros: Ros, light: ServedLight, topic: str, type_: str, quality: tuple[object, ...],
 ) -> None:
@@ -53,9 +57,17 @@ def test_type_and_quality_of_service(
 
     assert info.topic_type == type_
     assert (profile.reliability, profile.durability) == quality[:2]
-    # Fast DDS tells neither history nor depth to others, a middleware that does must agree.
-    assert profile.history in (HistoryPolicy.UNKNOWN, HistoryPolicy.KEEP_LAST)
-    assert profile.depth in (0, quality[2])
+
+
+def test_the_depths(domain: int) -> None:
+    """Fast DDS does not tell them to others."""
+    with resting_bridge(domain, lambda: 0.0) as process:
+        published = {publisher.topic_name: publisher.qos_profile
+                     for publisher in process.node.publishers}
+
+    assert {topic: (published[topic].history, published[topic].depth)
+            for topic, _, _ in QUALITIES} == {
+        topic: (HistoryPolicy.KEEP_LAST, quality[2]) for topic, _, quality in QUALITIES}
 
 
 @pytest.fixture(scope='module')

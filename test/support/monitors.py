@@ -95,18 +95,22 @@ class Watching:
 
 
 class Terminal:
-    """A pseudo-terminal with a program of ours on it."""
+    """
+    A pseudo-terminal with a program of ours on it.
+
+    :param shell: script of a shell with job control, which runs the program as ``"$@"``.
+    """
 
     def __init__(self, module: str, *arguments: str, size: tuple[int, int] = (24, 100),
-                 env: dict[str, str] | None = None) -> None:
+                 env: dict[str, str] | None = None, shell: str = 'exec "$@"') -> None:
         self._master, self._slave = pty.openpty()
         self.resize(*size)
         self.before = termios.tcgetattr(self._slave)
         given = {'TERM': 'xterm-256color', 'LANG': 'C.UTF-8', 'COLUMNS': '', 'LINES': '',
                  **(env or {})}
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'support.slow_program', module, *arguments], cwd=ROOT,
-            env=environment({**slow_environment(), **given}),
+            ['sh', '-mc', shell, 'sh', sys.executable, '-m', 'support.slow_program', module,
+             *arguments], cwd=ROOT, env=environment({**slow_environment(), **given}),
             stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
             preexec_fn=_own_terminal)
         self._grown = threading.Condition()

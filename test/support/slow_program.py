@@ -32,7 +32,8 @@ def main(module: str) -> int:
     """Run a module with the rest of the command line, and return its exit status."""
     # As the module does before it imports anything: of the threads that start meanwhile, none
     # is to take a signal.
-    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    signal.pthread_sigmask(signal.SIG_BLOCK, (
+        signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
     from support.slow import CLOCK, SlowLink
     from support.waiting import PATIENCE
     place: Any = import_module(PLACES[module])

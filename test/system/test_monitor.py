@@ -14,6 +14,8 @@
 
 """``monitor`` as a process: on a terminal, without one, and where something is missing."""
 
+import os
+import re
 import signal
 import subprocess
 import sys
@@ -45,7 +47,8 @@ class TestOnATerminal:
 
             assert (light.fake.fields['enable'], light.fake.fields['brightness']) == (1, 90.0)
 
-    @pytest.mark.parametrize('way', ['q', '\x03', '\x04', 'SIGINT', 'SIGTERM'])
+    @pytest.mark.parametrize('way', [
+        'q', '\x03', '\x04', '\x1c', 'SIGINT', 'SIGTERM', 'SIGQUIT', 'SIGHUP'])
     def test_it_leaves_the_terminal_as_it_was(self, own_ros: Ros, way: str) -> None:
         with terminal(env=domain(own_ros)) as screen:
             screen.wait_for('no lights in this ROS graph yet')
@@ -59,11 +62,41 @@ class TestOnATerminal:
             eventually(lambda: screen.restored)
             assert 'Traceback' not in screen.raw
 
-    def test_ctrl_z_does_not_leave_a_shell_with_it(self, own_ros: Ros) -> None:
+    @pytest.mark.parametrize(('way', 'job'), [
+        ('SIGTSTP', '"$@"'),
+        ('\x1a', '"$@"'),
+        # As "ros2 run" does, another program waits for it in the same job.
+        ('\x1a', '("$@"; exit $?)'),
+    ])
+    def test_it_gives_the_terminal_back_while_it_is_stopped(
+        self, own_ros: Ros, way: str, job: str,
+    ) -> None:
+        shell = f'{job} & echo pid $!; fg; echo in the shell; read line; fg'
+        with terminal(env=domain(own_ros), shell=shell) as screen:
+            screen.wait_for('no lights in this ROS graph yet')
+
+            if way == '\x1a':
+                screen.type(way)
+            else:
+                [pid] = re.findall(r'pid (\d+)', screen.raw)
+                os.kill(int(pid), signal.SIGTSTP)
+            screen.wait_for('in the shell')
+            assert screen.restored
+
+            screen.forget()
+            screen.type('\n')
+            screen.wait_for('no lights in this ROS graph yet')
+            screen.type('q')
+            assert screen.wait() == 0
+            eventually(lambda: screen.restored)
+
+    def test_ctrl_z_is_nothing_where_no_shell_could_continue_it(self, own_ros: Ros) -> None:
         with terminal(env=domain(own_ros)) as screen:
             screen.wait_for('no lights in this ROS graph yet')
 
-            screen.type('\x1a?')
+            screen.type('\x1a')
+            eventually(lambda: screen.raw.count('\x1b[?1049h') == 2)
+            screen.type('?')
 
             screen.wait_for('any key goes back')
 

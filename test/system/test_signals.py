@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""SIGINT and SIGTERM end every program at any moment: status 0, in time, without a traceback."""
+"""SIGINT, SIGTERM and SIGHUP end every program at any moment: status 0, in time, no traceback."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from support.ports import free_port
 from support.processes import environment, Program, python
 from support.ros import Ros, start_bridge, start_slow_bridge
 
-SIGNALS = [signal.SIGINT, signal.SIGTERM]
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 # Programs at a time; more would only measure how they wait for each other.
 AT_ONCE = 3
 # s; what Fast DDS has by default.
@@ -44,7 +44,7 @@ HANGING = """
 import threading
 from illuminator_ros.entry import enter
 def hang(termination):
-    termination.calls(threading.Event().wait)
+    termination.calls(threading.Event().wait, last=lambda: print('at last', flush=True))
     print('hanging', flush=True)
     threading.Event().wait()
 enter('program', hang)
@@ -54,12 +54,16 @@ enter('program', hang)
 Ending = tuple[int, str]
 
 
-def signals_are_taken(program: Program) -> bool:
-    """Return whether a program has come so far that it answers for signals itself."""
+def blocked(program: Program) -> set[signal.Signals]:
+    """Return which of the signals a program has blocked, in order to wait for them itself."""
     with open(f'/proc/{program.pid}/status') as file:
         [mask] = [line.split()[1] for line in file if line.startswith('SigBlk:')]
-    wanted = sum(1 << number - 1 for number in SIGNALS)
-    return int(mask, 16) & wanted == wanted
+    return {number for number in SIGNALS if int(mask, 16) & 1 << number - 1}
+
+
+def signals_are_taken(program: Program) -> bool:
+    """Return whether a program has come so far that it answers for signals itself."""
+    return blocked(program) == set(SIGNALS)
 
 
 class Case:
@@ -153,6 +157,10 @@ def test_a_program_ends(
     ros: Ros, moment: Callable[[Case, int], Ending], count: int,
     number: signal.Signals,
 ) -> None:
+    # It takes the same way as SIGTERM.
+    if number == signal.SIGHUP:
+        count = 1
+
     def run(n: int) -> Ending:
         with Case(ros, f'{moment.__name__} {number.name} {n}') as case:
             return moment(case, number)
@@ -181,6 +189,7 @@ def test_a_program_that_hangs_ends_all_the_same() -> None:
     program.wait_for('hanging')
 
     assert program.end(signal.SIGTERM) == 0
+    assert program.count('at last') == 1
 
 
 def test_the_parts_of_an_end_have_time_before_it_is_forced_and_that_is_within_a_second() -> None:
@@ -224,3 +233,14 @@ def test_a_program_in_the_background_of_a_script_ends_too(ros: Ros) -> None:
 
     program.wait_for('status 0')
     assert program.wait() == 0
+
+
+def test_a_program_under_nohup_outlives_its_terminal() -> None:
+    port = free_port()
+    program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
+                      'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')
+    program.wait_for('link open')
+
+    # What is ignored and not blocked has no effect.
+    assert blocked(program) == {signal.SIGINT, signal.SIGTERM}
+    assert program.end(signal.SIGTERM) == 0
