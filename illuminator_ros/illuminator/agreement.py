@@ -20,9 +20,12 @@ from collections.abc import Iterable, Mapping
 import math
 from typing import Any, TYPE_CHECKING
 
+from .comparison import unexplained
+from .configure import Configure
 from .model import checked, Configuration, FIELDS, InvalidValue, NOTHING, Status
 from .observer import Cause
-from .operation import Configure, Done, OperationQueue, Result, unexplained
+from .operation import Done, Result
+from .operation_queue import OperationQueue
 
 if TYPE_CHECKING:
     from .light import Light

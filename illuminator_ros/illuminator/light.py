@@ -21,10 +21,12 @@ from dataclasses import dataclass
 import math
 
 from .agreement import Agreement
+from .enable import Enable
 from .identification import Identification
 from .model import ErrorFlag, Identity, Limits, Status
 from .observer import LightObserver
-from .operation import Done, Enable, OperationQueue, Result
+from .operation import Done, Result
+from .operation_queue import OperationQueue
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime

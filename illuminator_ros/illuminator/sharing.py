@@ -25,8 +25,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from .comparison import unexplained
 from .model import DIMMING_FLAGS, Mode, NOTHING, Status
-from .operation import unexplained
 from .uptime import WRAP_MS
 
 # Changes back to what was before, by which several lights are told: the sixth status of

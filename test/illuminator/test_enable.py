@@ -17,7 +17,8 @@
 import re
 
 from illuminator_ros.illuminator.device import DeviceProperties
-from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT, PROGRESS_LIMIT
+from illuminator_ros.illuminator.enable import PROGRESS_LIMIT
+from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,
