@@ -34,8 +34,8 @@ TIME = {'time', 'datetime'}
 THREADS = {'threading', 'queue', 'multiprocessing', 'concurrent'}
 FORBIDDEN = {'mavlink': ROS, 'illuminator': ROS | IO | TIME | THREADS, 'ros': {'socket'}}
 # Inside mavlink/ too, the protocol itself does no I/O and has no clock.
-SANS_IO = ('agenda', 'command', 'dialect', 'echoes', 'endpoint', 'framing', 'round_trip',
-           'signing', 'statistics', 'url')
+SANS_IO = ('agenda', 'command', 'command_sender', 'dialect', 'echoes', 'endpoint', 'framing',
+           'round_trip', 'signing', 'statistics', 'url')
 # What parts of the monitor must do without.
 PURE = ROS | IO | TIME | THREADS
 MONITOR = {

@@ -24,7 +24,8 @@ from typing import Any
 from .light import Light, Settings
 from .model import Identity, Status
 from ..mavlink.agenda import Agenda
-from ..mavlink.command import CommandSender, Ending
+from ..mavlink.command import Ending
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import (
     CommandAck,
     ComponentInformationBasic,

@@ -30,7 +30,8 @@ from .operation_queue import OperationQueue
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
-from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
+from ..mavlink.command import Command, Ending, format_seconds, Outcome
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 
 # s without a status after which the light is asked for one, and between the askings.

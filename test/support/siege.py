@@ -28,7 +28,7 @@ from illuminator_ros.illuminator.model import Configuration, Identity, Status
 from illuminator_ros.illuminator.observer import Cause, LightObserver
 from illuminator_ros.illuminator.operation import Done, Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
-from illuminator_ros.mavlink.command import MAX_WAITING
+from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.dialect import (
     CommandLong,
     decode_payload,
