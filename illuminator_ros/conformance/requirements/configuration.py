@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from ..bench import Bench, LOW, Transaction
+from ..bench import Bench, LOW
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
+from ..transaction import Transaction
 from ...illuminator.model import float32, Limits, Mode
 from ...mavlink.dialect import MavCmd, MavResult
 
