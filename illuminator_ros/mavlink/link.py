@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
-from dataclasses import dataclass
 import logging
 import math
 import select
@@ -33,11 +32,12 @@ from .crowd import COLLECTION, Crowd
 from .departure import Departure
 from .dialect import decode_payload, HANDLED
 from .endpoint import Endpoint
-from .framing import DecoderCounters, Frame
+from .framing import Frame
+from .link_state import LinkEvent, LinkState
 from .opener import Opener
 from .reception import Reception
 from .routes import Routes
-from .signing import Signing, SigningCounters
+from .signing import Signing
 from .signing_files import TimestampStore
 from .statistics import Traffic
 from .transport import Channel, Peer
@@ -60,46 +60,6 @@ FAULT_LOG_INTERVAL = 1.0
 MAX_REASONS = 16
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class LinkEvent:
-    """
-    The link was opened or lost, or cannot be opened.
-
-    :param name: the transport, or the URL where there is none.
-    :param reason: why it is not open.
-    """
-
-    is_open: bool
-    name: str
-    reason: str = ''
-
-
-@dataclass
-class LinkState:
-    """
-    A link's condition, to be read from any thread.
-
-    :param since: when it was opened or lost, on the link's clock, s.
-    :param openings: how often it was opened.
-    :param peers: how many have lately sent something good.
-    """
-
-    is_open: bool
-    since: float
-    name: str
-    reason: str
-    openings: int
-    peers: int
-    traffic: Traffic
-    decoding: DecoderCounters
-    signing: SigningCounters
-
-    @property
-    def failure(self) -> str:
-        """Return what is not open and why, for people; '' while the link is open."""
-        return '' if self.is_open else f'{self.name} is not open: {self.reason}'
 
 
 class Link:

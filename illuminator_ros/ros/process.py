@@ -37,7 +37,8 @@ from ..illuminator.light import Light, Settings
 from ..illuminator.operation import Result
 from ..mavlink.command import format_seconds
 from ..mavlink.dialect import Source
-from ..mavlink.link import Link, LinkEvent
+from ..mavlink.link import Link
+from ..mavlink.link_state import LinkEvent
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
 

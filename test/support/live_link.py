@@ -29,7 +29,8 @@ from illuminator_ros.illuminator.observer import LightObserver
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
-from illuminator_ros.mavlink.link import Link, LinkEvent
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.url import parse_url, Url
 from support.waiting import eventually, Log, PATIENCE
 

@@ -25,7 +25,7 @@ from typing import Any
 from illuminator_ros.mavlink import link as link_module
 from illuminator_ros.mavlink import opener
 from illuminator_ros.mavlink.dialect import heartbeat
-from illuminator_ros.mavlink.link import LinkEvent
+from illuminator_ros.mavlink.link_state import LinkEvent
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
