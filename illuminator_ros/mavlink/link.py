@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
+import functools
 import logging
 import math
 import select
@@ -39,6 +40,7 @@ from .reception import Reception
 from .routes import Routes
 from .signing import Signing
 from .signing_files import TimestampStore
+from .standing import Standing
 from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
@@ -56,8 +58,6 @@ KNOCK_INTERVAL = 0.25
 # s; after a fault of ours the loop goes on no faster, and shows no more of them, than this.
 FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
-# Different reasons for not opening that are told apart before the first opening.
-MAX_REASONS = 16
 
 _log = logging.getLogger(__name__)
 
@@ -85,8 +85,6 @@ class Link:
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
         self.endpoint = endpoint
-        self._label = label
-        self._on_event = on_event
         self._signing = signing or Signing()
         self._store = store
         self._store_due = 0.0
@@ -106,11 +104,7 @@ class Link:
         self._reception = Reception(self._signing)
         self._routes = Routes()
         self._traffic = Traffic()
-        self._since = clock()
-        # Why the link is not open, as far as others know; '' where it is.
-        self._reason = 'not opened yet'
-        self._reasons: set[str] = set()
-        self._openings = 0
+        self._standing = Standing(label, functools.partial(self._guarded, on_event), clock())
         # When the channel counts as one that leads somewhere, infinity once it does; and
         # whether the one before never did.
         self._proven_at = math.inf
@@ -160,10 +154,11 @@ class Link:
 
     def state(self) -> LinkState:
         """Return the link's condition."""
-        channel, reason = self._channel, self._reason
+        channel, standing = self._channel, self._standing
+        reason = standing.reason
         return LinkState(
-            not reason, self._since, channel.name if channel else self._label, reason,
-            self._openings, self._routes.peer_count(self.clock()), self._traffic,
+            not reason, standing.since, channel.name if channel else standing.label, reason,
+            standing.openings, self._routes.peer_count(self.clock()), self._traffic,
             self._reception.counters, self._signing.counters)
 
     def _wake(self) -> None:
@@ -175,7 +170,7 @@ class Link:
         self.call(lambda now: self._opened(channel, now))
 
     def _failed_elsewhere(self, reason: str) -> None:
-        self.call(lambda now: self._failed(reason))
+        self.call(lambda now: self._standing.failed(reason))
 
     # In the link's thread
 
@@ -192,7 +187,7 @@ class Link:
         self._run_calls()
         self._guarded(self._store_timestamp, True)
         self._close()
-        self._since, self._reason = self.clock(), 'stopped'
+        self._standing.stopped(self.clock())
         self._release()
 
     def _release(self) -> None:
@@ -294,7 +289,7 @@ class Link:
         if not self._spoken:
             self._spoken = self._stirred = True
             self._opener.answered()
-            self._announce_again(channel, now)
+            self._believe(channel, now)
         self._knock_at = now + SILENCE
         counter = self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
@@ -358,46 +353,29 @@ class Link:
         self._flush()
         # Sending the first heartbeat may already have shown that it leads nowhere.
         if not self._doubtful:
-            self._announce(channel, now)
+            self._standing.opened(channel.name, now)
 
     def _prove(self, channel: Channel, now: float) -> None:
         """Note that the channel has lasted: so its loss is answered at once."""
         self._proven_at = math.inf
         self._opener.succeeded()
-        self._announce_again(channel, now)
+        self._believe(channel, now)
 
-    def _announce_again(self, channel: Channel, now: float) -> None:
-        """Announce a channel that was doubted until now."""
-        if self._reason:
-            self._announce(channel, now)
-
-    def _announce(self, channel: Channel, now: float) -> None:
-        self._since, self._reason = now, ''
-        self._openings += 1
-        self._guarded(self._on_event, LinkEvent(True, channel.name))
-
-    def _failed(self, reason: str) -> None:
-        self._reason = reason
-        # Once it has been open, its loss was one line in the log and its return will be another.
-        if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self._openings:
-            self._reasons.add(reason)
-            self._guarded(self._on_event, LinkEvent(False, self._label, reason))
+    def _believe(self, channel: Channel, now: float) -> None:
+        """Have a channel count as open that was doubted until now."""
+        if self._standing.reason:
+            self._standing.opened(channel.name, now)
 
     def _lost(self, error: OSError) -> None:
         if self._channel is None:
             return
         self._stirred = True
-        name, was_open = self._channel.name, not self._reason
+        name = self._channel.name
         self._doubtful = self._proven_at < math.inf and not self._spoken
         self._close()
         self._opener.start()
-        reason = error.strerror or str(error)
         now = self.clock()
-        if was_open:
-            self._since, self._reason = now, reason
-            self._guarded(self._on_event, LinkEvent(False, name, reason))
-        else:
-            self._failed(reason)
+        self._standing.lost(name, error.strerror or str(error), now)
         self._guarded(self.endpoint.link_closed, now)
         self._traffic.restart()
 
