@@ -16,16 +16,12 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
 import functools
 import logging
 import math
-import select
 import selectors
-import socket
-import threading
 import time
 from typing import Any
 
@@ -44,6 +40,7 @@ from .standing import Standing
 from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
+from .worker import Worker
 
 # s; the loop looks around this often even where nothing is due.
 IDLE = 1.0
@@ -55,14 +52,11 @@ PROBATION = 1.0
 # greetings. A router that has restarted passes nothing on to us until it has heard us.
 SILENCE = 1.5
 KNOCK_INTERVAL = 0.25
-# s; after a fault of ours the loop goes on no faster, and shows no more of them, than this.
-FAULT_PAUSE = 0.1
-FAULT_LOG_INTERVAL = 1.0
 
 _log = logging.getLogger(__name__)
 
 
-class Link:
+class Link(Worker):
     """
     Runs an endpoint over a connection URL in a thread of its own, and reopens what is lost.
 
@@ -72,7 +66,6 @@ class Link:
         opened at first. A channel that is lost again before it has proved to lead anywhere
         counts as not opened.
     :param store: where the time stamps of signing outlive us; None keeps them nowhere.
-    :param clock: s, monotonic.
     :param wall_clock: s, Unix time, for the signing time stamps.
     """
 
@@ -84,21 +77,13 @@ class Link:
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
+        super().__init__('mavlink-link', clock)
         self.endpoint = endpoint
         self._signing = signing or Signing()
         self._store = store
         self._store_due = 0.0
-        self.clock = clock
         self._wall_clock = wall_clock
         self._opener = Opener(url, self._opened_elsewhere, self._failed_elsewhere)
-        self._calls: deque[Callable[[float], None]] = deque()
-        self._wake_out, self._wake_in = socket.socketpair()
-        self._wake_out.setblocking(False)
-        self._wake_in.setblocking(False)
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._wake_out, selectors.EVENT_READ)
-        self._stopping = threading.Event()
-        self._starting = threading.Lock()
         self._channel: Channel | None = None
         self._departure = Departure(self._signing)
         self._reception = Reception(self._signing)
@@ -118,39 +103,13 @@ class Link:
         # Good frames that had come when it was last looked, and those for us since.
         self._frames_seen = 0
         self._crowd = Crowd()
-        self._calls_only = select.poll()
-        self._calls_only.register(self._wake_out, select.POLLIN)
-        self._pause = 0.0
-        self._fault_log_due = -math.inf
-        self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
 
-    def start(self) -> None:
-        """Start the thread; the first attempt to open follows at once."""
-        with self._starting:
-            if not self._stopping.is_set():
-                self._thread.start()
-
     def stop(self, timeout: float = 1.0) -> None:
-        """
-        End the thread and close the transport; it cannot be started again.
-
-        :param timeout: how long to wait for the thread, s.
-        """
-        with self._starting:
-            self._stopping.set()
-            if self._thread.ident is None:
-                self._release()
-        self._wake()
+        """See :meth:`Worker.stop`; the transport is closed."""
         self._opener.stop()
-        if self._thread.is_alive() and threading.current_thread() is not self._thread:
-            self._thread.join(timeout)
-
-    def call(self, function: Callable[[float], None]) -> None:
-        """Have ``function(now)`` called in the link's thread, unless that has ended."""
-        self._calls.append(function)
-        self._wake()
+        super().stop(timeout)
 
     def state(self) -> LinkState:
         """Return the link's condition."""
@@ -161,11 +120,6 @@ class Link:
             standing.openings, self._routes.peer_count(self.clock()), self._traffic,
             self._reception.counters, self._signing.counters)
 
-    def _wake(self) -> None:
-        # A full buffer has woken the thread already; a closed one has no thread to wake.
-        with contextlib.suppress(OSError):
-            self._wake_in.send(b'\0')
-
     def _opened_elsewhere(self, channel: Channel) -> None:
         self.call(lambda now: self._opened(channel, now))
 
@@ -174,26 +128,16 @@ class Link:
 
     # In the link's thread
 
-    def _run(self) -> None:
+    def _begin(self) -> None:
         self._opener.start()
-        while not self._stopping.is_set():
-            try:
-                self._turn()
-            except Exception:
-                self._show_fault()
-                self._stopping.wait(FAULT_PAUSE)
+
+    def _end(self) -> None:
         # No channel is handed over any more, and one that just was is among the calls.
         self._opener.stop()
         self._run_calls()
         self._guarded(self._store_timestamp, True)
         self._close()
         self._standing.stopped(self.clock())
-        self._release()
-
-    def _release(self) -> None:
-        self._selector.close()
-        self._wake_out.close()
-        self._wake_in.close()
 
     def _turn(self) -> None:
         due = min(self._due, self._reception.next_deadline())
@@ -231,24 +175,6 @@ class Link:
             self._guarded(self._store_timestamp)
         self._due = min(self.endpoint.next_deadline(), self._knock_at, self._proven_at,
                         self._store_due)
-
-    def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
-        """Call what is not ours: its fault must not end the link, nor anything else in it."""
-        try:
-            function(*arguments)
-        except Exception:
-            self._pause = FAULT_PAUSE
-            self._show_fault()
-
-    def _show_fault(self) -> None:
-        """Log the exception under way, but not again and again."""
-        if self.clock() >= self._fault_log_due:
-            self._fault_log_due = self.clock() + FAULT_LOG_INTERVAL
-            _log.exception('internal error in the link')
-
-    def _run_calls(self) -> None:
-        for _ in range(len(self._calls)):
-            self._guarded(self._calls.popleft(), self.clock())
 
     def _store_timestamp(self, last: bool = False) -> None:
         """Keep the time stamp for the next run ("Timestamp Handling")."""
