@@ -26,7 +26,7 @@ from illuminator_ros.conformance.report import (
     Table,
 )
 from illuminator_ros.conformance.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.model import Identity
 from illuminator_ros.mavlink.dialect import Source
 import pytest

@@ -14,7 +14,9 @@
 
 """The light's side: what it sends by itself and on request."""
 
-from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.model import Identity
 from illuminator_ros.mavlink.dialect import (
     CommandAck,

@@ -23,7 +23,8 @@ import time
 from typing import Any
 
 from illuminator_ros.illuminator.controller import Controller
-from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.observer import LightObserver
 from illuminator_ros.illuminator.operation import Result

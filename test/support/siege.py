@@ -22,7 +22,9 @@ import random
 from typing import Any
 
 from illuminator_ros.illuminator.controller import Controller, MAX_LIGHTS
-from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.model import Configuration, Identity, Status
 from illuminator_ros.illuminator.observer import Cause, LightObserver
