@@ -30,7 +30,8 @@ from rclpy.node import Node
 from .fleet_inputs import FleetInputs
 from .mounting import Mounting
 from .node import IlluminatorNode
-from .parameters import declare_link_parameters, LinkParameters, ParameterError
+from .parameter_spec import ParameterError
+from .parameters import declare_link_parameters, LinkParameters
 from .spinner import Spinner
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings

@@ -34,11 +34,8 @@ from illuminator_ros.monitor.options import parser
 from illuminator_ros.ros import beam, beam_output, mounting
 from illuminator_ros.ros.conversions import STATUS_TOPICS
 from illuminator_ros.ros.diagnostics import FLAG_LEVELS
-from illuminator_ros.ros.parameters import (
-    DEVICE_PARAMETERS,
-    LINK_PARAMETERS,
-    ParameterSpec,
-)
+from illuminator_ros.ros.parameter_spec import ParameterSpec
+from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 import pytest
 import yaml
 
