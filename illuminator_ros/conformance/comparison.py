@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from ..illuminator.model import Configuration, DIMMING_FLAGS, NOTHING, Status
+from ..illuminator.error_flags import DIMMING_FLAGS
+from ..illuminator.model import Configuration, NOTHING, Status
 
 
 def differences(asked: Configuration, status: Status) -> list[str]:

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from .model import Configuration, DIMMING_FLAGS, Mode
+from .error_flags import DIMMING_FLAGS
+from .model import Configuration, Mode
 
 
 def unexplained(

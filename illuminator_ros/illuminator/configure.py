@@ -20,7 +20,8 @@ from collections.abc import Mapping
 from typing import Any, TYPE_CHECKING
 
 from .comparison import unexplained
-from .model import DIMMING_FLAGS, Status
+from .error_flags import DIMMING_FLAGS
+from .model import Status
 from .operation import Done, Operation
 from ..mavlink.command import Command
 from ..mavlink.dialect import MavCmd

@@ -22,8 +22,9 @@ import math
 from typing import Any
 
 from .device_properties import DeviceProperties
+from .error_flags import ErrorFlag
 from .extended_status import ExtendedIlluminatorStatus
-from .model import checked, Configuration, ErrorFlag, InvalidValue, Limits, Mode
+from .model import checked, Configuration, InvalidValue, Limits, Mode
 from .thermal import ThermalModel
 from ..mavlink.dialect import ComponentInformationBasic, IlluminatorStatus
 

@@ -22,8 +22,9 @@ import math
 
 from .agreement import Agreement
 from .enable import Enable
+from .error_flags import ErrorFlag
 from .identification import Identification
-from .model import ErrorFlag, Identity, Limits, Status
+from .model import Identity, Limits, Status
 from .observer import LightObserver
 from .operation import Done, Result
 from .operation_queue import OperationQueue

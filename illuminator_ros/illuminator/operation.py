@@ -28,7 +28,8 @@ from dataclasses import dataclass, replace
 import math
 from typing import TYPE_CHECKING
 
-from .model import DIMMING_FLAGS, flag_names, Status
+from .error_flags import DIMMING_FLAGS, flag_names
+from .model import Status
 from ..mavlink.command import Command, Ending, format_seconds, Outcome
 from ..mavlink.dialect import MavResult
 

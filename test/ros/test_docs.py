@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 
 from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
-from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.illuminator.error_flags import ErrorFlag
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     ComponentInformationBasic,

@@ -22,7 +22,8 @@ from ..bench import Bench
 from ..describe import status_text
 from ..requirement import Failed, ILLUMINATOR, MESSAGES, requirement, Skipped
 from ..timing import median, periods
-from ...illuminator.model import flag_names, KNOWN_FLAGS, Mode, Status
+from ...illuminator.error_flags import flag_names, KNOWN_FLAGS
+from ...illuminator.model import Mode, Status
 from ...mavlink.dialect import MavCmd, STATUS_ID
 
 
