@@ -19,7 +19,8 @@ from __future__ import annotations
 from typing import Any
 
 from ..illuminator.error_flags import flag_names
-from ..illuminator.model import Identity, Status
+from ..illuminator.identity import Identity
+from ..illuminator.model import Status
 from ..mavlink.dialect import (
     CommandAck,
     CommandInt,

@@ -19,7 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .behaviour import Behaviour
-from .model import Identity, Limits, Mode
+from .identity import Identity
+from .model import Limits, Mode
 from .thermal import ThermalProperties
 from ..mavlink.dialect import MAV_COMP_ID_ILLUMINATOR, Source
 

@@ -24,7 +24,8 @@ from .agreement import Agreement
 from .enable import Enable
 from .error_flags import ErrorFlag
 from .identification import Identification
-from .model import Identity, Limits, Status
+from .identity import Identity
+from .model import Limits, Status
 from .observer import LightObserver
 from .operation import Done, Result
 from .operation_queue import OperationQueue

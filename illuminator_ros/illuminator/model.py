@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What an illuminator is: its status, configuration, limits and identity, and what they may be.
+What an illuminator reports and is told: status, configuration, limits, and what they may be.
 
 https://mavlink.io/en/services/illuminator.html
 """
@@ -27,8 +27,6 @@ import math
 import reprlib
 import struct
 from typing import Any
-
-from ..mavlink.dialect import wire_value
 
 ABSOLUTE_ZERO_C = -273.15
 MAX_TEMPERATURE_C = 1000.0
@@ -277,27 +275,3 @@ class Status:
 
 
 NOTHING = Configuration(Mode.UNKNOWN, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """A COMPONENT_INFORMATION_BASIC; what the light leaves empty is ''."""
-
-    vendor: str = ''
-    model: str = ''
-    software_version: str = ''
-    hardware_version: str = ''
-    serial_number: str = ''
-
-    @classmethod
-    def from_message(cls, message: Any) -> Identity:
-        """Read a message; a field that is full has no terminator, and some have odd bytes."""
-        return cls(*(text(wire_value(message, name)) for name in (
-            'vendor_name', 'model_name', 'software_version', 'hardware_version',
-            'serial_number')))
-
-
-def text(field: bytes) -> str:
-    """Return the printable text of a char field, up to its terminator if it has one."""
-    raw = field.partition(b'\0')[0].decode('utf-8', errors='replace')
-    return ''.join(c if c.isprintable() else '?' for c in raw).strip()

@@ -31,7 +31,8 @@ from ..command_line import integer, number
 from ..illuminator.behaviour import Behaviour, Extension, Profile, PROFILES
 from ..illuminator.device_properties import DeviceProperties
 from ..illuminator.faults import FaultError, with_fault
-from ..illuminator.model import Identity, InvalidValue, Limits, Mode, MODES
+from ..illuminator.identity import Identity
+from ..illuminator.model import InvalidValue, Limits, Mode, MODES
 from ..illuminator.thermal import ThermalProperties
 from ..mavlink.dialect import Source
 

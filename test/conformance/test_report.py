@@ -27,7 +27,7 @@ from illuminator_ros.conformance.report import (
 )
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.dialect import Source
 import pytest
 from support.conformance_run import Run

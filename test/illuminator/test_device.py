@@ -17,7 +17,7 @@
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
-from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,

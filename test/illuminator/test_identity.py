@@ -14,7 +14,7 @@
 
 """COMPONENT_INFORMATION_BASIC, whose strings cannot be trusted to end."""
 
-from illuminator_ros.illuminator.model import Identity, text
+from illuminator_ros.illuminator.identity import Identity, text
 from illuminator_ros.mavlink.dialect import (
     ComponentInformationBasic,
     decode_payload,

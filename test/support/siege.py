@@ -25,8 +25,9 @@ from illuminator_ros.illuminator.controller import Controller, MAX_LIGHTS
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.model import Configuration, Identity, Status
+from illuminator_ros.illuminator.model import Configuration, Status
 from illuminator_ros.illuminator.observer import Cause, LightObserver
 from illuminator_ros.illuminator.operation import Done, Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
