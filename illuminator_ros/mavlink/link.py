@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 import contextlib
 import functools
-import logging
 import math
 import selectors
 import time
@@ -35,7 +34,7 @@ from .opener import Opener
 from .reception import Reception
 from .routes import Routes
 from .signing import Signing
-from .signing_files import TimestampStore
+from .signing_files import TimestampKeeper, TimestampStore
 from .standing import Standing
 from .statistics import Traffic
 from .transport import Channel, Peer
@@ -52,8 +51,6 @@ PROBATION = 1.0
 # greetings. A router that has restarted passes nothing on to us until it has heard us.
 SILENCE = 1.5
 KNOCK_INTERVAL = 0.25
-
-_log = logging.getLogger(__name__)
 
 
 class Link(Worker):
@@ -80,7 +77,7 @@ class Link(Worker):
         super().__init__('mavlink-link', clock)
         self.endpoint = endpoint
         self._signing = signing or Signing()
-        self._store = store
+        self._timestamps = TimestampKeeper(self._signing, store)
         self._store_due = 0.0
         self._wall_clock = wall_clock
         self._opener = Opener(url, self._opened_elsewhere, self._failed_elsewhere)
@@ -135,7 +132,7 @@ class Link(Worker):
         # No channel is handed over any more, and one that just was is among the calls.
         self._opener.stop()
         self._run_calls()
-        self._guarded(self._store_timestamp, True)
+        self._guarded(self._timestamps.keep, True)
         self._close()
         self._standing.stopped(self.clock())
 
@@ -172,20 +169,10 @@ class Link(Worker):
         self._guarded(self.endpoint.poll, self.clock())
         self._flush()
         if self.clock() >= self._store_due:
-            self._guarded(self._store_timestamp)
+            self._store_due = self.clock() + STORE_INTERVAL
+            self._guarded(self._timestamps.keep)
         self._due = min(self.endpoint.next_deadline(), self._knock_at, self._proven_at,
                         self._store_due)
-
-    def _store_timestamp(self, last: bool = False) -> None:
-        """Keep the time stamp for the next run ("Timestamp Handling")."""
-        self._store_due = self.clock() + STORE_INTERVAL
-        if self._store is not None:
-            try:
-                self._store.store(self._signing.timestamp, last=last)
-            except OSError as error:
-                self._store = None
-                _log.error('cannot keep the signing time stamp, a restart may repeat some: %s',
-                           error)
 
     def _serve(self, handle: Any, events: int) -> None:
         assert self._channel is not None
