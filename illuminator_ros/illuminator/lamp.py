@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A light but for its link: what it shines like, how hot it gets, and what it knows of itself."""
+"""A light but for its link: how it shines, what it lets itself be told, what it reports."""
 
 from __future__ import annotations
 
