@@ -29,7 +29,7 @@ from typing import Any
 
 from .behaviour import Behaviour
 from .device_properties import DeviceProperties
-from .lamp import Lamp
+from .lamp import Judgement, Lamp
 from .outlet import Outlet, Schedule
 from ..mavlink.dialect import (
     CommandAck,
@@ -207,16 +207,11 @@ class Device(Lamp):
         else:
             self._apply(change, now)
 
-    def _judge(
-        self, command: int, params: list[float], now: float,
-    ) -> tuple[MavResult, Callable[[], None] | None, list[Callable[[float], Any]]]:
-        """Return the result of a command, the change it makes, and what else answers it."""
+    def _judge(self, command: int, params: list[float], now: float) -> Judgement:
         if command == MavCmd.ILLUMINATOR_ON_OFF:
-            valid, change = self._switch(params[0])
-            return MavResult.ACCEPTED if valid else MavResult.DENIED, change, []
+            return self._switch(params[0])
         if command == MavCmd.DO_ILLUMINATOR_CONFIGURE:
-            valid, change = self._configure(params)
-            return MavResult.ACCEPTED if valid else MavResult.DENIED, change, []
+            return self._configure(params)
         if command == MavCmd.REQUEST_MESSAGE:
             if params[0] == STATUS_ID and self.behaviour.on_request:
                 return MavResult.ACCEPTED, None, [self.status]

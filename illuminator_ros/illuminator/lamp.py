@@ -26,7 +26,10 @@ from .error_flags import ErrorFlag
 from .extended_status import ExtendedIlluminatorStatus
 from .model import checked, Configuration, InvalidValue, Limits, Mode
 from .thermal import ThermalModel
-from ..mavlink.dialect import ComponentInformationBasic, IlluminatorStatus
+from ..mavlink.dialect import ComponentInformationBasic, IlluminatorStatus, MavResult
+
+# The result of a command, the change that it makes, and what makes the messages that answer it.
+Judgement = tuple[MavResult, Callable[[], None] | None, list[Callable[[float], Any]]]
 
 
 class Lamp:
@@ -65,8 +68,7 @@ class Lamp:
                 self.enabled = configuration.brightness > 0
         return change
 
-    def _switch(self, param: float) -> tuple[bool, Callable[[], None]]:
-        """Return whether the light lets itself be switched so, and what switches it."""
+    def _switch(self, param: float) -> Judgement:
         valid = param in (0.0, 1.0) or self.behaviour.lets_all_in
         on = bool(param == 1.0)
         if on and self.behaviour.toggles:
@@ -78,10 +80,9 @@ class Lamp:
             if on and self.behaviour.joint_switch and not self.configuration.brightness:
                 self.configuration = replace(
                     self.configuration, brightness=self._last_brightness)
-        return valid, change
+        return MavResult.ACCEPTED if valid else MavResult.DENIED, change, []
 
-    def _configure(self, params: list[float]) -> tuple[bool, Callable[[], None]]:
-        """Return whether the light lets itself be configured so, and what configures it."""
+    def _configure(self, params: list[float]) -> Judgement:
         mode, brightness, period, duty = params
         behaviour = self.behaviour
         known = mode in (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
@@ -108,7 +109,7 @@ class Lamp:
             accepted = behaviour.lets_all_in
         else:
             accepted = True
-        return accepted, change
+        return MavResult.ACCEPTED if accepted else MavResult.DENIED, change, []
 
     def status(self, now: float) -> Any:
         """Return the ILLUMINATOR_STATUS of this moment."""
