@@ -26,135 +26,30 @@ takes. The exit status is 1 if a limit was exceeded.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
-import contextlib
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict
 import json
 import os
 from pathlib import Path
 import signal
-import statistics
 import sys
 import tempfile
-import threading
 import time
-from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
+from bench.promise_bench import Bench, Row, until_end  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from illuminator_ros.mavlink.link import Link  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
-from support.light import CONFIGURE, ON_OFF, ServedLight  # noqa: E402
+from support.light import CONFIGURE, ON_OFF  # noqa: E402
 from support.live_link import Lights, LiveLink  # noqa: E402
 from support.open_channel import bound_socket  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import Program, python  # noqa: E402
-from support.ros import own_domain, Parameters, Ros, start_bridge, STREAM  # noqa: E402
+from support.processes import python  # noqa: E402
+from support.ros import own_domain, STREAM  # noqa: E402
 
 ON = SetBool.Request(data=True)
-
-
-@dataclass
-class Row:
-    """One promise, and what was measured of it, s or a share."""
-
-    promise: str
-    section: str
-    limit: float
-    tries: int
-    p50: float
-    max: float  # noqa: A003
-
-    @property
-    def met(self) -> bool:
-        """Whether no try took longer than the limit."""
-        return self.max <= self.limit
-
-
-class Watch:
-    """Tells when a future was done: the waiting thread may be late."""
-
-    def __init__(self, future: Any) -> None:
-        self._began = time.monotonic()
-        self._done = threading.Event()
-        self._seconds = 0.0
-        future.add_done_callback(self._note)
-
-    def _note(self, future: Any) -> None:
-        self._seconds = time.monotonic() - self._began
-        self._done.set()
-
-    def seconds(self) -> float:
-        """Return how long it took."""
-        assert self._done.wait(30.0), 'no answer within 30 s'
-        return self._seconds
-
-
-class Bench:
-    """
-    Programs, and what was measured of them.
-
-    :ivar ros: a client of the bridge that runs.
-    """
-
-    ros: Ros
-
-    def __init__(self, domain: int, count: int) -> None:
-        self.count = count
-        self._domain = domain
-        self.rows: list[Row] = []
-
-    def take(self, promise: str, section: str, limit: float, times: list[float]) -> None:
-        """Keep what was measured of a promise."""
-        self.rows.append(Row(promise, section, limit, len(times), statistics.median(times),
-                             max(times)))
-
-    @contextlib.contextmanager
-    def bridge(self, port: int, until: str = 'link open', **parameters: Any) -> Iterator[Program]:
-        """Run a bridge, with a client that has met no other."""
-        self.ros = Ros(self._domain)
-        program = start_bridge(self._domain, port, **parameters)
-        try:
-            program.wait_for(until)
-            yield program
-            if program.running:
-                program.end()
-        finally:
-            program.kill()
-            self.ros.close()
-
-    @contextlib.contextmanager
-    def lit(self, **parameters: Any) -> Iterator[tuple[Program, ServedLight]]:
-        """Run a bridge and a light that has told it all."""
-        port = free_port()
-        with self.bridge(port, **parameters) as program, ServedLight(
-                port, link=Link, enable=1, stream=0.1) as light:
-            Parameters(self.ros).wait(brightness=100.0)
-            yield program, light
-
-    def call(self, type_: Any, service: str, request: Any) -> float:
-        """Return how long a service takes to answer."""
-        client = self.ros._client(type_, f'/illuminator/{service}')
-        return Watch(client.call_async(request)).seconds()
-
-    def set(self, **values: float) -> float:  # noqa: A003
-        """Return how long a set of parameters takes."""
-        from rcl_interfaces.srv import SetParameters
-        from rclpy.parameter import Parameter
-        return self.call(SetParameters, 'set_parameters', SetParameters.Request(parameters=[
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]))
-
-
-def until_end(program: Program, number: int = signal.SIGTERM) -> float:
-    """Return how long a program takes to end."""
-    began = time.monotonic()
-    program.send(number)
-    program._process.wait(30.0)
-    seconds = time.monotonic() - began
-    assert program.wait() == 0, program.log
-    return seconds
 
 
 def answers(bench: Bench) -> None:

@@ -20,7 +20,8 @@ import math
 import threading
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, CommandSender, Outcome
+from illuminator_ros.mavlink.command import Command, Outcome
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, Source
 from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link

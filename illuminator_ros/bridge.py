@@ -24,7 +24,8 @@ from .termination import Termination
 
 def usage() -> str:
     """Return what ``--help`` prints."""
-    from .ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS, ParameterSpec
+    from .ros.parameter_spec import ParameterSpec
+    from .ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 
     def row(spec: ParameterSpec, default: str) -> str:
         limits = f'{spec.shown_range} {spec.unit}'.strip()
@@ -107,7 +108,7 @@ def _serve(arguments: list[str], termination: Termination) -> int:
     from rclpy.signals import SignalHandlerOptions
 
     from .ros.node import IlluminatorNode
-    from .ros.parameters import ParameterError
+    from .ros.parameter_spec import ParameterError
     from .ros.process import BridgeProcess
 
     # From here on the ROS graph has to be left in order, so a signal only has effect later.

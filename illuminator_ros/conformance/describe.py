@@ -18,7 +18,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..illuminator.model import flag_names, Identity, Status
+from ..illuminator.error_flags import flag_names
+from ..illuminator.identity import Identity
+from ..illuminator.model import Status
 from ..mavlink.dialect import (
     CommandAck,
     CommandInt,

@@ -35,9 +35,10 @@ from .requirement import REQUIREMENTS
 from .suite import FIND_TIMEOUT, Suite
 from .. import __version__
 from ..command_line import add_signing, address, integer, number, Parser, signing
-from ..illuminator.model import Identity
+from ..illuminator.identity import Identity
 from ..mavlink.dialect import Source
-from ..mavlink.link import Link, LinkEvent
+from ..mavlink.link import Link
+from ..mavlink.link_state import LinkEvent
 from ..mavlink.signing_files import KeyFileError
 from ..mavlink.url import parse_url, UrlError
 

@@ -33,6 +33,8 @@ from .bench import (
 from .consent import NOT_AGREED
 from .requirement import Failed, Requirement, Result, Skipped, Verdict
 from .requirements import REQUIREMENTS
+from .script import Interrupted
+from .timing import median, periods
 from ..illuminator.model import Configuration, Mode, shortest, Status
 from ..mavlink.dialect import MavCmd, STATUS_ID
 
@@ -41,6 +43,8 @@ FIND_TIMEOUT = 10.0
 REST = 4.5
 RESTORE_TIMEOUT = 10.0
 
+# Lines of the exchange that are kept for one check.
+MAX_LINES = 60
 # Others on the link that are named where the light is not heard.
 MAX_NAMED = 8
 

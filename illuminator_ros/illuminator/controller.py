@@ -21,10 +21,12 @@ import itertools
 import math
 from typing import Any
 
+from .identity import Identity
 from .light import Light, Settings
-from .model import Identity, Status
+from .model import Status
 from ..mavlink.agenda import Agenda
-from ..mavlink.command import CommandSender, Ending
+from ..mavlink.command import Ending
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import (
     CommandAck,
     ComponentInformationBasic,

@@ -22,34 +22,27 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 import functools
 import math
 import random
 from typing import Any
 
 from .behaviour import Behaviour
-from .extended_status import ExtendedIlluminatorStatus
-from .model import checked, Configuration, ErrorFlag, Identity, InvalidValue, Limits, Mode
+from .device_properties import DeviceProperties
+from .lamp import Judgement, Lamp
 from .outlet import Outlet, Schedule
-from .thermal import ThermalModel, ThermalProperties
-from ..mavlink.agenda import Agenda
 from ..mavlink.dialect import (
     CommandAck,
     CommandInt,
     CommandLong,
-    ComponentInformationBasic,
     Heartbeat,
-    IlluminatorStatus,
     INFORMATION_ID,
-    MAV_COMP_ID_ILLUMINATOR,
     MavCmd,
     MAVLINK_VERSION,
     MavResult,
     Source,
     STATUS_ID,
 )
-from ..mavlink.endpoint import Endpoint
 
 # s; the fastest status stream on offer. Whoever asks for more gets this.
 SHORTEST_INTERVAL = 0.01
@@ -61,37 +54,7 @@ PROGRESS_INTERVAL = 0.5
 CHANGES = (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE)
 
 
-@dataclass(frozen=True)
-class DeviceProperties:
-    """
-    What a simulated light is.
-
-    :param name: what people call it.
-    :param mode_bitmask: as reported; here the enum values of the supported modes, or-ed.
-    :param modes: what it can be configured to.
-    :param status_interval: s between statuses unless told otherwise; 0 sends none.
-    :param time_scale: how much faster than time the light gets hot.
-    :param behaviour: what it does at first; :attr:`Device.behaviour` can change.
-    :param normal: what it does without faults.
-    :param seed: of what happens by chance.
-    """
-
-    source: Source = Source(1, MAV_COMP_ID_ILLUMINATOR)
-    identity: Identity = field(default_factory=lambda: Identity(
-        'illuminator_ros', 'simulator', '1.0.0', '1.0.0', 'SIM-1-243'))
-    limits: Limits = Limits(0.05, 10.0)
-    mode_bitmask: int = Mode.INTERNAL_CONTROL | Mode.EXTERNAL_SYNC
-    status_interval: float = 1.0
-    thermal: ThermalProperties = ThermalProperties()
-    time_scale: float = 1.0
-    name: str = ''
-    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
-    behaviour: Behaviour = Behaviour()
-    normal: Behaviour = Behaviour()
-    seed: int = 0
-
-
-class Device:
+class Device(Lamp):
     """
     One light. No I/O; time is passed in.
 
@@ -105,12 +68,9 @@ class Device:
         self, properties: DeviceProperties, now: float,
         outgoing: deque[tuple[Source, Any]] | None = None,
     ) -> None:
-        self.properties = properties
-        self.behaviour = properties.behaviour
+        super().__init__(properties)
         self.rejections = properties.behaviour.rejections
         self.outgoing = deque() if outgoing is None else outgoing
-        self.thermal = ThermalModel(properties.thermal)
-        self.thermal.sensor_failed = self.behaviour.thermistor_failed
         self.changed: Callable[[], None] = lambda: None
         self._outlet = Outlet(
             properties.source, self.outgoing, random.Random(f'{properties.seed} {self.source}'))
@@ -123,15 +83,11 @@ class Device:
         self.restart(now)
 
     def restart(self, now: float) -> None:
-        """Begin anew, as after a power cycle; only the heat stays."""
-        self.enabled = False
-        self.configuration = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
-        self._last_brightness = self.configuration.brightness
+        """See :meth:`Lamp.restart`."""
+        super().restart(now)
         self.interval = self.properties.status_interval
         self._in_progress: set[int] = set()
-        self._booted_at = now
         self._status_due = now if self.interval else math.inf
-        self._thermal_at = now
         self._heartbeat_due = now if self.behaviour.heartbeat_interval else math.inf
         self._outlet.clear()
         self._schedule.clear()
@@ -162,23 +118,7 @@ class Device:
 
         :raises InvalidValue: if it cannot be so.
         """
-        configuration = self.configuration.with_changes({
-            name: checked(name, value, self.properties.limits)
-            for name, value in changes.items()})
-
-        def change() -> None:
-            self.configuration = configuration
-            if enabled is not None:
-                self.enabled = enabled
-            elif self.behaviour.joint_switch:
-                self.enabled = configuration.brightness > 0
-
-        self._apply(change, now)
-
-    def heat_to(self, temperature: float, now: float) -> None:
-        """Bring the light to a temperature, degC."""
-        self._warm(now)
-        self.thermal.temperature = temperature
+        self._apply(self._press(enabled, changes), now)
 
     @property
     def source(self) -> Source:
@@ -267,10 +207,7 @@ class Device:
         else:
             self._apply(change, now)
 
-    def _judge(
-        self, command: int, params: list[float], now: float,
-    ) -> tuple[MavResult, Callable[[], None] | None, list[Callable[[float], Any]]]:
-        """Return the result of a command, the change it makes, and what else answers it."""
+    def _judge(self, command: int, params: list[float], now: float) -> Judgement:
         if command == MavCmd.ILLUMINATOR_ON_OFF:
             return self._switch(params[0])
         if command == MavCmd.DO_ILLUMINATOR_CONFIGURE:
@@ -287,51 +224,6 @@ class Device:
 
     def _unknown(self, result: MavResult) -> MavResult:
         return MavResult.ACCEPTED if self.behaviour.accepts_unknown else result
-
-    def _switch(self, param: float) -> tuple[MavResult, Callable[[], None], list[Any]]:
-        valid = param in (0.0, 1.0) or self.behaviour.lets_all_in
-        on = bool(param == 1.0)
-        if on and self.behaviour.toggles:
-            on = not self.enabled
-
-        def change() -> None:
-            self.enabled = on
-            # "0%: Off": where the two are one, being on needs some brightness.
-            if on and self.behaviour.joint_switch and not self.configuration.brightness:
-                self.configuration = replace(
-                    self.configuration, brightness=self._last_brightness)
-        return MavResult.ACCEPTED if valid else MavResult.DENIED, change, []
-
-    def _configure(
-        self, params: list[float],
-    ) -> tuple[MavResult, Callable[[], None] | None, list[Any]]:
-        mode, brightness, period, duty = params
-        behaviour = self.behaviour
-        known = mode in (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
-        configuration = Configuration(
-            Mode(int(mode)) if known else self.configuration.mode, brightness, period, duty)
-
-        def change() -> None:
-            self.configuration = configuration
-            if brightness > 0:
-                self._last_brightness = brightness
-            if behaviour.joint_switch:
-                self.enabled = brightness > 0
-
-        try:
-            if mode not in self.properties.modes:
-                raise InvalidValue(f'mode {mode}')
-            if period and not behaviour.measures:
-                raise InvalidValue('this light does not strobe')
-            for name, value in (('brightness', brightness), ('strobe_period', period),
-                                ('strobe_duty_cycle', duty)):
-                if not (math.isnan(value) and behaviour.lets_nan_in):
-                    checked(name, value, self.properties.limits)
-        except InvalidValue:
-            accepted = behaviour.lets_all_in
-        else:
-            accepted = True
-        return MavResult.ACCEPTED if accepted else MavResult.DENIED, change, []
 
     def _apply(self, change: Callable[[], None], now: float) -> None:
         """Make a change and, unless the stream is off, tell of it."""
@@ -357,60 +249,6 @@ class Device:
             return MavResult.DENIED
         self._status_due = now + self.interval if self.interval else math.inf
         return MavResult.ACCEPTED
-
-    def status(self, now: float) -> Any:
-        """Return the ILLUMINATOR_STATUS of this moment."""
-        self._warm(now)
-        behaviour, configuration = self.behaviour, self.configuration
-        brightness = configuration.brightness * self.thermal.output
-        if behaviour.joint_switch and not self.enabled:
-            brightness = 0.0
-        limits = self.properties.limits if behaviour.measures else Limits()
-        fields = (
-            self.uptime_ms(now), int(self.enabled), self.properties.mode_bitmask,
-            int(self._flags()), int(configuration.mode), brightness,
-            configuration.strobe_period, configuration.strobe_duty_cycle,
-            self.thermal.reading if behaviour.measures else 0.0,
-            limits.min_strobe_period, limits.max_strobe_period)
-        if behaviour.extension is not None:
-            return ExtendedIlluminatorStatus(*fields, extension=behaviour.extension)
-        return IlluminatorStatus(*fields)
-
-    def _flags(self) -> int:
-        flags = int(self.thermal.flags) | self.behaviour.false_flags
-        if self.behaviour.inverted_flags and self.enabled:
-            flags ^= ErrorFlag.THERMAL_THROTTLING
-        return flags
-
-    def information(self, now: float) -> Any:
-        """Return the COMPONENT_INFORMATION_BASIC."""
-        identity, behaviour = self.properties.identity, self.behaviour
-
-        def string(text: str, size: int) -> bytes:
-            if behaviour.padding:
-                return text.ljust(size, behaviour.padding).encode()[:size]
-            return text.encode()[:size - behaviour.terminates]
-
-        return ComponentInformationBasic(
-            self.uptime_ms(now), 0, 0, string(identity.vendor, 32), string(identity.model, 32),
-            string(identity.software_version, 24), string(identity.hardware_version, 24),
-            string(identity.serial_number, 32))
-
-    def uptime_ms(self, now: float) -> int:
-        """Return the time since the start, ms, wrapping as the field does."""
-        if not self.behaviour.has_clock:
-            return 0
-        return int((now - self._booted_at) * 1000) & 0xFFFFFFFF
-
-    def _warm(self, now: float) -> None:
-        configuration = self.configuration
-        power = configuration.brightness / 100 if self.enabled else 0.0
-        if configuration.strobe_period and configuration.strobe_duty_cycle:
-            power *= configuration.strobe_duty_cycle / 100
-        # A light that let NaN in is as hot as one at full power, and stays a light.
-        power = min(max(power, 0.0), 1.0) if math.isfinite(power) else 1.0
-        self.thermal.advance((now - self._thermal_at) * self.properties.time_scale, power)
-        self._thermal_at = now
 
     def _send(self, message: Any, now: float) -> None:
         if not self.silent(now):
@@ -451,41 +289,3 @@ class Device:
         return min(self._heartbeat_due, self._status_due, self._thermal_at + THERMAL_INTERVAL,
                    self._reboot_due, self._schedule.next_deadline(),
                    self._outlet.next_deadline())
-
-
-class Devices(Endpoint):
-    """Several lights on one link."""
-
-    def __init__(self, properties: list[DeviceProperties], now: float) -> None:
-        super().__init__()
-        self.devices = [Device(one, now, self.outgoing) for one in properties]
-        self._agenda: Agenda[int] = Agenda()
-        for index, device in enumerate(self.devices):
-            device.changed = functools.partial(self._schedule, index)
-            device.changed()
-
-    def _schedule(self, index: int) -> None:
-        self._agenda.set(index, self.devices[index].next_deadline())
-
-    def link_opened(self, now: float) -> None:
-        """See :meth:`Endpoint.link_opened`."""
-        for device in self.devices:
-            device.announce(now)
-
-    def receive(self, source: Source, message: Any, now: float) -> None:
-        """See :meth:`Endpoint.receive`."""
-        if isinstance(message, CommandLong | CommandInt):
-            for index, device in enumerate(self.devices):
-                if device.addressed(message):
-                    device.receive(source, message, now)
-                    self._schedule(index)
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Endpoint.poll`."""
-        for index in self._agenda.due(now):
-            self.devices[index].poll(now)
-            self._schedule(index)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Endpoint.next_deadline`."""
-        return self._agenda.next_deadline()

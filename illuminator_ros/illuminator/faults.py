@@ -27,7 +27,7 @@ import math
 from typing import Any
 
 from .behaviour import Behaviour
-from .model import ErrorFlag
+from .error_flags import ErrorFlag
 from ..mavlink.dialect import MavResult, MavType
 
 

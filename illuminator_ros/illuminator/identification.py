@@ -20,7 +20,7 @@ from collections.abc import Callable
 import math
 from typing import TYPE_CHECKING
 
-from .model import Identity
+from .identity import Identity
 from ..mavlink.command import Command, Ending, Outcome
 from ..mavlink.dialect import INFORMATION_ID, MavCmd, result_name
 

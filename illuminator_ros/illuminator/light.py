@@ -21,14 +21,19 @@ from dataclasses import dataclass
 import math
 
 from .agreement import Agreement
+from .enable import Enable
+from .error_flags import ErrorFlag
 from .identification import Identification
-from .model import ErrorFlag, Identity, Limits, Status
+from .identity import Identity
+from .model import Limits, Status
 from .observer import LightObserver
-from .operation import Done, Enable, OperationQueue, Result
+from .operation import Done, Result
+from .operation_queue import OperationQueue
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
-from ..mavlink.command import Command, CommandSender, Ending, format_seconds, Outcome
+from ..mavlink.command import Command, Ending, format_seconds, Outcome
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import MavCmd, Source, STATUS_ID
 
 # s without a status after which the light is asked for one, and between the askings.

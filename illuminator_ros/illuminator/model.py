@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What an illuminator is: its status, configuration, limits and identity, and what they may be.
+What an illuminator reports and is told: status, configuration, limits, and what they may be.
 
 https://mavlink.io/en/services/illuminator.html
 """
@@ -22,13 +22,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 import math
 import reprlib
 import struct
 from typing import Any
-
-from ..mavlink.dialect import wire_value
 
 ABSOLUTE_ZERO_C = -273.15
 MAX_TEMPERATURE_C = 1000.0
@@ -58,29 +56,6 @@ class Mode(IntEnum):
 
 # The modes that can be asked for; UNKNOWN can only be reported.
 MODES = {mode.label: mode for mode in Mode if mode is not Mode.UNKNOWN}
-
-
-class ErrorFlag(IntFlag):
-    """ILLUMINATOR_ERROR_FLAGS."""
-
-    THERMAL_THROTTLING = 1
-    OVER_TEMPERATURE_SHUTDOWN = 2
-    THERMISTOR_FAILURE = 4
-
-
-# The flags under which a light is less bright than it was told to be.
-DIMMING_FLAGS = ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN
-# An int: since Python 3.11 the complement of an IntFlag has no unknown bits.
-KNOWN_FLAGS = int(DIMMING_FLAGS | ErrorFlag.THERMISTOR_FAILURE)
-
-
-def flag_names(flags: int) -> list[str]:
-    """Return readable names of error flags; unknown bits as one hexadecimal number."""
-    names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlag
-             if flag & flags and flag.name]
-    if unknown := flags & ~KNOWN_FLAGS:
-        names.append(f'unknown flags 0x{unknown:x}')
-    return names
 
 
 def float32(value: float) -> float:
@@ -231,7 +206,7 @@ class Status:
 
     :param uptime_ms: ms since the light started, wrapping at 2**32.
     :param mode_bitmask: as sent; lights differ in what it means.
-    :param error_flags: as sent; see :class:`ErrorFlag`.
+    :param error_flags: as sent; see :class:`~.error_flags.ErrorFlag`.
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.
@@ -300,27 +275,3 @@ class Status:
 
 
 NOTHING = Configuration(Mode.UNKNOWN, 0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """A COMPONENT_INFORMATION_BASIC; what the light leaves empty is ''."""
-
-    vendor: str = ''
-    model: str = ''
-    software_version: str = ''
-    hardware_version: str = ''
-    serial_number: str = ''
-
-    @classmethod
-    def from_message(cls, message: Any) -> Identity:
-        """Read a message; a field that is full has no terminator, and some have odd bytes."""
-        return cls(*(text(wire_value(message, name)) for name in (
-            'vendor_name', 'model_name', 'software_version', 'hardware_version',
-            'serial_number')))
-
-
-def text(field: bytes) -> str:
-    """Return the printable text of a char field, up to its terminator if it has one."""
-    raw = field.partition(b'\0')[0].decode('utf-8', errors='replace')
-    return ''.join(c if c.isprintable() else '?' for c in raw).strip()

@@ -19,7 +19,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from .model import Configuration, Identity, Status
+from .identity import Identity
+from .model import Configuration, Status
 
 if TYPE_CHECKING:
     from .light import Light

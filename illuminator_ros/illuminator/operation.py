@@ -23,15 +23,15 @@ the change makes the change a success.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 import math
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
-from .model import Configuration, DIMMING_FLAGS, flag_names, Mode, Status
+from .error_flags import DIMMING_FLAGS, flag_names
+from .model import Status
 from ..mavlink.command import Command, Ending, format_seconds, Outcome
-from ..mavlink.dialect import MavCmd, MavResult
+from ..mavlink.dialect import MavResult
 
 if TYPE_CHECKING:
     from .light import Light
@@ -40,10 +40,6 @@ if TYPE_CHECKING:
 CONFIRMATION_TIMEOUT = 1.0
 # s between requests for the status meanwhile, where one or its answer was lost.
 ASK_INTERVAL = 0.25
-# s; a light that reports progress for longer is not waited for.
-PROGRESS_LIMIT = 30.0
-# Changes of one kind that may wait for one light.
-MAX_WAITING = 32
 
 
 @dataclass(frozen=True)
@@ -237,171 +233,3 @@ class Operation(ABC):
         if not self.finished:
             self.finished = True
             self._done(result, now)
-
-
-class Enable(Operation):
-    """MAV_CMD_ILLUMINATOR_ON_OFF."""
-
-    def __init__(self, light: Light, on: bool, done: Done, *, now: float) -> None:
-        super().__init__(light, done, now=now, limit=now + PROGRESS_LIMIT)
-        self.on = on
-
-    def command(self) -> Command:
-        """See :meth:`Operation.command`."""
-        return Command(self.light.source, MavCmd.ILLUMINATOR_ON_OFF,
-                       (float(self.on), float(self.light.instance)))
-
-    def shown_by(self, status: Status) -> bool:
-        """See :meth:`Operation.shown_by`."""
-        return status.enabled is self.on
-
-    def accepted(self, status: Status | None) -> None:
-        """See :meth:`Operation.accepted`."""
-
-    def proof(self, status: Status) -> str:
-        """See :meth:`Operation.proof`."""
-        return self.dimmed_proof(status) if self.on else super().proof(status)
-
-    @property
-    def wish(self) -> str:
-        """See :meth:`Operation.wish`."""
-        return 'on' if self.on else 'off'
-
-    def found(self, status: Status) -> str:
-        """See :meth:`Operation.found`."""
-        return {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
-
-
-class Configure(Operation):
-    """
-    MAV_CMD_DO_ILLUMINATOR_CONFIGURE, with all four fields.
-
-    :param changes: checked values by name; the other fields are those agreed when it is sent.
-    :param stream: whether it is one of a stream of setpoints, which a newer one replaces.
-    """
-
-    def __init__(
-        self, light: Light, changes: Mapping[str, Any], done: Done, *, now: float, limit: float,
-        stream: bool = False,
-    ) -> None:
-        super().__init__(light, done, now=now, limit=limit)
-        self.changes = changes
-        self.stream = stream
-        self.wanted = light.agreement.with_changes(changes)
-
-    def start(self, now: float) -> None:
-        """See :meth:`Operation.start`."""
-        # What went before in the queue may have changed the other fields.
-        self.wanted = self.light.agreement.with_changes(self.changes)
-        super().start(now)
-
-    def command(self) -> Command:
-        """See :meth:`Operation.command`."""
-        return Command(
-            self.light.source, MavCmd.DO_ILLUMINATOR_CONFIGURE,
-            (*self.wanted.params(), float(self.light.instance)))
-
-    def shown_by(self, status: Status) -> bool:
-        """See :meth:`Operation.shown_by`."""
-        return not unexplained(
-            self.wanted, status.configuration(self.wanted), status.error_flags, step=True)
-
-    def proof(self, status: Status) -> str:
-        """See :meth:`Operation.proof`."""
-        reported = status.configuration(self.wanted)
-        hidden = [name for name in self.wanted.differences(reported) if name in self.changes]
-        if not hidden:
-            return super().proof(status)
-        if status.error_flags & DIMMING_FLAGS:
-            return self.dimmed_proof(status)
-        return f'accepted (ILLUMINATOR_STATUS shows {reported.describe(hidden)})'
-
-    def accepted(self, status: Status | None) -> None:
-        """See :meth:`Operation.accepted`."""
-        self.light.agreement.agree(self.wanted, status)
-
-    @property
-    def wish(self) -> str:
-        """See :meth:`Operation.wish`."""
-        return self.wanted.describe(list(self.changes))
-
-    def found(self, status: Status) -> str:
-        """See :meth:`Operation.found`."""
-        reported = status.configuration(self.wanted)
-        return reported.describe(
-            unexplained(self.wanted, reported, status.error_flags, step=True))
-
-
-def unexplained(
-    agreed: Configuration, reported: Configuration, flags: int, *, step: bool,
-    external: bool = True,
-) -> list[str]:
-    """
-    Return the fields in which a light differs from its agreed configuration without reason.
-
-    There are two good reasons: it dims itself because it is hot, and under external sync its
-    output follows another signal.
-
-    :param external: whether external sync is to count as a reason.
-    :param step: whether the light's own rounding is passed over.
-    """
-    names = agreed.differences(reported, step=step)
-    # A light that does not say which mode it is in does not contradict.
-    if reported.mode is Mode.UNKNOWN or step and agreed.mode is Mode.UNKNOWN:
-        names = [name for name in names if name != 'mode']
-    if flags & DIMMING_FLAGS and reported.brightness < agreed.brightness:
-        names = [name for name in names if name != 'brightness']
-    if external and agreed.mode is reported.mode is Mode.EXTERNAL_SYNC:
-        names = []
-    return names
-
-
-class OperationQueue:
-    """Changes of one kind to one light: one is on its way, the others wait."""
-
-    def __init__(self) -> None:
-        self._operations: deque[Operation] = deque()
-
-    @property
-    def current(self) -> Operation | None:
-        """Return the change that is on its way."""
-        return self._operations[0] if self._operations else None
-
-    def submit(self, operation: Operation, now: float) -> None:
-        """Start a change, or put it behind the others."""
-        if len(self._operations) >= MAX_WAITING:
-            operation.fail(f'{MAX_WAITING} requests are waiting for light '
-                           f'{operation.light.source} already', now)
-            return
-        self._operations.append(operation)
-        if len(self._operations) == 1:
-            operation.start(now)
-            self.poll(now)
-
-    def cancel(self, now: float) -> None:
-        """End all changes, whether under way or waiting."""
-        for operation in list(self._operations):
-            operation.fail('cancelled', now)
-        self._operations.clear()
-
-    def poll(self, now: float) -> None:
-        """Do what is due, and start what has waited."""
-        for waiting in list(self._operations)[1:]:
-            if now >= waiting.limit:
-                waiting.fail('not sent: earlier requests took too long', now)
-        if self._operations:
-            self._operations[0].poll(now)
-        while self._operations and self._operations[0].finished:
-            self._operations.popleft()
-            while self._operations and self._operations[0].finished:
-                self._operations.popleft()
-            if self._operations:
-                self._operations[0].start(now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
-        if not self._operations:
-            return math.inf
-        first = self._operations[0]
-        waiting = min((op.limit for op in list(self._operations)[1:]), default=math.inf)
-        return -math.inf if first.finished else min(first.next_deadline(), waiting)

@@ -25,8 +25,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from .model import DIMMING_FLAGS, Mode, NOTHING, Status
-from .operation import unexplained
+from .comparison import unexplained
+from .error_flags import DIMMING_FLAGS
+from .model import Mode, NOTHING, Status
 from .uptime import WRAP_MS
 
 # Changes back to what was before, by which several lights are told: the sixth status of

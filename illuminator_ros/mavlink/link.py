@@ -16,16 +16,11 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
-from dataclasses import dataclass
-import logging
+import functools
 import math
-import select
 import selectors
-import socket
-import threading
 import time
 from typing import Any
 
@@ -33,15 +28,18 @@ from .crowd import COLLECTION, Crowd
 from .departure import Departure
 from .dialect import decode_payload, HANDLED
 from .endpoint import Endpoint
-from .framing import DecoderCounters, Frame
+from .framing import Frame
+from .link_state import LinkEvent, LinkState
 from .opener import Opener
 from .reception import Reception
 from .routes import Routes
-from .signing import Signing, SigningCounters
-from .signing_files import TimestampStore
+from .signing import Signing
+from .signing_files import TimestampKeeper, TimestampStore
+from .standing import Standing
 from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
+from .worker import Worker
 
 # s; the loop looks around this often even where nothing is due.
 IDLE = 1.0
@@ -53,56 +51,9 @@ PROBATION = 1.0
 # greetings. A router that has restarted passes nothing on to us until it has heard us.
 SILENCE = 1.5
 KNOCK_INTERVAL = 0.25
-# s; after a fault of ours the loop goes on no faster, and shows no more of them, than this.
-FAULT_PAUSE = 0.1
-FAULT_LOG_INTERVAL = 1.0
-# Different reasons for not opening that are told apart before the first opening.
-MAX_REASONS = 16
-
-_log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class LinkEvent:
-    """
-    The link was opened or lost, or cannot be opened.
-
-    :param name: the transport, or the URL where there is none.
-    :param reason: why it is not open.
-    """
-
-    is_open: bool
-    name: str
-    reason: str = ''
-
-
-@dataclass
-class LinkState:
-    """
-    A link's condition, to be read from any thread.
-
-    :param since: when it was opened or lost, on the link's clock, s.
-    :param openings: how often it was opened.
-    :param peers: how many have lately sent something good.
-    """
-
-    is_open: bool
-    since: float
-    name: str
-    reason: str
-    openings: int
-    peers: int
-    traffic: Traffic
-    decoding: DecoderCounters
-    signing: SigningCounters
-
-    @property
-    def failure(self) -> str:
-        """Return what is not open and why, for people; '' while the link is open."""
-        return '' if self.is_open else f'{self.name} is not open: {self.reason}'
-
-
-class Link:
+class Link(Worker):
     """
     Runs an endpoint over a connection URL in a thread of its own, and reopens what is lost.
 
@@ -112,7 +63,6 @@ class Link:
         opened at first. A channel that is lost again before it has proved to lead anywhere
         counts as not opened.
     :param store: where the time stamps of signing outlive us; None keeps them nowhere.
-    :param clock: s, monotonic.
     :param wall_clock: s, Unix time, for the signing time stamps.
     """
 
@@ -124,33 +74,19 @@ class Link:
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
     ) -> None:
+        super().__init__('mavlink-link', clock)
         self.endpoint = endpoint
-        self._label = label
-        self._on_event = on_event
         self._signing = signing or Signing()
-        self._store = store
+        self._timestamps = TimestampKeeper(self._signing, store)
         self._store_due = 0.0
-        self.clock = clock
         self._wall_clock = wall_clock
         self._opener = Opener(url, self._opened_elsewhere, self._failed_elsewhere)
-        self._calls: deque[Callable[[float], None]] = deque()
-        self._wake_out, self._wake_in = socket.socketpair()
-        self._wake_out.setblocking(False)
-        self._wake_in.setblocking(False)
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._wake_out, selectors.EVENT_READ)
-        self._stopping = threading.Event()
-        self._starting = threading.Lock()
         self._channel: Channel | None = None
         self._departure = Departure(self._signing)
         self._reception = Reception(self._signing)
         self._routes = Routes()
         self._traffic = Traffic()
-        self._since = clock()
-        # Why the link is not open, as far as others know; '' where it is.
-        self._reason = 'not opened yet'
-        self._reasons: set[str] = set()
-        self._openings = 0
+        self._standing = Standing(label, functools.partial(self._guarded, on_event), clock())
         # When the channel counts as one that leads somewhere, infinity once it does; and
         # whether the one before never did.
         self._proven_at = math.inf
@@ -164,81 +100,41 @@ class Link:
         # Good frames that had come when it was last looked, and those for us since.
         self._frames_seen = 0
         self._crowd = Crowd()
-        self._calls_only = select.poll()
-        self._calls_only.register(self._wake_out, select.POLLIN)
-        self._pause = 0.0
-        self._fault_log_due = -math.inf
-        self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
 
-    def start(self) -> None:
-        """Start the thread; the first attempt to open follows at once."""
-        with self._starting:
-            if not self._stopping.is_set():
-                self._thread.start()
-
     def stop(self, timeout: float = 1.0) -> None:
-        """
-        End the thread and close the transport; it cannot be started again.
-
-        :param timeout: how long to wait for the thread, s.
-        """
-        with self._starting:
-            self._stopping.set()
-            if self._thread.ident is None:
-                self._release()
-        self._wake()
+        """See :meth:`Worker.stop`; the transport is closed."""
         self._opener.stop()
-        if self._thread.is_alive() and threading.current_thread() is not self._thread:
-            self._thread.join(timeout)
-
-    def call(self, function: Callable[[float], None]) -> None:
-        """Have ``function(now)`` called in the link's thread, unless that has ended."""
-        self._calls.append(function)
-        self._wake()
+        super().stop(timeout)
 
     def state(self) -> LinkState:
         """Return the link's condition."""
-        channel, reason = self._channel, self._reason
+        channel, standing = self._channel, self._standing
+        reason = standing.reason
         return LinkState(
-            not reason, self._since, channel.name if channel else self._label, reason,
-            self._openings, self._routes.peer_count(self.clock()), self._traffic,
+            not reason, standing.since, channel.name if channel else standing.label, reason,
+            standing.openings, self._routes.peer_count(self.clock()), self._traffic,
             self._reception.counters, self._signing.counters)
-
-    def _wake(self) -> None:
-        # A full buffer has woken the thread already; a closed one has no thread to wake.
-        with contextlib.suppress(OSError):
-            self._wake_in.send(b'\0')
 
     def _opened_elsewhere(self, channel: Channel) -> None:
         self.call(lambda now: self._opened(channel, now))
 
     def _failed_elsewhere(self, reason: str) -> None:
-        self.call(lambda now: self._failed(reason))
+        self.call(lambda now: self._standing.failed(reason))
 
     # In the link's thread
 
-    def _run(self) -> None:
+    def _begin(self) -> None:
         self._opener.start()
-        while not self._stopping.is_set():
-            try:
-                self._turn()
-            except Exception:
-                self._show_fault()
-                self._stopping.wait(FAULT_PAUSE)
+
+    def _end(self) -> None:
         # No channel is handed over any more, and one that just was is among the calls.
         self._opener.stop()
         self._run_calls()
-        self._guarded(self._store_timestamp, True)
+        self._guarded(self._timestamps.keep, True)
         self._close()
-        self._since, self._reason = self.clock(), 'stopped'
-        self._release()
-
-    def _release(self) -> None:
-        self._selector.close()
-        self._wake_out.close()
-        self._wake_in.close()
+        self._standing.stopped(self.clock())
 
     def _turn(self) -> None:
         due = min(self._due, self._reception.next_deadline())
@@ -273,38 +169,10 @@ class Link:
         self._guarded(self.endpoint.poll, self.clock())
         self._flush()
         if self.clock() >= self._store_due:
-            self._guarded(self._store_timestamp)
+            self._store_due = self.clock() + STORE_INTERVAL
+            self._guarded(self._timestamps.keep)
         self._due = min(self.endpoint.next_deadline(), self._knock_at, self._proven_at,
                         self._store_due)
-
-    def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
-        """Call what is not ours: its fault must not end the link, nor anything else in it."""
-        try:
-            function(*arguments)
-        except Exception:
-            self._pause = FAULT_PAUSE
-            self._show_fault()
-
-    def _show_fault(self) -> None:
-        """Log the exception under way, but not again and again."""
-        if self.clock() >= self._fault_log_due:
-            self._fault_log_due = self.clock() + FAULT_LOG_INTERVAL
-            _log.exception('internal error in the link')
-
-    def _run_calls(self) -> None:
-        for _ in range(len(self._calls)):
-            self._guarded(self._calls.popleft(), self.clock())
-
-    def _store_timestamp(self, last: bool = False) -> None:
-        """Keep the time stamp for the next run ("Timestamp Handling")."""
-        self._store_due = self.clock() + STORE_INTERVAL
-        if self._store is not None:
-            try:
-                self._store.store(self._signing.timestamp, last=last)
-            except OSError as error:
-                self._store = None
-                _log.error('cannot keep the signing time stamp, a restart may repeat some: %s',
-                           error)
 
     def _serve(self, handle: Any, events: int) -> None:
         assert self._channel is not None
@@ -334,7 +202,7 @@ class Link:
         if not self._spoken:
             self._spoken = self._stirred = True
             self._opener.answered()
-            self._announce_again(channel, now)
+            self._believe(channel, now)
         self._knock_at = now + SILENCE
         counter = self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
@@ -398,46 +266,29 @@ class Link:
         self._flush()
         # Sending the first heartbeat may already have shown that it leads nowhere.
         if not self._doubtful:
-            self._announce(channel, now)
+            self._standing.opened(channel.name, now)
 
     def _prove(self, channel: Channel, now: float) -> None:
         """Note that the channel has lasted: so its loss is answered at once."""
         self._proven_at = math.inf
         self._opener.succeeded()
-        self._announce_again(channel, now)
+        self._believe(channel, now)
 
-    def _announce_again(self, channel: Channel, now: float) -> None:
-        """Announce a channel that was doubted until now."""
-        if self._reason:
-            self._announce(channel, now)
-
-    def _announce(self, channel: Channel, now: float) -> None:
-        self._since, self._reason = now, ''
-        self._openings += 1
-        self._guarded(self._on_event, LinkEvent(True, channel.name))
-
-    def _failed(self, reason: str) -> None:
-        self._reason = reason
-        # Once it has been open, its loss was one line in the log and its return will be another.
-        if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self._openings:
-            self._reasons.add(reason)
-            self._guarded(self._on_event, LinkEvent(False, self._label, reason))
+    def _believe(self, channel: Channel, now: float) -> None:
+        """Have a channel count as open that was doubted until now."""
+        if self._standing.reason:
+            self._standing.opened(channel.name, now)
 
     def _lost(self, error: OSError) -> None:
         if self._channel is None:
             return
         self._stirred = True
-        name, was_open = self._channel.name, not self._reason
+        name = self._channel.name
         self._doubtful = self._proven_at < math.inf and not self._spoken
         self._close()
         self._opener.start()
-        reason = error.strerror or str(error)
         now = self.clock()
-        if was_open:
-            self._since, self._reason = now, reason
-            self._guarded(self._on_event, LinkEvent(False, name, reason))
-        else:
-            self._failed(reason)
+        self._standing.lost(name, error.strerror or str(error), now)
         self._guarded(self.endpoint.link_closed, now)
         self._traffic.restart()
 

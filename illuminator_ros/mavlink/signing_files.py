@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import os
 from pathlib import Path
 import re
@@ -31,6 +32,8 @@ MAX_KEY_FILE = 4096
 # two stores repeats none. The specification asks for a store at least once a minute. It is not
 # more than a new stream may be behind, so others with the right time are still believed.
 STORE_MARGIN = 60 * TICKS_PER_SECOND
+
+_log = logging.getLogger(__name__)
 
 
 class KeyFileError(ValueError):
@@ -135,3 +138,25 @@ class TimestampStore:
         finally:
             with contextlib.suppress(OSError):
                 scratch.unlink()
+
+
+class TimestampKeeper:
+    """
+    Stores the time stamp for the next run ("Timestamp Handling"), until that fails.
+
+    :param store: None keeps it nowhere.
+    """
+
+    def __init__(self, signing: Signing, store: TimestampStore | None) -> None:
+        self._signing = signing
+        self._store = store
+
+    def keep(self, last: bool = False) -> None:
+        """Store it; see :meth:`TimestampStore.store`."""
+        if self._store is not None:
+            try:
+                self._store.store(self._signing.timestamp, last=last)
+            except OSError as error:
+                self._store = None
+                _log.error('cannot keep the signing time stamp, a restart may repeat some: %s',
+                           error)

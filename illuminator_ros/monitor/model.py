@@ -23,7 +23,7 @@ from enum import Enum
 import math
 from typing import Any
 
-from ..illuminator.model import flag_names
+from ..illuminator.error_flags import flag_names
 
 # s without anything from a light, or about it, after which what is shown is not up to date any
 # more: bridges ask for a status after 2.5 s, and publish diagnostics once a second.

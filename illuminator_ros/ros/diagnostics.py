@@ -27,10 +27,10 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..illuminator.controller import Controller
+from ..illuminator.error_flags import ErrorFlag, flag_names, KNOWN_FLAGS
 from ..illuminator.light import Light
-from ..illuminator.model import ErrorFlag, flag_names, KNOWN_FLAGS
 from ..mavlink.command import format_seconds
-from ..mavlink.link import LinkState
+from ..mavlink.link_state import LinkState
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from .diagnostics import Finding, flag_findings, OK
-from ..illuminator.model import flag_names
+from ..illuminator.error_flags import flag_names
 
 # s between two lines on one flag.
 PAUSE = 5.0

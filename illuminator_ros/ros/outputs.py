@@ -31,8 +31,9 @@ from .conversions import STATUS_TOPICS, status_values, temperature_message
 from .diagnostics import ERROR, WARN
 from .flag_log import FlagLog
 from .parameters import DEVICE_SPECS, period_range
+from ..illuminator.identity import Identity
 from ..illuminator.light import Light
-from ..illuminator.model import Configuration, FIELDS, Identity, Limits, Mode, shortest, Status
+from ..illuminator.model import Configuration, FIELDS, Limits, Mode, shortest, Status
 from ..illuminator.observer import Cause, LightObserver
 
 # A late subscriber gets the last value.

@@ -31,14 +31,16 @@ from .fleet_inputs import FleetInputs
 from .light_names import LightNames
 from .mounting import Mounting, not_its_own
 from .node import IlluminatorNode
-from .parameters import declare_link_parameters, LinkParameters, ParameterError
+from .parameter_spec import ParameterError
+from .parameters import declare_link_parameters, LinkParameters
 from .spinner import Spinner
 from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings
 from ..illuminator.operation import Result
 from ..mavlink.command import format_seconds
 from ..mavlink.dialect import Source
-from ..mavlink.link import Link, LinkEvent
+from ..mavlink.link import Link
+from ..mavlink.link_state import LinkEvent
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
 

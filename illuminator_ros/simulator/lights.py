@@ -24,7 +24,7 @@ from typing import Any
 
 from .settings import merged, profile_of, properties, read, SettingError, SETTINGS
 from ..command_line import address
-from ..illuminator.device import DeviceProperties
+from ..illuminator.device_properties import DeviceProperties
 from ..mavlink.dialect import Source
 
 MAX_LIGHTS = 200

@@ -30,8 +30,10 @@ from .options import DEFAULT_URL, parser
 from .settings import SettingError
 from .view import Glance, glance, LiveView, PlainView
 from ..command_line import signing
-from ..illuminator.device import DeviceProperties, Devices
-from ..mavlink.link import Link, LinkEvent
+from ..illuminator.device_properties import DeviceProperties
+from ..illuminator.devices import Devices
+from ..mavlink.link import Link
+from ..mavlink.link_state import LinkEvent
 from ..mavlink.signing_files import KeyFileError
 from ..mavlink.url import parse_url, Url, UrlError
 from ..termination import Termination

@@ -29,9 +29,10 @@ from typing import Any
 from .. import __version__
 from ..command_line import integer, number
 from ..illuminator.behaviour import Behaviour, Extension, Profile, PROFILES
-from ..illuminator.device import DeviceProperties
+from ..illuminator.device_properties import DeviceProperties
 from ..illuminator.faults import FaultError, with_fault
-from ..illuminator.model import Identity, InvalidValue, Limits, Mode, MODES
+from ..illuminator.identity import Identity
+from ..illuminator.model import InvalidValue, Limits, Mode, MODES
 from ..illuminator.thermal import ThermalProperties
 from ..mavlink.dialect import Source
 

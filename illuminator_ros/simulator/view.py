@@ -23,8 +23,9 @@ import shutil
 from typing import TextIO
 
 from ..illuminator.device import Device
+from ..illuminator.error_flags import flag_names
 from ..illuminator.faults import active
-from ..illuminator.model import flag_names, Mode
+from ..illuminator.model import Mode
 
 # K by which the temperature has to change to be worth a plain line.
 TEMPERATURE_STEP = 5.0

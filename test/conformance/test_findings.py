@@ -20,7 +20,7 @@ import math
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Identity, Limits, Mode
 from illuminator_ros.mavlink.dialect import MavCmd, Source

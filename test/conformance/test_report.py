@@ -26,8 +26,8 @@ from illuminator_ros.conformance.report import (
     Table,
 )
 from illuminator_ros.conformance.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.device import DeviceProperties
-from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.dialect import Source
 import pytest
 from support.conformance_run import Run

@@ -15,7 +15,7 @@
 """Which light is checked, and that others on the line do not matter."""
 
 from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
 import pytest

@@ -16,8 +16,8 @@
 
 from dataclasses import replace
 
+from illuminator_ros.illuminator.comparison import unexplained
 from illuminator_ros.illuminator.model import Configuration, float32, Mode
-from illuminator_ros.illuminator.operation import unexplained
 import pytest
 
 BASE = Configuration(Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)

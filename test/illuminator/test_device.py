@@ -14,8 +14,9 @@
 
 """The light's side: what it sends by itself and on request."""
 
-from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
-from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,
@@ -199,19 +200,6 @@ def test_an_acknowledgement_names_its_command_and_its_target(bench):
 def test_what_is_no_command_gets_no_answer(bench, message):
     bench.device.receive(GROUND, message, bench.now)
     assert bench.sent() == []
-
-
-def test_lights_on_one_link_answer_for_themselves_only():
-    lights = Devices([DeviceProperties(source=Source(1, one)) for one in (243, 244)], 0.0)
-    lights.receive(GROUND, CommandLong(1, 244, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
-    assert [device.enabled for device in lights.devices] == [False, True]
-    assert {source for source, _ in lights.outgoing} == {Source(1, 244)}
-
-
-def test_all_lights_on_a_link_answer_a_broadcast():
-    lights = Devices([DeviceProperties(source=Source(1, one)) for one in (243, 244)], 0.0)
-    lights.receive(GROUND, CommandLong(0, 0, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
-    assert [device.enabled for device in lights.devices] == [True, True]
 
 
 def test_a_restart_brings_back_the_default_settings_but_not_the_cold():

@@ -14,7 +14,8 @@
 
 """The light's side: the two commands that change it, and what they do not let in."""
 
-from illuminator_ros.illuminator.device import Device, DeviceProperties
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.dialect import (
     CommandInt,

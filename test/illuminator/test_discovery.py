@@ -17,7 +17,7 @@
 import math
 
 from illuminator_ros.illuminator.controller import CLASH_MEMORY, Controller, MAX_LIGHTS
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.dialect import (
     CommandAck,

@@ -16,8 +16,9 @@
 
 import re
 
-from illuminator_ros.illuminator.device import DeviceProperties
-from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT, PROGRESS_LIMIT
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.enable import PROGRESS_LIMIT
+from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,

@@ -17,7 +17,8 @@
 import math
 
 from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device import Device, DeviceProperties
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import (
     active,
     as_typed,

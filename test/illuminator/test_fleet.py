@@ -14,7 +14,7 @@
 
 """One request to all lights: one answer, which names what became of each."""
 
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.fleet import enable_all
 from illuminator_ros.mavlink.dialect import Source
 import pytest

@@ -25,7 +25,8 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.illuminator.controller import MAX_LIGHTS
-from illuminator_ros.illuminator.operation import MAX_WAITING, Result
+from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.illuminator.operation_queue import MAX_WAITING
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,

@@ -15,7 +15,7 @@
 """How a light is asked what it is."""
 
 from illuminator_ros.illuminator.identification import MAX_QUESTIONS, SETTLING_TIME
-from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.dialect import INFORMATION_ID, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair

@@ -14,7 +14,7 @@
 
 """COMPONENT_INFORMATION_BASIC, whose strings cannot be trusted to end."""
 
-from illuminator_ros.illuminator.model import flag_names, Identity, text
+from illuminator_ros.illuminator.identity import Identity, text
 from illuminator_ros.mavlink.dialect import (
     ComponentInformationBasic,
     decode_payload,
@@ -66,16 +66,3 @@ def test_strings_that_fill_their_fields_are_read_without_their_neighbours():
 
 def test_what_the_light_leaves_out_is_empty():
     assert read() == Identity()
-
-
-@pytest.mark.parametrize(('flags', 'names'), [
-    (0, []),
-    (1, ['thermal throttling']),
-    (2, ['over temperature shutdown']),
-    (4, ['thermistor failure']),
-    (5, ['thermal throttling', 'thermistor failure']),
-    (8, ['unknown flags 0x8']),
-    (0x80000001, ['thermal throttling', 'unknown flags 0x80000000']),
-])
-def test_error_flags_have_readable_names(flags, names):
-    assert flag_names(flags) == names

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import Counter
 import random
 
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.illuminator.operation import Result

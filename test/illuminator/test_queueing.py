@@ -14,8 +14,9 @@
 
 """Requests to one light: in order, one at a time of each kind, each answered exactly once."""
 
-from illuminator_ros.illuminator.device import DeviceProperties
-from illuminator_ros.illuminator.operation import MAX_WAITING, Result
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.illuminator.operation_queue import MAX_WAITING
 from illuminator_ros.mavlink.dialect import MavCmd, MavResult, Source
 import pytest
 from support.back_to_back import Pair

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from illuminator_ros.illuminator.controller import MAX_ASKED
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.mavlink.dialect import MavCmd, Source
 import pytest
 from support.back_to_back import Pair

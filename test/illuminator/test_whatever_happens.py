@@ -17,7 +17,7 @@
 from dataclasses import replace
 import random
 
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.thermal import ThermalProperties

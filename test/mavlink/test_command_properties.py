@@ -21,7 +21,8 @@ import random
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
-from illuminator_ros.mavlink.command import Ending, MAX_WAITING
+from illuminator_ros.mavlink.command import Ending
+from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.dialect import Source
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig, Run

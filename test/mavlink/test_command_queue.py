@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.command import Command, Ending, MAX_WAITING, Outcome
+from illuminator_ros.mavlink.command import Command, Ending, Outcome
+from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.dialect import Source
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig

@@ -22,7 +22,7 @@ import subprocess
 from typing import Any
 
 from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.parameters import ParameterError
+from illuminator_ros.ros.parameter_spec import ParameterError
 from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from rclpy.parameter import Parameter

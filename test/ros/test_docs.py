@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 
 from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
-from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.illuminator.error_flags import ErrorFlag
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     ComponentInformationBasic,
@@ -34,11 +34,8 @@ from illuminator_ros.monitor.options import parser
 from illuminator_ros.ros import beam, beam_output, mounting
 from illuminator_ros.ros.conversions import STATUS_TOPICS
 from illuminator_ros.ros.diagnostics import FLAG_LEVELS
-from illuminator_ros.ros.parameters import (
-    DEVICE_PARAMETERS,
-    LINK_PARAMETERS,
-    ParameterSpec,
-)
+from illuminator_ros.ros.parameter_spec import ParameterSpec
+from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 import pytest
 import yaml
 

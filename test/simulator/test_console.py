@@ -14,9 +14,10 @@
 
 """What can be done to simulated lights while they run."""
 
-from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.illuminator.error_flags import ErrorFlag
 from illuminator_ros.illuminator.faults import FAULTS
-from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.mavlink.dialect import IlluminatorStatus, Source
 from illuminator_ros.simulator.console import COMMANDS, describe_commands, execute
 import pytest

@@ -20,7 +20,8 @@ import re
 import shutil
 
 from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device import Device, DeviceProperties
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.simulator.view import glance, LiveView, PlainView

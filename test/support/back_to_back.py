@@ -21,7 +21,9 @@ import math
 from typing import Any
 
 from illuminator_ros.illuminator.controller import Controller
-from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.dialect import (

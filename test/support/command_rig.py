@@ -22,7 +22,8 @@ import heapq
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, CommandSender, Ending, Outcome
+from illuminator_ros.mavlink.command import Command, Ending, Outcome
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import CommandAck, CommandInt, MavResult, Source
 
 OURS = Source(1, 194)

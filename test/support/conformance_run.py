@@ -21,7 +21,8 @@ from dataclasses import replace
 from illuminator_ros.conformance.bench import Bench
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.suite import Suite
-from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.faults import with_fault
 from illuminator_ros.mavlink.dialect import Source
 from support.virtual_link import START, VirtualLink

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.model import Identity
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.dialect import (
     CommandAck,
     CommandInt,

@@ -23,13 +23,15 @@ import time
 from typing import Any
 
 from illuminator_ros.illuminator.controller import Controller
-from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.observer import LightObserver
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.dialect import Source
 from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
-from illuminator_ros.mavlink.link import Link, LinkEvent
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.url import parse_url, Url
 from support.waiting import eventually, Log, PATIENCE
 

@@ -24,7 +24,8 @@ from pathlib import Path
 import select
 import threading
 
-from illuminator_ros.illuminator.device import DeviceProperties, Devices
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.mavlink.dialect import decode_payload, HANDLED
 from illuminator_ros.mavlink.framing import Decoder
 from support.frames import frame_of

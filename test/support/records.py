@@ -21,8 +21,9 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.model import Configuration, Identity, Status
+from illuminator_ros.illuminator.model import Configuration, Status
 from illuminator_ros.illuminator.observer import Cause, LightObserver
 from illuminator_ros.illuminator.operation import Result
 

@@ -22,86 +22,29 @@ import random
 from typing import Any
 
 from illuminator_ros.illuminator.controller import Controller, MAX_LIGHTS
-from illuminator_ros.illuminator.device import Device, DeviceProperties, Devices
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.model import Configuration, Identity, Status
-from illuminator_ros.illuminator.observer import Cause, LightObserver
 from illuminator_ros.illuminator.operation import Done, Result
-from illuminator_ros.illuminator.operation import MAX_WAITING as MAX_WAITING_OPERATIONS
-from illuminator_ros.mavlink.command import MAX_WAITING
-from illuminator_ros.mavlink.dialect import (
-    CommandLong,
-    decode_payload,
-    encode_payload,
-    HANDLED,
-    LAYOUTS,
-    MavResult,
-    Source,
-)
-from illuminator_ros.mavlink.framing import Decoder, encode_frame
+from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
+from illuminator_ros.mavlink.command_sender import MAX_WAITING
+from illuminator_ros.mavlink.dialect import CommandLong, MavResult, Source
 from illuminator_ros.mavlink.reception import MAX_DECODERS
 from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from support.attacker import Attacker
+from support.party import KEY, Party
+from support.sceptic import Sceptic
 from support.simulated_link import SimulatedLink
 
-KEY = bytes(range(32))
 BRIDGE = Source(1, 194)
 GENUINE = Source(1, 243)
 GENUINE_PEER = ('127.0.0.1', 20_000)
 # s after which every request has been answered.
 ANSWERED_WITHIN = 120.0
-
-
-class Party:
-    """Somebody honest at the far end of the link: signs, and counts its sequence numbers."""
-
-    def __init__(self, source: Source, mode: SigningMode) -> None:
-        self.source = source
-        self._signing = Signing(mode, KEY if mode is not SigningMode.OFF else b'', link_id=7)
-        self._sequence = 0
-        self._decoder = Decoder()
-
-    def frame(self, message: Any, now: float) -> bytes:
-        """Return a message as it goes on the wire."""
-        self._sequence = (self._sequence + 1) & 0xFF
-        data = encode_frame(
-            message.id, encode_payload(message), sequence=self._sequence, source=self.source,
-            crc_extra=LAYOUTS[message.id].crc_extra, signed=self._signing.signs)
-        return self._signing.sign(data, 1.7e9 + now) if self._signing.signs else data
-
-    def messages(self, data: bytes) -> list[Any]:
-        """Return the messages in a datagram."""
-        return [decode_payload(frame.message_id, frame.payload)
-                for frame in self._decoder.feed(data) if frame.message_id in HANDLED]
-
-
-class Sceptic(LightObserver):
-    """Does not take a value that nobody should believe."""
-
-    def status(self, light: Light, status: Status) -> None:
-        for value, low, high in (
-                (status.brightness, 0.0, 100.0), (status.strobe_period, 0.0, 3600.0),
-                (status.strobe_duty_cycle, 0.0, 100.0), (status.temperature, -273.2, 1000.0)):
-            assert value is None or low <= value <= high, status
-        assert status.enabled in (None, False, True), status
-        if status.limits.known:
-            assert 0 <= status.limits.min_strobe_period <= status.limits.max_strobe_period <= 3600
-        temperature = light.temperature
-        assert temperature is None or math.isfinite(temperature), status
-
-    def configured(
-        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
-    ) -> None:
-        assert 0 <= configuration.brightness <= 100, configuration
-        assert 0 <= configuration.strobe_period <= 3600, configuration
-        assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
-
-    def identified(self, light: Light, identity: Identity) -> None:
-        for text in (identity.vendor, identity.model, identity.serial_number):
-            assert text.isprintable() and len(text) <= 32, identity
 
 
 class Siege:

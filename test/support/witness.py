@@ -21,7 +21,8 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
-from illuminator_ros.illuminator.device import Device, Devices
+from illuminator_ros.illuminator.device import Device
+from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.mavlink.dialect import (

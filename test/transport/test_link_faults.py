@@ -23,9 +23,9 @@ import threading
 from typing import Any
 
 from illuminator_ros.mavlink import link as link_module
-from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink import opener, worker
 from illuminator_ros.mavlink.dialect import heartbeat
-from illuminator_ros.mavlink.link import LinkEvent
+from illuminator_ros.mavlink.link_state import LinkEvent
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
@@ -67,7 +67,7 @@ class Faulty(Talker):
 @pytest.fixture(autouse=True)
 def _all_logged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have every fault logged, not only one in a while."""
-    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 0.0)
+    monkeypatch.setattr(worker, 'FAULT_LOG_INTERVAL', 0.0)
 
 
 def faults(caplog: pytest.LogCaptureFixture) -> list[str]:
@@ -189,7 +189,7 @@ def test_a_lasting_fault_does_not_keep_a_processor_busy(
     run: Run, endpoint: Faulty, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # So that a thread which does pause stands still, whatever time the machine takes.
-    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 3600.0)
+    monkeypatch.setattr(worker, 'FAULT_PAUSE', 3600.0)
     monkeypatch.setattr(link_module, 'IDLE', 3600.0)
     run(LiveLink('memory://faults', endpoint))
     endpoint.failures.wait_for(lambda one: True)
@@ -201,8 +201,8 @@ def test_a_lasting_fault_does_not_keep_a_processor_busy(
 def test_a_lasting_fault_does_not_fill_the_log(
     run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 60.0)
-    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 0.001)
+    monkeypatch.setattr(worker, 'FAULT_LOG_INTERVAL', 60.0)
+    monkeypatch.setattr(worker, 'FAULT_PAUSE', 0.001)
     endpoint = Restless('poll', times=NEVER_ENDING)
     run(LiveLink('memory://faults', endpoint))
     endpoint.failures.wait_for(lambda one: True, count=50)

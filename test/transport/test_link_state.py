@@ -21,7 +21,7 @@ import threading
 
 from illuminator_ros.mavlink import opener
 from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.link import LinkState
+from illuminator_ros.mavlink.link_state import LinkState
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame

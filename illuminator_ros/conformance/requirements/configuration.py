@@ -19,6 +19,7 @@ from __future__ import annotations
 from ..bench import Bench, DIM, LOW, same, Transaction
 from ..consent import dark, dimmed
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
+from ..transaction import Transaction
 from ...illuminator.model import float32, Limits, Mode
 from ...mavlink.dialect import MavCmd, MavResult
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from ..bench import Bench
 from ..requirement import Failed, ILLUMINATOR, MESSAGES, requirement, Skipped
-from ...illuminator.model import Identity
+from ...illuminator.identity import Identity
 from ...mavlink.dialect import INFORMATION_ID, MavCmd, wire_value
 
 STRINGS = ('vendor_name', 'model_name', 'software_version', 'hardware_version', 'serial_number')

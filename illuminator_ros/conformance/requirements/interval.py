@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from ..bench import Bench, median, periods
+from ..bench import Bench
 from ..requirement import Failed, MESSAGES, requirement, Skipped
+from ..timing import median, periods
 from ...mavlink.dialect import MavCmd, STATUS_ID
 
 # s

@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import math
 
-from ..bench import Bench, median, periods
+from ..bench import Bench
 from ..describe import status_text
 from ..requirement import Failed, ILLUMINATOR, MESSAGES, requirement, Skipped
-from ...illuminator.model import flag_names, KNOWN_FLAGS, Mode, Status
+from ..timing import median, periods
+from ...illuminator.error_flags import flag_names, KNOWN_FLAGS
+from ...illuminator.model import Mode, Status
 from ...mavlink.dialect import MavCmd, STATUS_ID
 
 

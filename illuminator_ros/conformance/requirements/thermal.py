@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from ..bench import Bench
 from ..requirement import Failed, ILLUMINATOR, requirement, Skipped
-from ...illuminator.model import ErrorFlag, flag_names, Status
+from ...illuminator.error_flags import ErrorFlag, flag_names
+from ...illuminator.model import Status
 
 # K that a light has to get warmer for a flag to have a reason.
 STEP = 0.5

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from ..bench import Bench, median, periods, Transaction
+from ..bench import Bench
 from ..requirement import (
     COMMAND,
     Failed,
@@ -26,6 +26,8 @@ from ..requirement import (
     SERIALIZATION,
     Skipped,
 )
+from ..timing import median, periods
+from ..transaction import Transaction
 from ...mavlink.dialect import MavResult, result_name, Source
 
 # s

@@ -1,0 +1,34 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Several simulated lights on one link."""
+
+from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.mavlink.dialect import CommandLong, Source
+
+GROUND = Source(255, 190)
+
+
+def test_lights_on_one_link_answer_for_themselves_only():
+    lights = Devices([DeviceProperties(source=Source(1, one)) for one in (243, 244)], 0.0)
+    lights.receive(GROUND, CommandLong(1, 244, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
+    assert [device.enabled for device in lights.devices] == [False, True]
+    assert {source for source, _ in lights.outgoing} == {Source(1, 244)}
+
+
+def test_all_lights_on_a_link_answer_a_broadcast():
+    lights = Devices([DeviceProperties(source=Source(1, one)) for one in (243, 244)], 0.0)
+    lights.receive(GROUND, CommandLong(0, 0, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
+    assert [device.enabled for device in lights.devices] == [True, True]
