@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from .bench import Bench, DIM, LOW
 from .requirement import Skipped
-from ..illuminator.model import DIMMING_FLAGS, Mode, Status
+from ..illuminator.error_flags import DIMMING_FLAGS
+from ..illuminator.model import Mode, Status
 from ..mavlink.dialect import MavCmd
 
 NOT_AGREED = 'not agreed to; see --yes'

@@ -20,17 +20,10 @@ from collections.abc import Callable, Sequence
 import logging
 import math
 
-from .bench import (
-    Bench,
-    differences,
-    Interrupted,
-    LightGone,
-    LOW,
-    MAX_LINES,
-    median,
-    periods,
-)
+from .bench import Bench, LOW
+from .comparison import differences
 from .consent import NOT_AGREED
+from .exchange import LightGone
 from .requirement import Failed, Requirement, Result, Skipped, Verdict
 from .requirements import REQUIREMENTS
 from .script import Interrupted

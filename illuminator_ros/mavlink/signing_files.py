@@ -24,7 +24,7 @@ from pathlib import Path
 import re
 import stat
 
-from .signing import KEY_SIZE, MAX_TICKS, ticks, TICKS_PER_SECOND
+from .signing import KEY_SIZE, MAX_TICKS, Signing, ticks, TICKS_PER_SECOND
 
 MIN_PASSPHRASE = 8
 MAX_KEY_FILE = 4096

@@ -19,7 +19,7 @@ from dataclasses import replace
 from illuminator_ros.conformance.requirement import Verdict
 from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import PROFILES
-from illuminator_ros.illuminator.device import DeviceProperties
+from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.mavlink.dialect import MavResult

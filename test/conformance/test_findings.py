@@ -22,7 +22,8 @@ from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
-from illuminator_ros.illuminator.model import Identity, Limits, Mode
+from illuminator_ros.illuminator.identity import Identity
+from illuminator_ros.illuminator.model import Limits, Mode
 from illuminator_ros.mavlink.dialect import MavCmd, Source
 import pytest
 from support.conformance_run import Run

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from ..bench import Bench, DIM, LOW, same, Transaction
+from ..bench import Bench, DIM, LOW
+from ..comparison import same
 from ..consent import dark, dimmed
 from ..requirement import fail_if, ILLUMINATOR, MESSAGES, requirement, Skipped
 from ..transaction import Transaction
