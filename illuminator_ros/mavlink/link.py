@@ -145,12 +145,9 @@ class Link(Worker):
             # A call ends it.
             self._calls_only.poll(1000 * COLLECTION)
             wait = 0.0
-        for key, events in self._selector.select(wait):
-            if key.fileobj is self._wake_out:
-                with contextlib.suppress(BlockingIOError):
-                    self._wake_out.recv(4096)
-            elif self._channel is not None:
-                self._serve(key.fileobj, events)
+        for handle, events in self._ready(wait):
+            if self._channel is not None:
+                self._serve(handle, events)
         now = self.clock()
         frames = self._reception.counters.frames
         if frames > self._frames_seen:
@@ -219,7 +216,10 @@ class Link(Worker):
 
     def _look_after(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
-            self._prove(channel, now)
+            # It has lasted, so its loss will be answered at once.
+            self._proven_at = math.inf
+            self._opener.succeeded()
+            self._believe(channel, now)
         for peer, frame in self._reception.give_up(now, self._wall_clock()):
             self._accept(channel, peer, frame, now)
         if now >= self._knock_at:
@@ -268,12 +268,6 @@ class Link(Worker):
         if not self._doubtful:
             self._standing.opened(channel.name, now)
 
-    def _prove(self, channel: Channel, now: float) -> None:
-        """Note that the channel has lasted: so its loss is answered at once."""
-        self._proven_at = math.inf
-        self._opener.succeeded()
-        self._believe(channel, now)
-
     def _believe(self, channel: Channel, now: float) -> None:
         """Have a channel count as open that was doubted until now."""
         if self._standing.reason:
@@ -295,9 +289,7 @@ class Link(Worker):
     def _close(self) -> None:
         if self._channel is None:
             return
-        for key in list(self._selector.get_map().values()):
-            if key.fileobj is not self._wake_out:
-                self._selector.unregister(key.fileobj)
+        self._unregister_all()
         channel, self._channel = self._channel, None
         with contextlib.suppress(OSError):
             channel.close()

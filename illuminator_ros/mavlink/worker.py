@@ -111,6 +111,23 @@ class Worker(ABC):
         self._wake_out.close()
         self._wake_in.close()
 
+    def _ready(self, seconds: float) -> list[tuple[Any, int]]:
+        """Return what is ready and for which events, waiting for that or for a call."""
+        ready = []
+        for key, events in self._selector.select(seconds):
+            if key.fileobj is self._wake_out:
+                with contextlib.suppress(BlockingIOError):
+                    self._wake_out.recv(4096)
+            else:
+                ready.append((key.fileobj, events))
+        return ready
+
+    def _unregister_all(self) -> None:
+        """Wait for nothing any more but calls."""
+        for key in list(self._selector.get_map().values()):
+            if key.fileobj is not self._wake_out:
+                self._selector.unregister(key.fileobj)
+
     @abstractmethod
     def _begin(self) -> None:
         """Do what comes before the first turn."""
