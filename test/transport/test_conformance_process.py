@@ -97,17 +97,28 @@ def test_what_is_found_is_exit_status_1(url, programs):
     assert 'FAIL    on ' in conformance.log
 
 
-def test_a_signal_ends_it_with_the_light_as_it_was(url, programs):
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP])
+def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     simulator = programs('simulator', f'udpin://{url}')
     simulator.wait_for('link open')
     conformance = programs('conformance', f'udpout://{url}', '--yes')
     conformance.wait_for('    brightness ')
-    conformance.send(signal.SIGINT)
+    conformance.send(number)
     assert conformance.wait() == 1
     assert conformance.log.rstrip().endswith('the light is as it was')
     assert 'Traceback' not in conformance.log
     simulator.wait_for('100 %', count=2)
     assert 'off    100 %  no strobe' in simulator.lines[-1]
+
+
+def test_under_nohup_it_outlives_its_terminal(url):
+    program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
+                      'illuminator_ros.conformance', f'udpout://{url}', '--yes')
+    program.wait_for('checking the light')
+    with open(f'/proc/{program.pid}/status') as status:
+        [ignored] = [line.split()[1] for line in status if line.startswith('SigIgn:')]
+    program.kill()
+    assert int(ignored, 16) & 1 << signal.SIGHUP - 1
 
 
 def test_without_a_light_it_is_exit_status_1(url, programs):
