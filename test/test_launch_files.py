@@ -86,6 +86,12 @@ def test_the_namespace_of_a_group_holds_where_none_is_given(launch: ET.Element) 
 
 
 @EVERY
+def test_each_node_is_in_the_namespace(launch: ET.Element) -> None:
+    assert {node.attrib.get('namespace') for node in launch.findall('node')} <= {
+        '$(var namespace)'}
+
+
+@EVERY
 def test_elements_and_attributes_are_known(launch: ET.Element) -> None:
     assert (launch.tag, launch.attrib) == ('launch', {})
     for parent in launch.iter():

@@ -35,12 +35,12 @@ PACKAGE = 'illuminator_ros'
 # Modules whose rosdep key is another than their name; fastcrc comes with pymavlink.
 KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
         'pymavlink': 'python3-pymavlink-pip', 'pytest': 'python3-pytest',
-        'serial': 'python3-serial', 'yaml': 'python3-yaml',
+        'rich': 'python3-rich', 'serial': 'python3-serial', 'yaml': 'python3-yaml',
         'catkin_pkg': 'python3-catkin-pkg-modules'}
 
 pytestmark = pytest.mark.timeout(300)
 # Extras, which whoever wants them installs.
-OPTIONAL = {'rich', 'textual'}
+OPTIONAL = {'python3-rich'}
 
 
 def imported(folder: Path) -> set[str]:
@@ -52,7 +52,7 @@ def imported(folder: Path) -> set[str]:
                 names |= {alias.name.partition('.')[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 names.add(str(node.module).partition('.')[0])
-    return names - sys.stdlib_module_names - OPTIONAL
+    return names - sys.stdlib_module_names
 
 
 def output(folder: Path, *arguments: str) -> str:
@@ -103,7 +103,14 @@ def test_what_the_package_imports_is_declared() -> None:
 
     needed = {KEYS.get(name, name) for name in imported(ROOT / PACKAGE) - {PACKAGE}}
 
-    assert needed - declared == set()
+    assert needed - declared == OPTIONAL
+
+
+def test_what_the_launch_files_need_is_declared() -> None:
+    declared = {depend.name for depend in parse_package(str(ROOT)).exec_depends}
+
+    assert {path.suffixes[-2:] == ['.launch', '.xml'] for path in ROOT.glob('launch/*')} == {True}
+    assert declared >= {'ros2launch', 'launch_ros', 'launch_xml'}
 
 
 def test_what_the_tests_import_is_declared() -> None:
@@ -111,7 +118,8 @@ def test_what_the_tests_import_is_declared() -> None:
     declared = {depend.name for depend in package.exec_depends + package.test_depends}
     own = {path.stem for path in (*ROOT.glob('*'), *ROOT.glob('*/*'))} - {PACKAGE}
 
-    needed = {KEYS.get(name, name) for name in imported(ROOT / 'test') - own - {PACKAGE}}
+    modules = imported(ROOT / 'test') | imported(ROOT / PACKAGE)
+    needed = {KEYS.get(name, name) for name in modules - own - {PACKAGE}}
 
     assert needed - declared == set()
 

@@ -119,13 +119,14 @@ def _consent(options: argparse.Namespace) -> bool:
 
 
 class _Signals:
-    """SIGINT, SIGTERM and SIGHUP end a run in order; the second one at once."""
+    """SIGINT, SIGTERM and, but for nohup, SIGHUP end a run in order; the second one at once."""
 
     def __init__(self, interrupt: Callable[[], None]) -> None:
         self._interrupt = interrupt
         self._count = 0
         for one in SIGNALS:
-            signal.signal(one, self._handle)
+            if signal.getsignal(one) != signal.SIG_IGN:
+                signal.signal(one, self._handle)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         self._count += 1

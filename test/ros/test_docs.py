@@ -18,7 +18,6 @@ from importlib import import_module
 from pathlib import Path
 import re
 from typing import Any
-from xml.etree import ElementTree
 
 from bench.subjects import SUBJECTS
 from illuminator_ros.bridge import usage
@@ -32,11 +31,11 @@ from illuminator_ros.mavlink.dialect import (
 from illuminator_ros.monitor import graph, keys, model, requests
 from illuminator_ros.monitor.options import parser
 from illuminator_ros.ros import beam, beam_output, mounting
-from illuminator_ros.ros.conversions import STATUS_TOPICS
 from illuminator_ros.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.ros.parameter_spec import ParameterSpec
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
 import pytest
+from support.tables import table
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,23 +46,6 @@ PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 MONITOR = (ROOT / 'doc' / 'monitor.md').read_text()
 BEAM = (ROOT / 'doc' / 'beam.md').read_text()
 LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
-
-
-def table(document: str, first_heading: str) -> list[list[str]]:
-    """Return the rows of the table whose first column has this heading."""
-    rows = iter(document.splitlines())
-    for line in rows:
-        if line.startswith(f'| {first_heading} |'):
-            next(rows)
-            break
-    else:
-        raise AssertionError(f'no table {first_heading!r}')
-    found = []
-    for line in rows:
-        if not line.startswith('|'):
-            break
-        found.append([cell.strip() for cell in line.strip('|').split('|')])
-    return found
 
 
 def range_of(spec: ParameterSpec) -> str:
@@ -105,26 +87,6 @@ def test_readme_has_each_parameter_of_the_light_as_tools_show_it(spec: Parameter
     ('parameter of the link', LINK_PARAMETERS), ('parameter of the light', DEVICE_PARAMETERS)])
 def test_readme_has_no_other_parameters(heading: str, specs: tuple[ParameterSpec, ...]) -> None:
     assert [cells[0] for cells in table(README, heading)] == [f'`{spec.name}`' for spec in specs]
-
-
-def test_readme_has_each_status_topic_with_its_type() -> None:
-    rows = {cells[0]: cells[1] for cells in table(README, 'published')}
-    for name, type_ in STATUS_TOPICS.items():
-        assert rows[f'`~/{name}`'] == f'`std_msgs/{type_.__name__}`'
-
-
-@pytest.mark.parametrize(('heading', 'actions'), [
-    ('published', {'publish'}), ('accepted', {'subscribe', 'reply'})])
-def test_readme_has_each_topic_and_service_of_the_policy(
-    heading: str, actions: set[str],
-) -> None:
-    # test_security_policy.py compares the policy with the running node.
-    policy = ElementTree.parse(ROOT / 'config' / 'sros2' / 'illuminator.policy.xml')
-    names = {
-        name.text for rules in policy.iterfind('.//profile[@node="illuminator"]/*')
-        if actions & set(rules.attrib) for name in rules
-        if not re.search('parameter|logger|type_description|rosout|clock', str(name.text))}
-    assert {cells[0].strip('`') for cells in table(README, heading)} == names
 
 
 def test_yaml_has_each_link_parameter_with_its_default() -> None:

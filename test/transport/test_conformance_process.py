@@ -120,6 +120,16 @@ def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
 
 
+def test_under_nohup_it_outlives_its_terminal(url):
+    program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
+                      'illuminator_ros.conformance', f'udpout://{url}', '--yes')
+    program.wait_for('checking the light')
+    with open(f'/proc/{program.pid}/status') as status:
+        [ignored] = [line.split()[1] for line in status if line.startswith('SigIgn:')]
+    program.kill()
+    assert int(ignored, 16) & 1 << signal.SIGHUP - 1
+
+
 def test_without_a_light_it_is_exit_status_1(url, programs):
     conformance = programs('conformance', f'udpin://{url}', '--wait', '0.5')
     assert conformance.wait() == 1

@@ -1,0 +1,32 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tables of the documentation."""
+
+
+def table(document: str, first_heading: str) -> list[list[str]]:
+    """Return the rows of the table whose first column has this heading."""
+    rows = iter(document.splitlines())
+    for line in rows:
+        if line.startswith(f'| {first_heading} |'):
+            next(rows)
+            break
+    else:
+        raise AssertionError(f'no table {first_heading!r}')
+    found = []
+    for line in rows:
+        if not line.startswith('|'):
+            break
+        found.append([cell.strip() for cell in line.strip('|').split('|')])
+    return found
