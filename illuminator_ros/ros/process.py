@@ -135,8 +135,8 @@ class BridgeProcess:
     def _found(self, light: Light) -> None:
         """Give a light its node, in the link's thread."""
         if self.node.light is None and self._selected(light.source):
-            self.node.bind(light, self.link.clock())
             self._names.begin(light.source, self.link.clock())
+            self.node.bind(light, self.link.clock())
             return
         if self._selected(light.source):
             first = self.node.light
