@@ -214,7 +214,7 @@ def test_an_answer_that_is_neither_yes_nor_no_is_said_to_be_taken_as_no(url):
 def test_it_does_not_ask_where_nothing_that_dazzles_is_to_be_checked(url):
     _, seen = conversation(
         'illuminator_ros.conformance', f'udpin://{url}', '--wait', '0.1', '--only', 'address',
-        '--only', 'on', answers=[])
+        '--only', 'on', answers=[('', 'n')])
     assert 'no light was heard' in seen
     assert '[y/N]' not in seen
 
