@@ -141,6 +141,18 @@ def test_drops_are_counted_over_all_openings(run: Run) -> None:
         assert 0 < counts[0] < counts[1]
 
 
+def test_what_was_sent_while_the_link_was_lost_does_not_count_as_lost(run: Run) -> None:
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        for count, sequence in enumerate((10, 100), 1):
+            with server.accept()[0] as connection:
+                connection.sendall(heartbeat_frame(sequence=sequence))
+                link.endpoint.heard.wait_for(lambda heard: True, count=count)
+            link.wait_lost(count)
+    counter = link.link.state().traffic.sources[LIGHT]
+    assert (counter.received, counter.lost) == (2, 0)
+
+
 def test_reading_it_while_everything_changes_is_no_error(
     run: Run, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
