@@ -93,6 +93,7 @@ class Light:
         self.sharing = Sharing()
         self._switching = OperationQueue()
         self._status_due = math.inf
+        self._asked_at = -math.inf
         # Whether it was lost since the newest status.
         self._was_away = False
         self._sending_times = SendingTimes()
@@ -242,20 +243,30 @@ class Light:
         # The sum and not the difference, which is what next_deadline() returns: floats differ.
         if self.connected and now >= self.heard_at + self.settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}')
-        if now >= self._status_due:
-            self._status_due = now + STATUS_TIMEOUT
+        if now >= self._question_due:
+            self._asked_at, self._status_due = now, now + STATUS_TIMEOUT
             self.request_status(now)
         self.identification.poll(now)
         self._switching.poll(now)
         self.agreement.poll(now)
         self._tell_refreshes(lambda refresh: refresh.poll(now))
 
+    @property
+    def _question_due(self) -> float:
+        """
+        When the light is to be asked for a status.
+
+        It may have no heartbeat, and have been asked to send its status less often than that.
+        """
+        silent_since = max(self.heard_at, self._asked_at) if self.connected else math.inf
+        return min(self._status_due, silent_since + STATUS_TIMEOUT)
+
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
         lost = (self.heard_at + self.settings.heartbeat_timeout if self.connected
                 else math.inf)
         refresh = min((refresh.until for refresh in self._refreshes), default=math.inf)
-        return min(lost, self._status_due, refresh, self.identification.next_deadline(),
+        return min(lost, self._question_due, refresh, self.identification.next_deadline(),
                    self._switching.next_deadline(), self.agreement.next_deadline())
 
     def _tell_refreshes(self, tell: Callable[[Refresh], None]) -> None:

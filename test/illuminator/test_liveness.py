@@ -189,6 +189,12 @@ class TestStatusStream:
         assert fake.stream == pytest.approx(interval)
         assert self.requests(pair, 1003.0) == []
 
+    def test_a_light_without_heartbeat_that_is_to_report_rarely_is_not_lost(self):
+        fake = FakeLight(heartbeat_type=None)
+        pair = Pair(fake, settings=Settings(status_interval=60.0)).settle(300.0)
+        assert fake.stream == 60.0
+        assert pair.recorder.events == ['connected']
+
     def test_the_interval_is_left_alone_where_none_is_wished(self, faked):
         assert faked.commands(MavCmd.SET_MESSAGE_INTERVAL) == []
 

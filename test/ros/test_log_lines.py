@@ -23,6 +23,7 @@ from illuminator_ros.mavlink.dialect import (
     MavType,
     Source,
 )
+from illuminator_ros.ros.node import PATIENCE
 from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from support.embedded import resting_bridge
@@ -62,6 +63,23 @@ def process(domain: int, parameters: dict[str, Any]) -> Iterator[BridgeProcess]:
 def hear(process: BridgeProcess, *sources: Source) -> None:
     for source in sources:
         process.controller.receive(source, heartbeat(MavType.ILLUMINATOR), NOW)
+
+
+def test_a_light_that_stays_away_is_missed_once(
+    domain: int, capfd: pytest.CaptureFixture[str],
+) -> None:
+    now = [NOW]
+    with resting_bridge(domain, lambda: now[0]) as process:
+        process.node.poll(0.0)
+        assert 'no light' not in ''.join(capfd.readouterr())
+
+        for _ in range(10):
+            now[0] += PATIENCE
+            process.node.poll(0.0)
+
+    [line] = [line for line in ''.join(capfd.readouterr()).splitlines() if 'no light' in line]
+    assert line.startswith('[WARN]')
+    assert line.endswith('no light connected: memory://rest is not open: not opened yet')
 
 
 @pytest.mark.parametrize(('flags', 'severity', 'text'), [

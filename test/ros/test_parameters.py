@@ -20,6 +20,8 @@ from typing import Any
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, GetParameterTypes
+from rclpy.parameter import Parameter
+from support.embedded import resting_bridge
 from support.light import ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
@@ -168,3 +170,13 @@ class TestLinkParameters:
         assert not result.successful
         assert 'read-only' in result.reason
         assert parameters.get(name) == before
+
+
+def test_what_runs_in_the_same_process_cannot_set_what_the_light_has_not_accepted(
+    domain: int,
+) -> None:
+    with resting_bridge(domain, lambda: 0.0) as process:
+        [result] = process.node.set_parameters([Parameter('brightness', value=30.0)])
+
+        assert not result.successful
+        assert result.reason == 'brightness: only the parameter services reach the light'

@@ -123,8 +123,7 @@ class Ros(SpunNode):
         client, met = self._clients.get(service, (None, set()))
         now = self._incarnations(node)
         if client is None or not now or not now <= met:
-            if client is not None:
-                self.node.destroy_client(client)
+            # The old one is left alone: it may still wait for an answer.
             client = self.node.create_client(type_, service)
             eventually(client.service_is_ready)
             self._meet(node)

@@ -61,6 +61,11 @@ def test_a_peer_that_stays_silent_is_found_out_within_seconds(ours: OpenChannel)
     ours_socket: Any = next(iter(ours.selector.get_map().values())).fileobj
     milliseconds = ours_socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
     assert 0 < milliseconds <= 2000
+    # That is for what was sent; where nothing is, the kernel asks.
+    assert ours_socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    idle, interval, count = (ours_socket.getsockopt(socket.IPPROTO_TCP, option) for option in (
+        socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT))
+    assert idle + interval * count <= 5
 
 
 def test_a_server_that_ends_is_a_lost_channel(ours: OpenChannel, server: socket.socket) -> None:

@@ -22,7 +22,7 @@ import socket
 from typing import Any
 
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
-from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM
+from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM, RECEIVE_BUFFER
 from illuminator_ros.mavlink.url import Address, UdpUrl
 import pytest
 from support.open_channel import bound_socket, has_nothing, OpenChannel
@@ -38,6 +38,14 @@ def test_a_listening_socket_hears_everybody(channel: OpenFunction, loopback: str
         one.sendto(b'one', (loopback.strip('[]'), port))
         other.sendto(b'other', (loopback.strip('[]'), port))
         assert sorted(data for _, data in ours.receive(2)) == [b'one', b'other']
+
+
+def test_a_socket_keeps_as_much_as_the_kernel_allows(channel: OpenFunction) -> None:
+    ours: Any = channel(UdpUrl(Address('127.0.0.1', 0))).channel
+    with socket.socket(type=socket.SOCK_DGRAM) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        most = other.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+    assert ours._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) == most
 
 
 def test_a_listening_socket_sends_to_whom_it_has_checked(
