@@ -156,7 +156,7 @@ def _link_fault(link: Link) -> str:
 
 def _show(texts: _Texts, event: LinkEvent) -> None:
     if not event.is_open:
-        texts.put(f'link not open: {event.name}: {event.reason}; trying again')
+        texts.put(str(event))
 
 
 def _write(path: str | None, text: str) -> bool:

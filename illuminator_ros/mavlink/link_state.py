@@ -26,15 +26,23 @@ from .statistics import Traffic
 @dataclass(frozen=True)
 class LinkEvent:
     """
-    The link was opened or lost, or cannot be opened.
+    The link was opened or lost, or cannot be opened; as text it is a line for people.
 
     :param name: the transport, or the URL where there is none.
     :param reason: why it is not open.
+    :param was_open: whether it is lost, and not just not open yet.
     """
 
     is_open: bool
     name: str
     reason: str = ''
+    was_open: bool = False
+
+    def __str__(self) -> str:
+        if self.is_open:
+            return f'link open: {self.name}'
+        what = 'lost' if self.was_open else 'not open'
+        return f'link {what}: {self.name}: {self.reason}; trying again'
 
 
 @dataclass

@@ -63,7 +63,7 @@ class Standing:
             self.failed(reason)
         else:
             self.since, self.reason = now, reason
-            self._tell(LinkEvent(False, name, reason))
+            self._tell(LinkEvent(False, name, reason, was_open=True))
 
     def stopped(self, now: float) -> None:
         """Note that it is closed for good, of which nobody is told."""

@@ -197,10 +197,9 @@ class BridgeProcess:
     def _link_event(self, event: LinkEvent) -> None:
         logger = self.node.get_logger()
         if event.is_open:
-            logger.info(f'link open: {event.name}')
+            logger.info(str(event))
         else:
-            what = 'lost' if self.link.state().openings else 'not open'
-            logger.warning(f'link {what}: {event.name}: {event.reason}; trying again')
+            logger.warning(str(event))
         for node in list(self.nodes):
             node.publish_diagnostics()
 

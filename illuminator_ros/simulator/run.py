@@ -108,11 +108,7 @@ class _Simulation:
             self._texts.put((execute(line, self._endpoint.devices, now), line))
 
     def _note(self, event: LinkEvent) -> None:
-        if event.is_open:
-            text = f'link open: {event.name}'
-        else:
-            text = f'link not open: {event.name}: {event.reason}; trying again'
-        self._texts.put((text, None))
+        self._texts.put((str(event), None))
 
 
 def run(args: list[str] | None, termination: Termination) -> int:

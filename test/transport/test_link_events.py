@@ -73,6 +73,8 @@ def test_a_reason_for_not_opening_is_reported_once(
     assert link.history() == [False]
     assert link.events[0].reason == (
         f'cannot connect to 127.0.0.1:{port}: Connection refused')
+    assert str(link.events[0]) == (
+        f'link not open: tcp://127.0.0.1:{port}: {link.events[0].reason}; trying again')
 
 
 def count_tries(monkeypatch: pytest.MonkeyPatch) -> Log[Any]:
@@ -93,6 +95,11 @@ def test_a_loss_and_a_return_are_one_event_each(run: Run, port: int) -> None:
     with listening_socket(port=port) as server, server.accept()[0]:
         link.wait_open(2)
         assert link.history() == [True, False, True]
+        name = f'tcp to 127.0.0.1:{port}'
+        assert list(map(str, link.events)) == [
+            f'link open: {name}',
+            f'link lost: {name}: {link.events[1].reason}; trying again',
+            f'link open: {name}']
         assert link.events[1].reason
 
 
