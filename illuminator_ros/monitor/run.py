@@ -44,6 +44,7 @@ from .terminal import (
     suspend,
     suspended_by,
     unbuffered,
+    while_it_lasts,
 )
 from .view import plain, Scene, screen
 from ..entry import one_line
@@ -108,7 +109,9 @@ def run(args: list[str] | None, termination: Termination) -> int:
                    and not console.is_dumb_terminal and not options.once)
     try:
         if interactive:
-            return _watch(monitor, console, termination, ascii_only=options.ascii)
+            with while_it_lasts():
+                _watch(monitor, console, termination, ascii_only=options.ascii)
+            return 0
         return _print_once(monitor, options, termination)
     finally:
         monitor.end()
@@ -118,7 +121,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
 
 def _watch(
     monitor: Monitor, console: Console, termination: Termination, *, ascii_only: bool,
-) -> int:
+) -> None:
     """Show the lights until somebody has had enough."""
     operator = Operator(monitor.graph)
     keyboard = Keyboard(sys.stdin.fileno())
@@ -152,7 +155,6 @@ def _watch(
             suspend(job=operator.stop)
             operator.stop = False
     keyboard.close()
-    return 0
 
 
 def told(light: Light) -> bool:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import errno
 import functools
 import os
 import select
@@ -29,6 +30,18 @@ import threading
 
 # s after an escape in which what belongs to it must have come.
 ESCAPE_TIMEOUT = 0.05
+
+
+@contextlib.contextmanager
+def while_it_lasts() -> Iterator[None]:
+    """Leave what is in it without an error once the terminal is gone."""
+    try:
+        yield
+    except (OSError, termios.error) as error:
+        if error.args[0] != errno.EIO:
+            raise
+        # The interpreter would try at its end to write what is left.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager

@@ -115,11 +115,12 @@ class Terminal:
             preexec_fn=_own_terminal)
         self._grown = threading.Condition()
         self._raw = b''
+        self._gone = False
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
     def _read(self) -> None:
-        while True:
+        while not self._gone:
             try:
                 data = os.read(self._master, 65536)
             except OSError:
@@ -158,6 +159,15 @@ class Terminal:
         """Send a signal to the program."""
         self._process.send_signal(number)
 
+    def hang_up(self) -> None:
+        """Be gone, as a window that is closed."""
+        self._gone = True
+        # What answers the key ends the reader, which keeps the terminal from being gone.
+        self.type('?')
+        self._reader.join(PATIENCE)
+        os.close(self._slave)
+        os.close(self._master)
+
     def wait(self) -> int:
         """Wait for the end and return the exit status."""
         return self._process.wait(PATIENCE)
@@ -176,9 +186,10 @@ class Terminal:
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGKILL)
             self._process.wait(PATIENCE)
-        os.close(self._slave)
-        self._reader.join(PATIENCE)
-        os.close(self._master)
+        if not self._gone:
+            os.close(self._slave)
+            self._reader.join(PATIENCE)
+            os.close(self._master)
 
 
 def _own_terminal() -> None:

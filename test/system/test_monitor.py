@@ -100,6 +100,14 @@ class TestOnATerminal:
 
             screen.wait_for('any key goes back')
 
+    def test_it_ends_in_order_with_its_terminal(self, own_ros: Ros) -> None:
+        with terminal(env=domain(own_ros)) as screen:
+            screen.wait_for('no lights in this ROS graph yet')
+
+            screen.hang_up()
+
+            assert screen.wait() == 0
+
     def test_it_follows_the_size(self, own_ros: Ros) -> None:
         with terminal(env=domain(own_ros), size=(24, 100)) as screen:
             screen.wait_for('a all off')
