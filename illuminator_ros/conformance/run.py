@@ -119,7 +119,11 @@ def _consent(options: argparse.Namespace) -> bool:
 
 
 class _Signals:
-    """SIGINT, SIGTERM and, but for nohup, SIGHUP end a run in order; the second one at once."""
+    """
+    SIGINT, SIGTERM and, but for nohup, SIGHUP end a run in order.
+
+    After that SIGINT and SIGTERM end it at once.
+    """
 
     def __init__(self, interrupt: Callable[[], None]) -> None:
         self._interrupt = interrupt
@@ -129,18 +133,26 @@ class _Signals:
                 signal.signal(one, self._handle)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self._count and number == signal.SIGHUP:
+            # A window that is closed sends several, by the shell and by the terminal.
+            return
         self._count += 1
         if self._count > 1:
-            os.write(2, b'conformance: ended; the light is not as it was\n')
+            _warn(b'conformance: ended; the light is not as it was\n')
             os._exit(1)
-        os.write(2, b'conformance: bringing the light back to where it was; once more to end '
-                    b'without\n')
+        _warn(b'conformance: bringing the light back to where it was; once more to end without\n')
         self._interrupt()
+
+
+def _warn(text: bytes) -> None:
+    # Where nobody can be told any more, the light is to be brought back all the same.
+    with contextlib.suppress(OSError):
+        os.write(2, text)
 
 
 def _print(*texts: str) -> None:
     # Whoever reads it through a pipe wants to have it now; who does not, does not.
-    with contextlib.suppress(BrokenPipeError):
+    with contextlib.suppress(OSError):
         print(*texts, sep='\n', flush=True)
 
 

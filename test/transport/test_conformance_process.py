@@ -120,6 +120,40 @@ def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
 
 
+def test_a_window_that_is_closed_leaves_the_light_as_it_was(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    master, slave = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'illuminator_ros.conformance', f'udpout://{url}', '--yes',
+         '--only', 'thermal-flags', '--heat', '3600'],
+        stdin=slave, stdout=slave, stderr=slave, cwd=ROOT, env=environment(),
+        start_new_session=True)
+    os.close(slave)
+    try:
+        simulator.wait_for('ON     100 %')
+        os.close(master)
+        process.send_signal(signal.SIGHUP)
+        process.wait(PATIENCE)
+        eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_window_that_is_closed_may_send_several_signals(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    conformance = programs('conformance', f'udpout://{url}', '--yes', '--only', 'thermal-flags',
+                           '--heat', '3600')
+    simulator.wait_for('ON     100 %')
+    conformance.send(signal.SIGHUP)
+    conformance.wait_for('bringing the light back')
+    conformance.send(signal.SIGHUP)
+    assert conformance.wait() == 1
+    assert conformance.log.rstrip().endswith('the light is as it was')
+
+
 def test_under_nohup_it_outlives_its_terminal(url):
     program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
                       'illuminator_ros.conformance', f'udpout://{url}', '--yes')
