@@ -39,11 +39,16 @@ async def _all_refused(bench: Bench, values: list[tuple[float, ...]]) -> None:
     fail_if([await bench.refused(CONFIGURE, value) for value in values])
 
 
+async def _synchronised(bench: Bench) -> Transaction:
+    """Configure it to external sync, dark unless it may strobe as another signal has it."""
+    return await bench.configure(Mode.EXTERNAL_SYNC, brightness=LOW if bench.consent else 0.0)
+
+
 @requirement('mode-internal', 'takes internal control', ILLUMINATOR, 'MODES', changes=True)
 async def internal(bench: Bench) -> None:
     """Configure it to that mode, from the other one if it takes that."""
     await bench.baseline()
-    await bench.configure(Mode.EXTERNAL_SYNC)
+    await _synchronised(bench)
     before = await bench.status()
     # Another brightness, since in a light that knows one mode only the mode would show nothing.
     one = await bench.configure(Mode.INTERNAL_CONTROL, brightness=DIM)
@@ -59,7 +64,7 @@ async def external(bench: Bench) -> None:
     """Configure it to that mode."""
     await bench.baseline()
     status = await bench.status()
-    one = await bench.configure(Mode.EXTERNAL_SYNC)
+    one = await _synchronised(bench)
     bitmask = status.mode_bitmask if status else 0
     # Lights differ in whether 2 stands for this mode or, as 1 << 1, for the other.
     if one.result == MavResult.DENIED and bitmask not in (3, 6):
