@@ -259,7 +259,9 @@ class Light:
         It may have no heartbeat, and have been asked to send its status less often than that.
         """
         silent_since = max(self.heard_at, self._asked_at) if self.connected else math.inf
-        return min(self._status_due, silent_since + STATUS_TIMEOUT)
+        # Its answer takes time, too.
+        patience = min(STATUS_TIMEOUT, self.settings.heartbeat_timeout / 1.2)
+        return min(self._status_due, silent_since + patience)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""

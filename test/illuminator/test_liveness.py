@@ -189,9 +189,10 @@ class TestStatusStream:
         assert fake.stream == pytest.approx(interval)
         assert self.requests(pair, 1003.0) == []
 
-    def test_a_light_without_heartbeat_that_is_to_report_rarely_is_not_lost(self):
+    @pytest.mark.parametrize('timeout', [10.0, 3.0, 2.0, 1.1])
+    def test_a_light_without_heartbeat_that_is_to_report_rarely_is_not_lost(self, timeout):
         fake = FakeLight(heartbeat_type=None)
-        pair = Pair(fake, settings=Settings(status_interval=60.0)).settle(300.0)
+        pair = Pair(fake, settings=Settings(timeout, status_interval=60.0)).settle(300.0)
         assert fake.stream == 60.0
         assert pair.recorder.events == ['connected']
 
