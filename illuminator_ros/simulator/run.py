@@ -95,6 +95,9 @@ class _Simulation:
         while True:
             try:
                 line = sys.stdin.readline() if sys.stdin else ''
+            except UnicodeDecodeError:
+                # What is no text is no command.
+                continue
             except (OSError, ValueError):
                 return
             if not line:

@@ -14,6 +14,7 @@
 
 """``conformance`` and ``simulator`` as processes, over UDP, on a machine without ROS."""
 
+import contextlib
 import json
 import os
 import pty
@@ -277,3 +278,28 @@ def test_a_simulator_whose_input_has_ended_goes_on(url, programs):
     simulator.wait_for('link open')
     assert simulator.running
     assert simulator.end() == 0
+
+
+def test_what_is_typed_into_the_simulator_and_is_no_text_does_not_end_its_console(url):
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'illuminator_ros.simulator', f'udpin://{url}'], cwd=ROOT,
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+        env=environment({'PYTHONIOENCODING': 'utf-8:strict'}))
+
+    def ended():
+        # Again and again: one that is read together with what is no text is passed over with it.
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write(b'quit\n')
+            process.stdin.flush()
+        return process.poll() is not None
+
+    try:
+        process.stdin.write(b'\xff\n')
+        process.stdin.flush()
+        eventually(ended, 'it does not take commands any more')
+        assert process.returncode == 0
+    finally:
+        process.kill()
+        process.wait()
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
