@@ -14,7 +14,6 @@
 
 """``conformance`` and ``simulator`` as processes, over UDP, on a machine without ROS."""
 
-import contextlib
 import json
 import os
 import pty
@@ -119,40 +118,6 @@ def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     assert conformance.log.rstrip().endswith('the light is as it was')
     assert 'Traceback' not in conformance.log
     eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
-
-
-def test_a_window_that_is_closed_leaves_the_light_as_it_was(url, programs):
-    simulator = programs('simulator', f'udpin://{url}')
-    simulator.wait_for('link open')
-    master, slave = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'illuminator_ros.conformance', f'udpout://{url}', '--yes',
-         '--only', 'thermal-flags', '--heat', '3600'],
-        stdin=slave, stdout=slave, stderr=slave, cwd=ROOT, env=environment(),
-        start_new_session=True)
-    os.close(slave)
-    try:
-        simulator.wait_for('ON     100 %')
-        os.close(master)
-        process.send_signal(signal.SIGHUP)
-        process.wait(PATIENCE)
-        eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
-    finally:
-        process.kill()
-        process.wait()
-
-
-def test_a_window_that_is_closed_may_send_several_signals(url, programs):
-    simulator = programs('simulator', f'udpin://{url}')
-    simulator.wait_for('link open')
-    conformance = programs('conformance', f'udpout://{url}', '--yes', '--only', 'thermal-flags',
-                           '--heat', '3600')
-    simulator.wait_for('ON     100 %')
-    conformance.send(signal.SIGHUP)
-    conformance.wait_for('bringing the light back')
-    conformance.send(signal.SIGHUP)
-    assert conformance.wait() == 1
-    assert conformance.log.rstrip().endswith('the light is as it was')
 
 
 def test_under_nohup_it_outlives_its_terminal(url):
@@ -278,28 +243,3 @@ def test_a_simulator_whose_input_has_ended_goes_on(url, programs):
     simulator.wait_for('link open')
     assert simulator.running
     assert simulator.end() == 0
-
-
-def test_what_is_typed_into_the_simulator_and_is_no_text_does_not_end_its_console(url):
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'illuminator_ros.simulator', f'udpin://{url}'], cwd=ROOT,
-        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-        env=environment({'PYTHONIOENCODING': 'utf-8:strict'}))
-
-    def ended():
-        # Again and again: one that is read together with what is no text is passed over with it.
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(b'quit\n')
-            process.stdin.flush()
-        return process.poll() is not None
-
-    try:
-        process.stdin.write(b'\xff\n')
-        process.stdin.flush()
-        eventually(ended, 'it does not take commands any more')
-        assert process.returncode == 0
-    finally:
-        process.kill()
-        process.wait()
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.close()
