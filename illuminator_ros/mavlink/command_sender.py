@@ -221,11 +221,6 @@ class CommandSender:
                 if target is None or entry.command.target == target:
                     self._end(entry, ending, now)
 
-    def forget(self, target: Source) -> None:
-        """Drop what is known of a target that is no longer served."""
-        self._round_trips.pop(target, None)
-        self.unanswering.discard(target)
-
     def _begin(self, entry: _Entry, now: float) -> None:
         self._active[entry.command.key] = entry
         entry.first_sent = now

@@ -99,9 +99,9 @@ class BridgeProcess:
 
     def _poll(self) -> None:
         while not self._ended.wait(self._tick):
-            self._names.look(self.controller.lights, self.link.clock())
             for node in list(self.nodes):
                 try:
+                    self._names.look(self.controller.lights, self.link.clock())
                     node.poll(self._tick / 2)
                 except Exception as error:
                     node.get_logger().error(

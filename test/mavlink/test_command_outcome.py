@@ -71,13 +71,6 @@ def test_who_leaves_a_command_unanswered_is_known_until_it_answers_one() -> None
     assert not rig.sender.unanswering
 
 
-def test_nothing_is_known_of_who_is_forgotten() -> None:
-    rig = Rig(retries=0)
-    rig.ended()
-    rig.sender.forget(LIGHT)
-    assert not rig.sender.unanswering
-
-
 def test_counters_tell_first_tries_resends_and_silence() -> None:
     rig = Rig(retries=2)
     rig.ended()

@@ -229,12 +229,3 @@ def test_callback_may_end_all_the_others() -> None:
     rig.run(LONG)
     assert sorted(ends, key=str) == [Ending.CANCELLED] * 5 + [Ending.NO_ANSWER]
     assert rig.idle
-
-
-def test_forgetting_a_target_forgets_its_round_trips() -> None:
-    rig = Rig()
-    rig.start()
-    rig.ack(ACCEPTED)
-    assert rig.sender.round_trip(LIGHT).quantile(0.5) is not None
-    rig.sender.forget(LIGHT)
-    assert rig.sender.round_trip(LIGHT).quantile(0.5) is None
