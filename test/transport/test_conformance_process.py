@@ -120,6 +120,51 @@ def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
 
 
+def test_a_terminal_that_goes_leaves_the_light_as_it_was(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    master, slave = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'illuminator_ros.conformance', f'udpout://{url}', '--yes', '--only',
+         'brightness', '--only', 'thermal-flags', '--heat', '3600'],
+        stdin=slave, stdout=slave, stderr=slave, cwd=ROOT, env=environment())
+    os.close(slave)
+    try:
+        simulator.wait_for('ON     100 %')
+        os.close(master)
+        # Nobody has it for a controlling terminal, so that the kernel tells nobody either.
+        process.send_signal(signal.SIGHUP)
+        assert process.wait(PATIENCE) == 1
+        eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_terminal_that_goes_may_be_told_of_twice(url, programs):
+    simulator = programs('simulator', f'udpin://{url}')
+    simulator.wait_for('link open')
+    conformance = programs('conformance', f'udpout://{url}', '--yes', '--only', 'brightness',
+                           '--only', 'thermal-flags', '--heat', '3600')
+    simulator.wait_for('ON     100 %')
+    conformance.send(signal.SIGHUP)
+    conformance.wait_for('bringing the light back')
+    conformance.send(signal.SIGHUP)
+    conformance.wait()
+    assert conformance.log.rstrip().endswith('the light is as it was')
+
+
+@pytest.mark.parametrize('arguments', ['--list', 'udpin://{url} --wait 0.1'],
+                         ids=['list', 'run'])
+def test_a_full_disk_is_said_in_one_line_with_exit_status_1(url, arguments):
+    ended = subprocess.run(
+        f'{sys.executable} -m illuminator_ros.conformance {arguments.format(url=url)} > /dev/full',
+        shell=True, cwd=ROOT, env=environment(), text=True, stderr=subprocess.PIPE,
+        timeout=PATIENCE)
+    assert ended.stderr == 'conformance: standard output: No space left on device\n'
+    assert ended.returncode == 1
+
+
 def test_under_nohup_it_outlives_its_terminal(url):
     program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
                       'illuminator_ros.conformance', f'udpout://{url}', '--yes')
