@@ -122,7 +122,7 @@ class _Signals:
     """
     SIGINT, SIGTERM and, but for nohup, SIGHUP end a run in order.
 
-    After that SIGINT and SIGTERM end it at once.
+    A second one ends it at once, but for SIGHUP: of a terminal that goes, kernel and shell tell.
     """
 
     def __init__(self, interrupt: Callable[[], None]) -> None:
@@ -134,26 +134,33 @@ class _Signals:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self._count and number == signal.SIGHUP:
-            # A window that is closed sends several, by the shell and by the terminal.
             return
         self._count += 1
         if self._count > 1:
-            _warn(b'conformance: ended; the light is not as it was\n')
+            _complain('ended; the light is not as it was')
             os._exit(1)
-        _warn(b'conformance: bringing the light back to where it was; once more to end without\n')
+        _complain('bringing the light back to where it was; once more to end without')
         self._interrupt()
 
 
-def _warn(text: bytes) -> None:
-    # Where nobody can be told any more, the light is to be brought back all the same.
+def _complain(text: str) -> None:
+    # Not through sys.stderr, which a signal may interrupt; and the terminal may be gone.
     with contextlib.suppress(OSError):
-        os.write(2, text)
+        os.write(2, f'conformance: {text}\n'.encode())
 
 
-def _print(*texts: str) -> None:
-    # Whoever reads it through a pipe wants to have it now; who does not, does not.
-    with contextlib.suppress(OSError):
+def _print(*texts: str) -> bool:
+    """Print; say so once if that fails, and go on: the light is to be brought back."""
+    try:
+        # Whoever reads it through a pipe wants to have it now; who does not, does not.
         print(*texts, sep='\n', flush=True)
+    except BrokenPipeError:
+        pass
+    except OSError as error:
+        _complain(f'standard output: {error.strerror}')
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return False
+    return True
 
 
 def _put(texts: _Texts, lines: list[str]) -> None:
@@ -193,8 +200,7 @@ def run(args: list[str] | None = None) -> int:
     options = parsing.parse_args(args)
     logging.basicConfig(format='%(message)s')
     if options.list:
-        _print(*catalogue())
-        return 0
+        return 0 if _print(*catalogue()) else 1
     if options.url is None:
         parsing.error('the connection URL is missing')
     for path in filter(None, (options.junit, options.json)):
@@ -233,7 +239,7 @@ def _conduct(
     _Signals(lambda: link.call(bench.interrupt))
     begun = link.clock()
     link.start()
-    _print(f'checking the light on {options.url} ...')
+    written = [_print(f'checking the light on {options.url} ...')]
     while True:
         link.call(look)
         try:
@@ -242,12 +248,12 @@ def _conduct(
             continue
         if text is None:
             break
-        _print(text)
+        written.append(_print(text))
     link.stop()
     report = Report(options.url, _light(bench, suite), tuple(suite.results), suite.restored,
                     link.clock() - begun, suite.passed)
-    _print('', report.light, report.summary)
-    written = [_write(options.junit, as_junit(report)), _write(options.json, as_json(report))]
+    written += [_print('', report.light, report.summary),
+                _write(options.junit, as_junit(report)), _write(options.json, as_json(report))]
     return 0 if suite.passed and all(written) else 1
 
 

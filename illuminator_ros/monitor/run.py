@@ -179,13 +179,18 @@ def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int
         print('monitor: no lights found', file=sys.stderr)
         return 1
     console = Console(width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True)
-    with console.capture() as captured:
-        console.print(plain(Scene(lights, None, monitor.clock())))
+    status = 0
     try:
+        with console.capture() as captured:
+            console.print(plain(Scene(lights, None, monitor.clock())))
         for line in captured.get().splitlines():
             print(line.rstrip())
         sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever reads has seen enough; and the interpreter would say so again at its end.
+    except OSError as error:
+        # Of a pipe, whoever reads has seen enough.
+        if not isinstance(error, BrokenPipeError):
+            print(f'monitor: standard output: {error.strerror}', file=sys.stderr)
+            status = 1
+        # The interpreter would say so again at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
+    return status

@@ -143,6 +143,19 @@ class TestWithoutATerminal:
         assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
         assert (outcome.returncode, outcome.stderr) == (0, '')
 
+    def test_a_full_disk_is_said_in_one_line_with_exit_status_1(self, own_ros: Ros) -> None:
+        port = free_port()
+        with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port),
+              open('/dev/full', 'w') as full):
+            bridge.wait_for('connected')
+            outcome = subprocess.run(
+                [sys.executable, '-m', MONITOR, '--once', '--wait', '20'], cwd=ROOT, text=True,
+                env=environment(domain(own_ros)), stdout=full, stderr=subprocess.PIPE,
+                timeout=60)
+
+        assert outcome.stderr == 'monitor: standard output: No space left on device\n'
+        assert outcome.returncode == 1
+
     def test_without_lights_it_fails_and_says_so(self, own_ros: Ros) -> None:
         outcome = run(MONITOR, '--once', '--wait', '0.1', env=domain(own_ros))
 

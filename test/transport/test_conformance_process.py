@@ -120,6 +120,17 @@ def test_a_signal_ends_it_with_the_light_as_it_was(url, programs, number):
     eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not brought back')
 
 
+@pytest.mark.parametrize('arguments', ['--list', 'udpin://{url} --wait 0.1'],
+                         ids=['list', 'run'])
+def test_a_full_disk_is_said_in_one_line_with_exit_status_1(url, arguments):
+    ended = subprocess.run(
+        f'{sys.executable} -m illuminator_ros.conformance {arguments.format(url=url)} > /dev/full',
+        shell=True, cwd=ROOT, env=environment(), text=True, stderr=subprocess.PIPE,
+        timeout=PATIENCE)
+    assert ended.stderr == 'conformance: standard output: No space left on device\n'
+    assert ended.returncode == 1
+
+
 def test_under_nohup_it_outlives_its_terminal(url):
     program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
                       'illuminator_ros.conformance', f'udpout://{url}', '--yes')
