@@ -23,6 +23,7 @@ goes out in one command.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Awaitable, Callable
 import contextlib
 import inspect
@@ -172,7 +173,7 @@ class ParameterServices:
         if not self._node.has_parameter(name):
             return f'{name} is no parameter of this node'
         try:
-            value = Parameter.from_parameter_msg(message).value
+            value = _value(message)
         except ValueError:
             return f'{name}: {message.value.type} is no parameter type'
         if name not in DEVICE_SPECS:
@@ -187,4 +188,6 @@ class ParameterServices:
 
 
 def _value(message: Any) -> Any:
-    return Parameter.from_parameter_msg(message).value
+    value = Parameter.from_parameter_msg(message).value
+    # As people write it, for the answer that refuses it.
+    return list(value) if isinstance(value, array) else value

@@ -109,7 +109,7 @@ class TestRefusedHere:
         ('brightness', math.inf, 'brightness inf is not a finite number'),
         ('brightness', 'bright', "brightness 'bright' is not a number"),
         ('brightness', True, 'brightness True is not a number'),
-        ('brightness', [1.0], 'is not a number'),
+        ('brightness', [1.0], 'brightness [1.0] is not a number'),
         ('strobe_duty_cycle', 100.5, 'strobe_duty_cycle 100.5 % is out of range'),
         ('strobe_period', 0.01, 'strobe_period 0.01 s is outside what the light reports: 0 (no '
                                 'strobe) or 0.05 to 10 s'),
