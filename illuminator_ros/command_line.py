@@ -23,7 +23,7 @@ from typing import NoReturn
 
 from .mavlink.dialect import Source
 from .mavlink.signing import Signing, SigningMode
-from .mavlink.signing_files import load_key, TimestampStore
+from .mavlink.signing_files import keyed, TimestampStore
 
 
 class Parser(argparse.ArgumentParser):
@@ -83,12 +83,11 @@ def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampS
 
     :param name: whose time stamps are kept.
     :raises ValueError: if a key is given and not used, which would look like protection.
+    :raises KeyFileError: if the key cannot be used.
     """
     mode = SigningMode(options.signing_mode)
     if mode is SigningMode.OFF:
         if options.signing_key_file:
             raise ValueError('--signing-key-file is given, but --signing-mode is off')
         return Signing(), None
-    store = TimestampStore(options.signing_key_file, name)
-    key = load_key(options.signing_key_file)
-    return Signing(mode, key, timestamp=store.begin(time.time())), store
+    return keyed(mode, options.signing_key_file, name, time.time())

@@ -24,7 +24,7 @@ from pathlib import Path
 import re
 import stat
 
-from .signing import KEY_SIZE, MAX_TICKS, Signing, ticks, TICKS_PER_SECOND
+from .signing import KEY_SIZE, MAX_TICKS, Signing, SigningMode, ticks, TICKS_PER_SECOND
 
 MIN_PASSPHRASE = 8
 MAX_KEY_FILE = 4096
@@ -138,6 +138,22 @@ class TimestampStore:
         finally:
             with contextlib.suppress(OSError):
                 scratch.unlink()
+
+
+def keyed(
+    mode: SigningMode, key_file: str, name: str, unix_time: float,
+) -> tuple[Signing, TimestampStore]:
+    """
+    Return what signs with the key of a file, and where its time stamps are kept.
+
+    :param mode: any but ``off``.
+    :param name: whose time stamps those are.
+    :param unix_time: now, s.
+    :raises KeyFileError: if the key cannot be used.
+    """
+    key = load_key(key_file)
+    store = TimestampStore(key_file, name)
+    return Signing(mode, key, timestamp=store.begin(unix_time)), store
 
 
 class TimestampKeeper:

@@ -42,7 +42,7 @@ from ..mavlink.dialect import Source
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
 from ..mavlink.signing import Signing, SigningMode
-from ..mavlink.signing_files import KeyFileError, load_key, TimestampStore
+from ..mavlink.signing_files import keyed, KeyFileError, TimestampStore
 
 # s; SIGINT and SIGTERM end the process within 1 s, these and the leaving of ROS included.
 OFF_LIMIT = 0.6
@@ -264,11 +264,10 @@ def _signing(parameters: LinkParameters) -> tuple[Signing, TimestampStore | None
     if parameters.signing_mode is SigningMode.OFF:
         return Signing(), None
     try:
-        key = load_key(parameters.signing_key_file)
+        return keyed(parameters.signing_mode, parameters.signing_key_file,
+                     f'bridge {parameters.identity}', time.time())
     except KeyFileError as error:
         raise ParameterError(f'signing_key_file: {error}') from None
-    store = TimestampStore(parameters.signing_key_file, f'bridge {parameters.identity}')
-    return Signing(parameters.signing_mode, key, timestamp=store.begin(time.time())), store
 
 
 class _LogForwarder(logging.Handler):
