@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+import os
 import re
 import signal
 import sys
@@ -60,6 +61,12 @@ def explained(name: str, run: Callable[[], int]) -> int:
             raise
         print(f'{name}: {package} is not installed: {_REMEDIES[package]}', file=sys.stderr)
         return 1
+
+
+def discard_output() -> None:
+    """Have what is still to be written to standard output, at the end too, lead nowhere."""
+    with open(os.devnull, 'wb') as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def one_line(message: object) -> str:

@@ -35,6 +35,7 @@ from .requirement import REQUIREMENTS
 from .suite import FIND_TIMEOUT, Suite
 from .. import __version__
 from ..command_line import add_signing, address, integer, number, Parser, signing
+from ..entry import discard_output
 from ..illuminator.identity import Identity
 from ..mavlink.dialect import Source
 from ..mavlink.link import Link
@@ -158,7 +159,7 @@ def _print(*texts: str) -> bool:
         pass
     except OSError as error:
         _complain(f'standard output: {error.strerror}')
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard_output()
         return False
     return True
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import copy
-import os
 import sys
 import threading
 import time
@@ -47,7 +46,7 @@ from .terminal import (
     while_it_lasts,
 )
 from .view import plain, Scene, screen
-from ..entry import one_line
+from ..entry import discard_output, one_line
 from ..ros.spinner import Spinner
 from ..termination import Termination
 
@@ -192,5 +191,5 @@ def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int
             print(f'monitor: standard output: {error.strerror}', file=sys.stderr)
             status = 1
         # The interpreter would say so again at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard_output()
     return status

@@ -28,6 +28,8 @@ import tempfile
 import termios
 import threading
 
+from ..entry import discard_output
+
 # s after an escape in which what belongs to it must have come.
 ESCAPE_TIMEOUT = 0.05
 
@@ -41,7 +43,7 @@ def while_it_lasts() -> Iterator[None]:
         if error.args[0] != errno.EIO:
             raise
         # The interpreter would try at its end to write what is left.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard_output()
 
 
 @contextlib.contextmanager
