@@ -55,10 +55,10 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'bridge = illuminator_ros.bridge:main',
-            'conformance = illuminator_ros.conformance:main',
-            'monitor = illuminator_ros.monitor:main',
-            'simulator = illuminator_ros.simulator:main',
+            'bridge = illuminator_ros.cli.bridge:main',
+            'conformance = illuminator_ros.cli.conformance:main',
+            'monitor = illuminator_ros.cli.monitor:main',
+            'simulator = illuminator_ros.cli.simulator:main',
         ],
     },
 )

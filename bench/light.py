@@ -21,7 +21,9 @@ import socket
 import time
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandLong,
     encode_payload,
@@ -30,11 +32,9 @@ from illuminator_ros.mavlink.dialect import (
     LAYOUTS,
     MavResult,
     MavType,
-    Source,
 )
-from illuminator_ros.mavlink.framing import Decoder, encode_frame
 
-SOURCE = Source(1, 243)
+SOURCE = Address(1, 243)
 
 
 class Sender:

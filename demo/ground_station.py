@@ -22,12 +22,12 @@ from typing import Any
 
 from illuminator_ros.mavlink.command import Command, Outcome
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, Source
-from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
+from illuminator_ros.mavlink.component import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import Address, CommandAck, MavCmd
 from illuminator_ros.mavlink.url import parse_url
 
-IDENTITY = Source(255, 190)
+IDENTITY = Address(255, 190)
 MAV_TYPE_GCS = 6
 
 
@@ -42,7 +42,7 @@ class GroundStation(Endpoint):
         self._link = Link(parse_url(url), self, label=url)
         self._link.start()
 
-    def configure(self, target: Source, mode: int, brightness: float, period: float,
+    def configure(self, target: Address, mode: int, brightness: float, period: float,
                   duty: float, timeout: float = 5.0) -> Outcome:
         """Send MAV_CMD_DO_ILLUMINATOR_CONFIGURE and return its outcome."""
         command = Command(
@@ -66,7 +66,7 @@ class GroundStation(Endpoint):
         """See :meth:`Endpoint.link_opened`."""
         self._heartbeat.send(now, self.outgoing)
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         if isinstance(message, CommandAck):
             self._sender.acknowledge(source, message, now)

@@ -36,10 +36,10 @@ os.environ['ROS_DOMAIN_ID'] = str(random.randrange(1, 101))
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from ground_station import GroundStation  # noqa: E402
-from illuminator_ros.mavlink.dialect import Source  # noqa: E402
+from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from ros_client import RosClient, TimedOut  # noqa: E402
 
-LIGHT = Source(1, 243)
+LIGHT = Address(1, 243)
 # s for simulator and bridge to end after SIGINT.
 END_TIMEOUT = 5.0
 

@@ -22,9 +22,9 @@ from pathlib import Path
 import re
 import xml.etree.ElementTree as ET
 
+from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
-from illuminator_ros.simulator.options import parser
 import pytest
 import yaml
 

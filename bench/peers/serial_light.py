@@ -37,8 +37,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 from bench.traffic import frames  # noqa: E402
 from illuminator_ros.illuminator.device_properties import DeviceProperties  # noqa: E402
 from illuminator_ros.illuminator.devices import Devices  # noqa: E402
-from illuminator_ros.mavlink.dialect import decode_payload, HANDLED  # noqa: E402
-from illuminator_ros.mavlink.framing import Decoder  # noqa: E402
+from illuminator_ros.mavlink.frame import Decoder  # noqa: E402
+from illuminator_ros.mavlink.messages import decode_payload, HANDLED  # noqa: E402
 from support.frames import frame_of  # noqa: E402
 
 BITS = 10

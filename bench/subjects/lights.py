@@ -32,16 +32,16 @@ from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.observer import LightObserver
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.frame import encode_frame
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import (
+    Address,
     encode_payload,
     heartbeat,
     IlluminatorStatus,
     LAYOUTS,
     MavType,
-    Source,
 )
-from illuminator_ros.mavlink.framing import encode_frame
-from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
 
 from ..rig import Bench, free_port, interleaved, PATIENCE, simulator
@@ -62,9 +62,9 @@ class Watcher(LightObserver):
     """Counts what lights report."""
 
     def __init__(self) -> None:
-        self.found: dict[Source, float] = {}
+        self.found: dict[Address, float] = {}
         self.lost_count = 0
-        self.statuses: Counter[Source] = Counter()
+        self.statuses: Counter[Address] = Counter()
 
     def connected(self, light: Light) -> None:
         self.found.setdefault(light.source, time.monotonic())
@@ -85,7 +85,7 @@ def listening(port: int, **options: Any) -> Iterator[tuple[Link, Watcher]]:
         light.observer = watcher
 
     link = Link(parse_url(f'udpin://127.0.0.1:{port}'),
-                Controller(Source(1, 194), Settings(), on_light=found, **options), label='')
+                Controller(Address(1, 194), Settings(), on_light=found, **options), label='')
     link.start()
     until = time.monotonic() + PATIENCE
     while not link.state().is_open and time.monotonic() < until:
@@ -98,11 +98,11 @@ def listening(port: int, **options: Any) -> Iterator[tuple[Link, Watcher]]:
 
 def frames(lights: int, seconds: float) -> list[bytes]:
     """Return what lights send in some time: heartbeats and statuses, RATE a second in all."""
-    sources = [Source(2 + number // 250, 1 + number % 250) for number in range(lights)]
-    sequences: Counter[Source] = Counter()
+    sources = [Address(2 + number // 250, 1 + number % 250) for number in range(lights)]
+    sequences: Counter[Address] = Counter()
     result = []
 
-    def add(source: Source, message: Any) -> None:
+    def add(source: Address, message: Any) -> None:
         result.append(encode_frame(
             message.id, encode_payload(message), sequence=sequences[source] & 0xFF, source=source,
             crc_extra=LAYOUTS[message.id].crc_extra))

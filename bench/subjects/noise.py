@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Iterator
 import random
 
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
 from pymavlink.dialects.v20 import ardupilotmega
 
 from ..rig import Bench

@@ -23,8 +23,8 @@ import threading
 import time
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import CommandLong, MavCmd, Source
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
 from illuminator_ros.mavlink.url import parse_url
 from support.fake_light import FakeLight
 
@@ -42,19 +42,19 @@ class Light(FakeLight):
     :ivar switched: set when it is asked to.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Address) -> None:
         super().__init__(source)
         self.pushes = True
         self.switched = threading.Event()
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         super().receive(source, message, now)
         if isinstance(message, CommandLong) and message.command == MavCmd.ILLUMINATOR_ON_OFF:
             self.switched.set()
 
 
 @contextlib.contextmanager
-def served(port: int, source: Source) -> Iterator[Light]:
+def served(port: int, source: Address) -> Iterator[Light]:
     """Serve a light by a thread of this process."""
     light = Light(source)
     link = Link(parse_url(f'udpout://127.0.0.1:{port}'), light, label='')
@@ -74,7 +74,7 @@ def measure(bench: Bench) -> Iterator[Row]:
     took: dict[str, list[float]] = {BESIDE: [], ALONE: []}
     with contextlib.ExitStack() as stack:
         stack.enter_context(bridge(f'udpin://127.0.0.1:{port}', target_component=243))
-        lights = [stack.enter_context(served(port, Source(1, 243 + number)))
+        lights = [stack.enter_context(served(port, Address(1, 243 + number)))
                   for number in range(LIGHTS)]
         client = stack.enter_context(Client(bench.domain))
         nagging = stack.enter_context(Client(bench.domain))

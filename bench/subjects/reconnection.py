@@ -28,7 +28,7 @@ import socket
 import tempfile
 import time
 
-from illuminator_ros.mavlink.dialect import heartbeat, MavType
+from illuminator_ros.mavlink.messages import heartbeat, MavType
 from support.frames import frame_of
 from support.ptys import PtyDevice
 

@@ -21,7 +21,8 @@ from typing import NamedTuple
 
 from .identity import Identity
 from .model import Limits, Mode
-from ..mavlink.dialect import (
+from ..mavlink.messages import (
+    Address,
     MAV_AUTOPILOT_ARDUPILOTMEGA,
     MAV_AUTOPILOT_INVALID,
     MAV_COMP_ID_AUTOPILOT1,
@@ -30,7 +31,6 @@ from ..mavlink.dialect import (
     MAV_STATE_UNINIT,
     MavResult,
     MavType,
-    Source,
 )
 
 
@@ -141,7 +141,7 @@ class Profile:
     """
 
     description: str
-    source: Source = Source(1, MAV_COMP_ID_ILLUMINATOR)
+    source: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
     behaviour: Behaviour = Behaviour()
     limits: Limits = Limits(0.05, 10.0)
     modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
@@ -155,7 +155,7 @@ PROFILES = {
     'reference': Profile(
         'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
         'status at 1 Hz or not at all',
-        Source(255, 0),
+        Address(255, 0),
         Behaviour(
             heartbeat_state=MAV_STATE_UNINIT, has_clock=False, fixed_rate=True, pushes=False,
             terminates=False, filters_target=False, takes_int=False, acks_target=False,
@@ -167,7 +167,7 @@ PROFILES = {
     'ardusub': Profile(
         "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
         'for what it does not measure, brightness 0 is off',
-        Source(1, MAV_COMP_ID_AUTOPILOT1),
+        Address(1, MAV_COMP_ID_AUTOPILOT1),
         Behaviour(
             heartbeat_type=MavType.SUBMARINE, heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA,
             measures=False, identifies=False, joint_switch=True, pushes=False,

@@ -24,7 +24,7 @@ from .error_flags import DIMMING_FLAGS
 from .model import Status
 from .operation import Done, Operation
 from ..mavlink.command import Command
-from ..mavlink.dialect import MavCmd
+from ..mavlink.messages import MavCmd
 
 if TYPE_CHECKING:
     from .light import Light

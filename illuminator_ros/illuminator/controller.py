@@ -24,18 +24,18 @@ from typing import Any
 from .identity import Identity
 from .light import Light, Settings
 from .model import Status
-from ..mavlink.agenda import Agenda
 from ..mavlink.command import Ending
 from ..mavlink.command_sender import CommandSender
-from ..mavlink.dialect import (
+from ..mavlink.component import Endpoint, Heartbeat
+from ..mavlink.deadline_queue import Agenda
+from ..mavlink.messages import (
+    Address,
     CommandAck,
     ComponentInformationBasic,
     IlluminatorStatus,
     MavType,
-    Source,
 )
-from ..mavlink.dialect import Heartbeat as HeartbeatMessage
-from ..mavlink.endpoint import Endpoint, Heartbeat
+from ..mavlink.messages import Heartbeat as HeartbeatMessage
 
 # Lights that are kept apart; one more is passed over, so that memory is bounded.
 MAX_LIGHTS = 128
@@ -65,16 +65,16 @@ class Controller(Endpoint):
     """
 
     def __init__(
-        self, identity: Source, settings: Settings, *, command_timeout: float = 0.5,
+        self, identity: Address, settings: Settings, *, command_timeout: float = 0.5,
         command_retries: int = 3, on_light: Callable[[Light], None] = lambda light: None,
-        wanted: Callable[[Source], bool] = lambda source: True,
+        wanted: Callable[[Address], bool] = lambda source: True,
         link_failure: Callable[[], str] = lambda: '',
     ) -> None:
         super().__init__()
         self.identity = identity
         self.settings = settings
-        self.lights: dict[Source, Light] = {}
-        self.left_alone: dict[Source, None] = {}
+        self.lights: dict[Address, Light] = {}
+        self.left_alone: dict[Address, None] = {}
         self.clash_at = -math.inf
         self.passed_over = False
         self._on_light = on_light
@@ -82,7 +82,7 @@ class Controller(Endpoint):
         self._link_failure = link_failure
         self._heartbeat = Heartbeat(identity, MavType.ONBOARD_CONTROLLER)
         self._link_open = False
-        self._agenda: Agenda[Source] = Agenda()
+        self._agenda: Agenda[Address] = Agenda()
         self.sender = CommandSender(
             lambda message: self.outgoing.append((identity, message)), identity,
             command_timeout, command_retries)
@@ -104,7 +104,7 @@ class Controller(Endpoint):
             light.lose('the link was lost')
         self._schedule_all()
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         if not source.system:
             # 0 is the address of everybody, and what is sent to it switches every light.
@@ -130,7 +130,7 @@ class Controller(Endpoint):
                 light.take_information(Identity.from_message(message), now)
         self._schedule(source)
 
-    def _schedule(self, source: Source) -> None:
+    def _schedule(self, source: Address) -> None:
         """Enter when a light has something to do, after anything that may have changed it."""
         light = self.lights.get(source)
         if light is not None:
@@ -140,7 +140,7 @@ class Controller(Endpoint):
         for source in self.lights:
             self._schedule(source)
 
-    def _light(self, source: Source) -> Light | None:
+    def _light(self, source: Address) -> Light | None:
         """Return the light at an address, a new one if need be; None if it is passed over."""
         light = self.lights.get(source)
         if light is None and self._wanted(source):

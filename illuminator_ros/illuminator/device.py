@@ -31,7 +31,8 @@ from .behaviour import Behaviour
 from .device_properties import DeviceProperties
 from .lamp import Judgement, Lamp
 from .outlet import Outlet, Schedule
-from ..mavlink.dialect import (
+from ..mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
@@ -40,7 +41,6 @@ from ..mavlink.dialect import (
     MavCmd,
     MAVLINK_VERSION,
     MavResult,
-    Source,
     STATUS_ID,
 )
 
@@ -66,7 +66,7 @@ class Device(Lamp):
 
     def __init__(
         self, properties: DeviceProperties, now: float,
-        outgoing: deque[tuple[Source, Any]] | None = None,
+        outgoing: deque[tuple[Address, Any]] | None = None,
     ) -> None:
         super().__init__(properties)
         self.rejections = properties.behaviour.rejections
@@ -121,7 +121,7 @@ class Device(Lamp):
         self._apply(self._press(enabled, changes), now)
 
     @property
-    def source(self) -> Source:
+    def source(self) -> Address:
         """Return the address of the light."""
         return self.properties.source
 
@@ -130,13 +130,13 @@ class Device(Lamp):
         if not self.behaviour.filters_target:
             return True
         system, component = self.source
-        to = Source(message.target_system, message.target_component)
+        to = Address(message.target_system, message.target_component)
         if to == self.source:
             return True
         return self.behaviour.takes_broadcast and (
             to.system == 0 or to.system == system and to.component == 0)
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         """Take a message: commands are answered, the rest is of no interest."""
         if (not isinstance(message, CommandLong | CommandInt) or self.silent(now)
                 or not self.addressed(message)):
@@ -149,7 +149,7 @@ class Device(Lamp):
         else:
             self._consider(source, message, now)
 
-    def _consider(self, source: Source, message: Any, now: float) -> None:
+    def _consider(self, source: Address, message: Any, now: float) -> None:
         """Answer a command at once, or report its progress first."""
         params = [message.param1, message.param2, message.param3, message.param4]
         if message.command not in CHANGES:
@@ -165,15 +165,15 @@ class Device(Lamp):
             self._finish(source, message.command, params, now)
 
     def _acknowledge(
-        self, source: Source, command: int, result: int, now: float, progress: int = 0,
+        self, source: Address, command: int, result: int, now: float, progress: int = 0,
     ) -> None:
-        target = source if self.behaviour.acks_target else Source(0, 0)
+        target = source if self.behaviour.acks_target else Address(0, 0)
         if self.behaviour.misaddresses:
-            target = Source(source.system, source.component ^ 1)
+            target = Address(source.system, source.component ^ 1)
         self._send(CommandAck(command, result, progress, 0, *target), now)
 
     def _progress(
-        self, source: Source, command: int, params: list[float], begun: float, now: float,
+        self, source: Address, command: int, params: list[float], begun: float, now: float,
     ) -> None:
         """Report progress until the time for it is over, then do what was asked for."""
         share = (now - begun) / (self.behaviour.progress or 1e-9)
@@ -188,7 +188,7 @@ class Device(Lamp):
             self._progress, source, command, params, begun))
 
     def _finish(
-        self, source: Source, command: int, params: list[float], now: float,
+        self, source: Address, command: int, params: list[float], now: float,
     ) -> None:
         """Answer a command and do what it asks for."""
         behaviour = self.behaviour

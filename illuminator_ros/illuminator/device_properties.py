@@ -22,7 +22,7 @@ from .behaviour import Behaviour
 from .identity import Identity
 from .model import Limits, Mode
 from .thermal import ThermalProperties
-from ..mavlink.dialect import MAV_COMP_ID_ILLUMINATOR, Source
+from ..mavlink.messages import Address, MAV_COMP_ID_ILLUMINATOR
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class DeviceProperties:
     :param seed: of what happens by chance.
     """
 
-    source: Source = Source(1, MAV_COMP_ID_ILLUMINATOR)
+    source: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
     identity: Identity = field(default_factory=lambda: Identity(
         'illuminator_ros', 'simulator', '1.0.0', '1.0.0', 'SIM-1-243'))
     limits: Limits = Limits(0.05, 10.0)

@@ -21,9 +21,9 @@ from typing import Any
 
 from .device import Device
 from .device_properties import DeviceProperties
-from ..mavlink.agenda import Agenda
-from ..mavlink.dialect import CommandInt, CommandLong, Source
-from ..mavlink.endpoint import Endpoint
+from ..mavlink.component import Endpoint
+from ..mavlink.deadline_queue import Agenda
+from ..mavlink.messages import Address, CommandInt, CommandLong
 
 
 class Devices(Endpoint):
@@ -45,7 +45,7 @@ class Devices(Endpoint):
         for device in self.devices:
             device.announce(now)
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         if isinstance(message, CommandLong | CommandInt):
             for index, device in enumerate(self.devices):

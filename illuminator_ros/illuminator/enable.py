@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from .model import Status
 from .operation import Done, Operation
 from ..mavlink.command import Command
-from ..mavlink.dialect import MavCmd
+from ..mavlink.messages import MavCmd
 
 if TYPE_CHECKING:
     from .light import Light

@@ -25,7 +25,7 @@ import struct
 from typing import Any
 
 from .behaviour import Extension
-from ..mavlink.dialect import IlluminatorStatus
+from ..mavlink.messages import IlluminatorStatus
 
 
 class ExtendedIlluminatorStatus(IlluminatorStatus):  # type: ignore[misc, valid-type]

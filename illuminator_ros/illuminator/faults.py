@@ -28,7 +28,7 @@ from typing import Any
 
 from .behaviour import Behaviour
 from .error_flags import ErrorFlag
-from ..mavlink.dialect import MavResult, MavType
+from ..mavlink.messages import MavResult, MavType
 
 
 class FaultError(ValueError):

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from .identity import Identity
 from ..mavlink.command import Command, Ending, Outcome
-from ..mavlink.dialect import INFORMATION_ID, MavCmd, result_name
+from ..mavlink.messages import INFORMATION_ID, MavCmd, result_name
 
 if TYPE_CHECKING:
     from .light import Light

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..mavlink.dialect import wire_value
+from ..mavlink.messages import wire_value
 
 
 @dataclass(frozen=True, slots=True)

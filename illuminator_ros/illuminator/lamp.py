@@ -26,7 +26,7 @@ from .error_flags import ErrorFlag
 from .extended_status import ExtendedIlluminatorStatus
 from .model import checked, Configuration, InvalidValue, Limits, Mode
 from .thermal import ThermalModel
-from ..mavlink.dialect import ComponentInformationBasic, IlluminatorStatus, MavResult
+from ..mavlink.messages import ComponentInformationBasic, IlluminatorStatus, MavResult
 
 # The result of a command, the change that it makes, and what makes the messages that answer it.
 Judgement = tuple[MavResult, Callable[[], None] | None, list[Callable[[float], Any]]]

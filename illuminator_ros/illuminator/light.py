@@ -34,7 +34,7 @@ from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
 from ..mavlink.command import Command, Ending, format_seconds, Outcome
 from ..mavlink.command_sender import CommandSender
-from ..mavlink.dialect import MavCmd, Source, STATUS_ID
+from ..mavlink.messages import Address, MavCmd, STATUS_ID
 
 # s without a status after which the light is asked for one, and between the askings.
 STATUS_TIMEOUT = 2.5
@@ -72,7 +72,7 @@ class Light:
     """
 
     def __init__(
-        self, source: Source, sender: CommandSender, settings: Settings,
+        self, source: Address, sender: CommandSender, settings: Settings,
         observer: LightObserver | None = None, *, instance: int = 0,
     ) -> None:
         self.source = source

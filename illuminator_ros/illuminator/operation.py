@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 from .error_flags import DIMMING_FLAGS, flag_names
 from .model import Status
 from ..mavlink.command import Command, Ending, format_seconds, Outcome
-from ..mavlink.dialect import MavResult
+from ..mavlink.messages import MavResult
 
 if TYPE_CHECKING:
     from .light import Light

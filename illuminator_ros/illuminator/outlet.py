@@ -26,7 +26,7 @@ import random
 from typing import Any
 
 from .behaviour import Behaviour
-from ..mavlink.dialect import Source
+from ..mavlink.messages import Address
 
 
 class Outlet:
@@ -38,7 +38,7 @@ class Outlet:
     """
 
     def __init__(
-        self, source: Source, outgoing: deque[tuple[Source, Any]], chance: random.Random,
+        self, source: Address, outgoing: deque[tuple[Address, Any]], chance: random.Random,
     ) -> None:
         self._source = source
         self._outgoing = outgoing

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from .dialect import MavResult, result_name, Source
+from .messages import Address, MavResult, result_name
 
 
 class Ending(Enum):
@@ -45,12 +45,12 @@ class Command:
         as "not used".
     """
 
-    target: Source
+    target: Address
     command: int
     params: tuple[float, ...] = ()
 
     @property
-    def key(self) -> tuple[Source, int]:
+    def key(self) -> tuple[Address, int]:
         """Return what an acknowledgement can tell apart."""
         return self.target, self.command
 

@@ -30,7 +30,7 @@ import math
 from typing import Any
 
 from .command import Command, Done, Ending, Outcome
-from .dialect import CommandInt, CommandLong, MavResult, Source
+from .messages import Address, CommandInt, CommandLong, MavResult
 from .round_trip import RoundTrip
 
 # Between two reports of progress. The specification leaves it open; MAVSDK also takes 3 s.
@@ -83,14 +83,14 @@ class CommandSender:
     """
 
     send: Callable[[Any], None]
-    identity: Source
+    identity: Address
     timeout: float = 0.5
     retries: int = 3
     counters: CommandCounters = field(default_factory=CommandCounters)
-    unanswering: set[Source] = field(default_factory=set)
-    _active: dict[tuple[Source, int], _Entry] = field(default_factory=dict)
-    _waiting: dict[tuple[Source, int], deque[_Entry]] = field(default_factory=dict)
-    _round_trips: dict[Source, RoundTrip] = field(default_factory=dict)
+    unanswering: set[Address] = field(default_factory=set)
+    _active: dict[tuple[Address, int], _Entry] = field(default_factory=dict)
+    _waiting: dict[tuple[Address, int], deque[_Entry]] = field(default_factory=dict)
+    _round_trips: dict[Address, RoundTrip] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.timeout) and self.timeout > 0):
@@ -117,7 +117,7 @@ class CommandSender:
         else:
             self._begin(entry, now)
 
-    def pending(self, target: Source, command: int) -> bool:
+    def pending(self, target: Address, command: int) -> bool:
         """Return whether a command of this kind is under way."""
         return (target, command) in self._active
 
@@ -127,11 +127,11 @@ class CommandSender:
         if entry is not None and entry.command is command:
             self._end(entry, Ending.CANCELLED, now)
 
-    def round_trip(self, target: Source) -> RoundTrip:
+    def round_trip(self, target: Address) -> RoundTrip:
         """Return the round-trip times of a target's acknowledgements."""
         return self._round_trips.setdefault(target, RoundTrip())
 
-    def acknowledge(self, source: Source, ack: Any, now: float) -> None:
+    def acknowledge(self, source: Address, ack: Any, now: float) -> None:
         """
         Take a COMMAND_ACK.
 
@@ -214,7 +214,7 @@ class CommandSender:
         times += [entry.limit for waiting in self._waiting.values() for entry in waiting]
         return min(times, default=math.inf)
 
-    def end_all(self, now: float, ending: Ending, target: Source | None = None) -> None:
+    def end_all(self, now: float, ending: Ending, target: Address | None = None) -> None:
         """End what is under way or waiting, to one target or to all."""
         for queue in [*self._waiting.values(), deque(self._active.values())]:
             for entry in list(queue):

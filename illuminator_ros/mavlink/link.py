@@ -24,15 +24,15 @@ import selectors
 import time
 from typing import Any
 
+from .component import Endpoint
+from .connector import Opener
 from .crowd import COLLECTION, Crowd
-from .departure import Departure
-from .dialect import decode_payload, HANDLED
-from .endpoint import Endpoint
-from .framing import Frame
+from .frame import Frame
+from .frame_writer import Departure
 from .link_state import LinkEvent, LinkState
-from .opener import Opener
-from .reception import Reception
-from .routes import Routes
+from .messages import decode_payload, HANDLED
+from .receiver import Reception
+from .router import Routes
 from .signing import Signing
 from .signing_files import TimestampKeeper, TimestampStore
 from .standing import Standing

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .framing import DecoderCounters
+from .frame import DecoderCounters
 from .signing import SigningCounters
 from .statistics import Traffic
 

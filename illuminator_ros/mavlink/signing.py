@@ -27,8 +27,8 @@ from enum import Enum
 import hashlib
 import hmac
 
-from .dialect import Source
-from .framing import Frame, SIGNATURE
+from .frame import Frame, SIGNATURE
+from .messages import Address
 
 # Time stamps count 10 us from 2015-01-01 00:00 UTC, in 48 bits.
 EPOCH = 1_420_070_400
@@ -95,7 +95,7 @@ class Signing:
     link_id: int = 0
     timestamp: int = 0
     counters: SigningCounters = field(default_factory=SigningCounters)
-    _streams: dict[tuple[int, Source], int] = field(default_factory=dict)
+    _streams: dict[tuple[int, Address], int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.mode is SigningMode.OFF:

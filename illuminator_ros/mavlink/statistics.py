@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .dialect import Source
+from .messages import Address
 
 # Sources that are told apart; frames of further ones are counted in the totals only.
 MAX_SOURCES = 256
@@ -130,7 +130,7 @@ class Traffic:
     bytes_sent: int = 0
     frames_sent: int = 0
     frames_dropped: int = 0
-    sources: dict[Source, SequenceCounter] = field(default_factory=dict)
+    sources: dict[Address, SequenceCounter] = field(default_factory=dict)
     _frames_of_others: int = 0
     _in: Lately = field(default_factory=Lately)
     _out: Lately = field(default_factory=Lately)
@@ -149,7 +149,7 @@ class Traffic:
         """Return the bytes that went out per second lately."""
         return self._out.rate(self.bytes_sent, now)
 
-    def count(self, source: Source, sequence: int) -> SequenceCounter | None:
+    def count(self, source: Address, sequence: int) -> SequenceCounter | None:
         """Take a frame that has come with the right checksum; return what counts its source."""
         counter = self.sources.get(source)
         if counter is None:

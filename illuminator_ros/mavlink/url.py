@@ -42,7 +42,7 @@ class UrlError(ValueError):
     """A connection URL that is wrong; the message quotes the URL and the offending part."""
 
 
-class Address(NamedTuple):
+class HostPort(NamedTuple):
     """Host name or IP address ('' = all interfaces, where listening) and port (0 = any)."""
 
     host: str
@@ -62,8 +62,8 @@ class UdpUrl:
     :param broadcast: the remote is a broadcast address: '' no, 'until_peer' or 'always'.
     """
 
-    bind: Address
-    remote: Address | None = None
+    bind: HostPort
+    remote: HostPort | None = None
     broadcast: str = ''
 
 
@@ -71,7 +71,7 @@ class UdpUrl:
 class TcpUrl:
     """A TCP client, or a server where ``listen`` is set."""
 
-    address: Address
+    address: HostPort
     listen: bool = False
 
 
@@ -148,7 +148,7 @@ class _Parser:
 
     def address(
         self, text: str, *, default_host: str | None = '', default_port: int | None = None,
-    ) -> Address:
+    ) -> HostPort:
         """Return host and port of ``[host][:port]``; a part without default must be there."""
         if match := re.fullmatch(r'\[([^\[\]]*)\](?::(.*))?', text):
             host, port = match.groups()
@@ -170,10 +170,10 @@ class _Parser:
         if port is None:
             if default_port is None:
                 self.fail(f'no port in {text!r}')
-            return Address(host, default_port)
-        return Address(host, self.port(port))
+            return HostPort(host, default_port)
+        return HostPort(host, self.port(port))
 
-    def remote(self, text: str, *, default_port: int | None = None) -> Address:
+    def remote(self, text: str, *, default_port: int | None = None) -> HostPort:
         """Return an address to send to: it needs a host, and not the one that means "any"."""
         address = self.address(text, default_host=None, default_port=default_port)
         if _means_any(address.host):
@@ -219,10 +219,10 @@ class _Parser:
         return UdpUrl(self.address(self.no_path(rest)))
 
     def udp_out(self, rest: str) -> Url:
-        return UdpUrl(Address('', 0), self.remote(self.no_path(rest)))
+        return UdpUrl(HostPort('', 0), self.remote(self.no_path(rest)))
 
     def udp_bcast(self, rest: str) -> Url:
-        return UdpUrl(Address('', 0), self.address(self.no_path(rest), default_host=None),
+        return UdpUrl(HostPort('', 0), self.address(self.no_path(rest), default_host=None),
                       'always')
 
     def tcp(self, rest: str) -> Url:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Mapping
 import math
 
-from ..mavlink.dialect import Source
+from ..mavlink.messages import Address
 
 # s from the first light on, after which the others are there that are switched on with it.
 PATIENCE = 10.0
@@ -36,7 +36,7 @@ class LightNames:
     """
 
     def __init__(
-        self, given: Mapping[Source, str], first: str, *, served: Callable[[Source], bool],
+        self, given: Mapping[Address, str], first: str, *, served: Callable[[Address], bool],
         warn: Callable[[str], object],
     ) -> None:
         self._given = given
@@ -45,11 +45,11 @@ class LightNames:
         self._warn = warn
         self._due = math.inf
 
-    def of(self, source: Source) -> str:
+    def of(self, source: Address) -> str:
         """Return the name of a further light's node."""
         return self._given.get(source) or f'{self._first}_{source.system}_{source.component}'
 
-    def begin(self, source: Source, now: float) -> None:
+    def begin(self, source: Address, now: float) -> None:
         """Take note of the light that the first node serves."""
         self._due = now + PATIENCE
         if name := self._given.get(source):
@@ -58,7 +58,7 @@ class LightNames:
                 f'node, {self._first}: -r __node:={name} names that, target_system and '
                 'target_component choose its light')
 
-    def look(self, heard: Container[Source], now: float) -> None:
+    def look(self, heard: Container[Address], now: float) -> None:
         """Say once which names are of lights that are not there; callable from any thread."""
         if now < self._due:
             return

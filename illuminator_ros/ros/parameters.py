@@ -30,7 +30,7 @@ from rclpy.parameter import Parameter
 
 from .parameter_spec import ParameterError, ParameterSpec
 from ..illuminator.model import checked, InvalidValue, MAX_STROBE_PERIOD, MODES
-from ..mavlink.dialect import Source
+from ..mavlink.messages import Address
 from ..mavlink.signing import SigningMode
 from ..mavlink.url import parse_url, Url, UrlError
 
@@ -83,10 +83,10 @@ class LinkParameters:
     """The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges."""
 
     url: Url
-    identity: Source
-    target: Source
+    identity: Address
+    target: Address
     only_target: bool
-    names: Mapping[Source, str]
+    names: Mapping[Address, str]
     heartbeat_timeout: float
     command_timeout: float
     command_retries: int
@@ -114,8 +114,8 @@ def declare_link_parameters(node: Node) -> LinkParameters:
     except UrlError as error:
         raise ParameterError(f'connection_url: {error}') from None
     return LinkParameters(
-        url=url, identity=Source(values['system_id'], values['component_id']),
-        target=Source(values['target_system'], values['target_component']),
+        url=url, identity=Address(values['system_id'], values['component_id']),
+        target=Address(values['target_system'], values['target_component']),
         names=_parse_names(values['names'], node.get_name()),
         signing_mode=SigningMode(values['signing_mode']),
         **{name: values[name] for name in (
@@ -137,8 +137,8 @@ def declare_read_only(node: Node, spec: ParameterSpec, otherwise: Any) -> Any:
     return value
 
 
-def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
-    names: dict[Source, str] = {}
+def _parse_names(entries: list[str], first: str) -> dict[Address, str]:
+    names: dict[Address, str] = {}
     for entry in filter(None, entries):
         match = re.fullmatch(r'([0-9]{1,3})/([0-9]{1,3})=(.*)', str(entry))
         if not match or int(match[1]) > 255 or int(match[2]) > 255:
@@ -147,7 +147,7 @@ def _parse_names(entries: list[str], first: str) -> dict[Source, str]:
         name = match[3]
         if not re.fullmatch(r'[A-Za-z_][A-Za-z0-9_]*', name):
             raise ParameterError(f'names: {name!r} in {entry!r} is no node name')
-        source = Source(int(match[1]), int(match[2]))
+        source = Address(int(match[1]), int(match[2]))
         if source in names or name in names.values():
             raise ParameterError(f'names: {entry!r} repeats an address or a name')
         if name == first:

@@ -38,9 +38,9 @@ from ..illuminator.controller import Controller
 from ..illuminator.light import Light, Settings
 from ..illuminator.operation import Result
 from ..mavlink.command import format_seconds
-from ..mavlink.dialect import Source
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
+from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, KeyFileError, TimestampStore
 
@@ -124,12 +124,12 @@ class BridgeProcess:
         for spinner in list(self._spinners):
             spinner.end()
 
-    def _selected(self, source: Source) -> bool:
+    def _selected(self, source: Address) -> bool:
         target = self.parameters.target
         return (target.system in (0, source.system)
                 and target.component in (0, source.component))
 
-    def _served(self, source: Source) -> bool:
+    def _served(self, source: Address) -> bool:
         return not self.parameters.only_target or self._selected(source)
 
     def _found(self, light: Light) -> None:

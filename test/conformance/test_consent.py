@@ -16,14 +16,14 @@
 
 from dataclasses import replace
 
-from illuminator_ros.conformance.requirement import Verdict
-from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.cli.simulator.settings import properties
 from illuminator_ros.illuminator.behaviour import PROFILES
+from illuminator_ros.illuminator.checks.requirement import Verdict
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
-from illuminator_ros.mavlink.dialect import MavResult
-from illuminator_ros.simulator.settings import properties
+from illuminator_ros.mavlink.messages import MavResult
 import pytest
 from support.conformance_run import Run
 

@@ -17,12 +17,12 @@
 from pathlib import Path
 import re
 
-from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
+from illuminator_ros.cli.simulator.lights import scene
+from illuminator_ros.cli.simulator.settings import SETTINGS
 from illuminator_ros.illuminator.behaviour import PROFILES
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
-from illuminator_ros.simulator.console import COMMANDS, OTHERS
-from illuminator_ros.simulator.lights import scene
-from illuminator_ros.simulator.settings import SETTINGS
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,14 +17,14 @@
 from dataclasses import replace
 import math
 
-from illuminator_ros.conformance.requirement import Verdict
-from illuminator_ros.conformance.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.behaviour import Behaviour
+from illuminator_ros.illuminator.checks.requirement import Verdict
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.model import Limits, Mode
-from illuminator_ros.mavlink.dialect import MavCmd, Source
+from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.conformance_run import Run
 
@@ -75,7 +75,7 @@ BY_CHANCE = {
 }
 # What no fault but the properties of a light bring about.
 BUILT_IN = {
-    'address': DeviceProperties(source=Source(255, 0)),
+    'address': DeviceProperties(source=Address(255, 0)),
     'status-stream': DeviceProperties(status_interval=0.0),
     'status-mode': DeviceProperties(mode_bitmask=0),
     'strobe-limits': DeviceProperties(limits=Limits(5.0, 1.0)),

@@ -17,7 +17,7 @@
 import json
 from xml.etree import ElementTree
 
-from illuminator_ros.conformance.report import (
+from illuminator_ros.illuminator.checks.report import (
     as_json,
     as_junit,
     catalogue,
@@ -25,10 +25,10 @@ from illuminator_ros.conformance.report import (
     Report,
     Table,
 )
-from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.conformance_run import Run
 
@@ -101,7 +101,7 @@ def shown(run):
 
 
 def test_without_a_light_the_table_has_one_line_for_all_that_was_not_checked():
-    run = Run(target=Source(9, 9)).finish()
+    run = Run(target=Address(9, 9)).finish()
     assert shown(run)[:2] == lines(run.result('heartbeat'))[:2]
     assert shown(run)[-1] == 'SKIPPED 47 requirements: 9/9 was not heard'
     assert len(shown(run)) == 4
@@ -133,7 +133,7 @@ def test_what_was_skipped_for_a_reason_of_its_own_keeps_its_lines():
 
 
 def test_one_requirement_that_was_not_checked_is_named():
-    run = Run(target=Source(9, 9), only=('on',)).finish()
+    run = Run(target=Address(9, 9), only=('on',)).finish()
     assert shown(run) == lines(run.result('on'))
 
 

@@ -17,8 +17,8 @@
 from dataclasses import replace
 import math
 
-from illuminator_ros.conformance.requirement import Verdict
-from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirement import Verdict
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
@@ -114,7 +114,7 @@ def test_a_check_with_an_error_in_it_fails_and_the_light_is_brought_back(monkeyp
         await bench.switch(False)
         raise ZeroDivisionError('oops')
 
-    monkeypatch.setattr('illuminator_ros.conformance.suite.REQUIREMENTS', [
+    monkeypatch.setattr('illuminator_ros.illuminator.checks.suite.REQUIREMENTS', [
         replace(one, check=broken) if one.name == 'on' else one for one in REQUIREMENTS])
     run = prepared().finish()
     assert run.failed == {'on'}

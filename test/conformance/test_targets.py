@@ -17,11 +17,11 @@
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.conformance_run import Run
 
-FIRST, SECOND = Source(1, 243), Source(1, 244)
+FIRST, SECOND = Address(1, 243), Address(1, 244)
 BAD = with_fault(with_fault(Behaviour(), 'nan'), 'lie')
 
 
@@ -65,7 +65,7 @@ def test_without_a_light_there_is_one_finding_and_nothing_is_said_to_be_met():
 
 
 @pytest.mark.parametrize(('target', 'said'), [
-    (Source(9, 9), '9/9 was not heard within 10 s; 1/243 and 1/244 were'),
+    (Address(9, 9), '9/9 was not heard within 10 s; 1/243 and 1/244 were'),
     (None, 'no light was heard within 10 s: neither HEARTBEAT with MAV_TYPE_ILLUMINATOR nor '
            'ILLUMINATOR_STATUS; 1/243 and 1/244 were')])
 def test_who_was_heard_instead_of_the_light_is_said(target, said):
@@ -76,7 +76,8 @@ def test_who_was_heard_instead_of_the_light_is_said(target, said):
 
 
 def test_of_a_crowd_that_was_heard_instead_of_the_light_some_are_named():
-    run = Run(*[DeviceProperties(source=Source(1, n)) for n in range(1, 12)], target=Source(9, 9))
+    lights = [DeviceProperties(source=Address(1, n)) for n in range(1, 12)]
+    run = Run(*lights, target=Address(9, 9))
     assert run.finish().suite.missing.endswith('1/7, 1/8 and 3 more were')
 
 

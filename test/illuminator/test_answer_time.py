@@ -16,7 +16,7 @@
 
 import random
 
-from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, MavResult, STATUS_ID
+from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult, STATUS_ID
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight

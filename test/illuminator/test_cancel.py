@@ -14,7 +14,7 @@
 
 """Ending all requests, so that one last one is sent at once."""
 
-from illuminator_ros.mavlink.dialect import MavCmd, MavResult
+from illuminator_ros.mavlink.messages import MavCmd, MavResult
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 

@@ -18,7 +18,7 @@ from dataclasses import astuple
 
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.observer import Cause
-from illuminator_ros.mavlink.dialect import MavCmd, MavResult
+from illuminator_ros.mavlink.messages import MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

@@ -17,7 +17,8 @@
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
@@ -29,12 +30,11 @@ from illuminator_ros.mavlink.dialect import (
     MavCmd,
     MavResult,
     MavType,
-    Source,
     STATUS_ID,
 )
 import pytest
 
-GROUND = Source(255, 190)
+GROUND = Address(255, 190)
 NAN, INF = float('nan'), float('inf')
 
 

@@ -17,7 +17,8 @@
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandInt,
     CommandLong,
     decode_payload,
@@ -26,12 +27,11 @@ from illuminator_ros.mavlink.dialect import (
     INFORMATION_ID,
     MavCmd,
     MavResult,
-    Source,
     STATUS_ID,
 )
 import pytest
 
-GROUND = Source(255, 190)
+GROUND = Address(255, 190)
 NAN, INF = float('nan'), float('inf')
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED

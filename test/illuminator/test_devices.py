@@ -16,19 +16,19 @@
 
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
-from illuminator_ros.mavlink.dialect import CommandLong, Source
+from illuminator_ros.mavlink.messages import Address, CommandLong
 
-GROUND = Source(255, 190)
+GROUND = Address(255, 190)
 
 
 def test_lights_on_one_link_answer_for_themselves_only():
-    lights = Devices([DeviceProperties(source=Source(1, one)) for one in (243, 244)], 0.0)
+    lights = Devices([DeviceProperties(source=Address(1, one)) for one in (243, 244)], 0.0)
     lights.receive(GROUND, CommandLong(1, 244, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
     assert [device.enabled for device in lights.devices] == [False, True]
-    assert {source for source, _ in lights.outgoing} == {Source(1, 244)}
+    assert {source for source, _ in lights.outgoing} == {Address(1, 244)}
 
 
 def test_all_lights_on_a_link_answer_a_broadcast():
-    lights = Devices([DeviceProperties(source=Source(1, one)) for one in (243, 244)], 0.0)
+    lights = Devices([DeviceProperties(source=Address(1, one)) for one in (243, 244)], 0.0)
     lights.receive(GROUND, CommandLong(0, 0, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
     assert [device.enabled for device in lights.devices] == [True, True]

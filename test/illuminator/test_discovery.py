@@ -19,14 +19,14 @@ import math
 from illuminator_ros.illuminator.controller import CLASH_MEMORY, Controller, MAX_LIGHTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     ComponentInformationBasic,
     Heartbeat,
     heartbeat,
     IlluminatorStatus,
     MavType,
-    Source,
 )
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -69,7 +69,7 @@ def test_nothing_is_sent_before_the_link_is_open():
 
 
 def test_nothing_is_sent_after_the_link_was_closed(controller):
-    controller.receive(Source(1, 243), ILLUMINATOR, 0.0)
+    controller.receive(Address(1, 243), ILLUMINATOR, 0.0)
     controller.outgoing.clear()
     controller.link_closed(0.1)
     for second in range(10):
@@ -85,7 +85,7 @@ def test_whoever_comes_within_hearing_gets_a_heartbeat_at_once(controller):
 
 
 @pytest.mark.parametrize('source', [
-    Source(1, 243), Source(1, 1), Source(255, 0), Source(7, 190), Source(1, 255)])
+    Address(1, 243), Address(1, 1), Address(255, 0), Address(7, 190), Address(1, 255)])
 @pytest.mark.parametrize('message', [ILLUMINATOR, status_message()], ids=['heartbeat', 'status'])
 def test_a_light_is_known_by_what_it_sends_from_whatever_address(controller, source, message):
     controller.receive(source, message, 0.0)
@@ -99,21 +99,21 @@ def test_a_light_is_known_by_what_it_sends_from_whatever_address(controller, sou
     ComponentInformationBasic(0, 0, 0, b'maker', b'torch', b'1', b'1', b'n'),
 ], ids=lambda message: message.get_type())
 def test_the_id_of_an_illuminator_proves_nothing(controller, message):
-    controller.receive(Source(1, 243), message, 0.0)
+    controller.receive(Address(1, 243), message, 0.0)
     assert controller.lights == {}
 
 
 def test_each_light_is_announced_once_in_the_order_of_appearance():
     found = []
     controller = Controller(BRIDGE, Settings(), on_light=lambda light: found.append(light.source))
-    for source in (Source(1, 244), Source(1, 243), Source(1, 244)):
+    for source in (Address(1, 244), Address(1, 243), Address(1, 244)):
         controller.receive(source, ILLUMINATOR, 0.0)
         controller.receive(source, status_message(), 0.0)
-    assert found == [Source(1, 244), Source(1, 243)]
+    assert found == [Address(1, 244), Address(1, 243)]
 
 
 def test_further_lights_are_passed_over_when_there_are_too_many(controller):
-    sources = [Source(system, component) for system in (2, 3) for component in range(256)]
+    sources = [Address(system, component) for system in (2, 3) for component in range(256)]
     for source in sources[:MAX_LIGHTS]:
         controller.receive(source, ILLUMINATOR, 0.0)
     assert not controller.passed_over
@@ -127,9 +127,9 @@ def test_further_lights_are_passed_over_when_there_are_too_many(controller):
 def test_a_light_that_is_not_wanted_is_left_alone():
     controller = Controller(BRIDGE, Settings(), wanted=lambda source: source.system == 2)
     for system in (1, 2):
-        controller.receive(Source(system, 243), ILLUMINATOR, 0.0)
-        controller.receive(Source(system, 243), status_message(), 0.0)
-    assert list(controller.lights) == [Source(2, 243)]
+        controller.receive(Address(system, 243), ILLUMINATOR, 0.0)
+        controller.receive(Address(system, 243), status_message(), 0.0)
+    assert list(controller.lights) == [Address(2, 243)]
     assert {message.target_system for _, message in controller.outgoing} == {2}
 
 
@@ -148,7 +148,7 @@ def test_nobody_at_our_own_address_is_a_light(controller, message):
 
 
 def test_several_lights_are_known_apart():
-    sources = [Source(1, 243), Source(1, 244), Source(2, 243)]
+    sources = [Address(1, 243), Address(1, 244), Address(2, 243)]
     pair = Pair([DeviceProperties(source=source) for source in sources]).settle()
     light = pair.controller.lights[sources[1]]
     answer = pair.ask_enable(True, light)
@@ -159,13 +159,13 @@ def test_several_lights_are_known_apart():
 
 
 def test_a_light_without_a_heartbeat_of_its_own_lives_by_its_statuses():
-    pair = Pair(FakeLight(Source(1, 1), heartbeat_type=None)).settle()
+    pair = Pair(FakeLight(Address(1, 1), heartbeat_type=None)).settle()
     pair.run(60.0)
     assert pair.recorder.events == ['connected']
 
 
 def test_a_light_found_by_its_status_lives_by_the_heartbeat_of_its_autopilot():
-    fake = FakeLight(Source(1, 1), heartbeat_type=SUBMARINE)
+    fake = FakeLight(Address(1, 1), heartbeat_type=SUBMARINE)
     pair = Pair(fake).settle()
     fake.stream = 0.0
     fake.answers.clear()
@@ -182,5 +182,5 @@ def test_the_statuses_that_a_light_sends_are_all_passed_on(pair):
 
 
 def test_the_address_of_everybody_is_nobody():
-    pair = Pair(FakeLight(Source(0, 7))).settle()
+    pair = Pair(FakeLight(Address(0, 7))).settle()
     assert not pair.controller.lights

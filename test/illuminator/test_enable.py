@@ -19,14 +19,14 @@ import re
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.enable import PROGRESS_LIMIT
 from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
     MavCmd,
     MavResult,
     result_name,
-    Source,
 )
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -177,8 +177,8 @@ def test_progress_is_waited_for_but_not_for_ever(fake, faked):
 
 
 @pytest.mark.parametrize('ack', [
-    (Source(1, 1), BRIDGE), (Source(2, 243), BRIDGE), (Source(1, 243), Source(1, 191)),
-    (Source(1, 243), Source(255, 194)),
+    (Address(1, 1), BRIDGE), (Address(2, 243), BRIDGE), (Address(1, 243), Address(1, 191)),
+    (Address(1, 243), Address(255, 194)),
 ], ids=['autopilot', 'other system', 'other component', 'other ground'])
 def test_the_acknowledgement_of_another_or_for_another_does_not_count(fake, faked, ack):
     source, target = ack
@@ -240,8 +240,8 @@ def test_a_light_that_restarts_meanwhile_does_not_confirm(fake, faked):
 
 
 def test_one_dead_light_does_not_delay_another():
-    pair = Pair([DeviceProperties(source=Source(1, one)) for one in (243, 244)]).settle()
-    dead, alive = (pair.controller.lights[Source(1, one)] for one in (243, 244))
+    pair = Pair([DeviceProperties(source=Address(1, one)) for one in (243, 244)]).settle()
+    dead, alive = (pair.controller.lights[Address(1, one)] for one in (243, 244))
     pair.device.receive = lambda source, message, now: None
     late = pair.ask_enable(True, dead)
     answer = pair.ask_enable(True, alive)

@@ -28,19 +28,19 @@ from illuminator_ros.illuminator.faults import (
     with_fault,
     without_fault,
 )
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandLong,
     Heartbeat,
     IlluminatorStatus,
     MavCmd,
     MavResult,
-    Source,
     STATUS_ID,
 )
 import pytest
 
-GROUND = Source(255, 190)
+GROUND = Address(255, 190)
 ON_OFF = MavCmd.ILLUMINATOR_ON_OFF
 
 

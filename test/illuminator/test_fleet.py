@@ -16,11 +16,11 @@
 
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.fleet import enable_all
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.back_to_back import Answer, Pair
 
-LIGHTS = [DeviceProperties(Source(1, component)) for component in (243, 244, 245)]
+LIGHTS = [DeviceProperties(Address(1, component)) for component in (243, 244, 245)]
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_the_commands_go_out_together_and_the_answer_comes_with_the_slowest(flee
 
 
 def test_a_lost_light_is_named_and_not_commanded_and_does_not_spoil_the_success(fleet):
-    lost = fleet.controller.lights[Source(1, 244)]
+    lost = fleet.controller.lights[Address(1, 244)]
     lost.lose('gone')
     result = fleet.wait_for(ask(fleet))
     assert result.success

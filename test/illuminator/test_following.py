@@ -16,7 +16,7 @@
 
 from illuminator_ros.illuminator.model import float32, Mode
 from illuminator_ros.illuminator.observer import Cause
-from illuminator_ros.mavlink.dialect import MavCmd
+from illuminator_ros.mavlink.messages import MavCmd
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

@@ -27,7 +27,8 @@ from hypothesis import strategies as st
 from illuminator_ros.illuminator.controller import MAX_LIGHTS
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
@@ -35,10 +36,9 @@ from illuminator_ros.mavlink.dialect import (
     Heartbeat,
     IlluminatorStatus,
     LAYOUTS,
-    Source,
 )
-from illuminator_ros.mavlink.reception import MAX_DECODERS
-from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.receiver import MAX_DECODERS
+from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
@@ -55,7 +55,7 @@ FLOAT = st.floats(width=32) | st.sampled_from([math.nan, math.inf, -math.inf, 1e
 BYTE = st.integers(0, 0xFF)
 LONG = st.integers(0, 0xFFFFFFFF)
 COMMAND = st.sampled_from([405, 406, 511, 512]) | st.integers(0, 0xFFFF)
-SOURCE = st.sampled_from([GENUINE, BRIDGE, Source(1, 1)]) | st.builds(Source, BYTE, BYTE)
+SOURCE = st.sampled_from([GENUINE, BRIDGE, Address(1, 1)]) | st.builds(Address, BYTE, BYTE)
 TARGET = [BYTE | st.just(1), BYTE | st.sampled_from([0, 194, 243])]
 INT32 = st.integers(-0x80000000, 0x7FFFFFFF)
 
@@ -121,9 +121,9 @@ def flood(siege: Siege, frames: Iterator[bytes] | list[bytes], *, peers: int = 1
         siege.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
 
 
-def many_sources(count: int) -> list[Source]:
+def many_sources(count: int) -> list[Address]:
     """Return addresses, none of them honest."""
-    return [Source(2 + number // 250, 1 + number % 250) for number in range(count)]
+    return [Address(2 + number // 250, 1 + number % 250) for number in range(count)]
 
 
 def test_a_flood_of_lights_is_bounded(bridge: BridgeSiege) -> None:
@@ -143,10 +143,10 @@ def test_a_flood_of_components_is_bounded(bridge: BridgeSiege) -> None:
 
 
 def test_a_flood_of_peers_is_bounded(bridge: BridgeSiege) -> None:
-    flood(bridge, [heartbeat_frame(Source(2, 1))] * 3000, peers=3000)
+    flood(bridge, [heartbeat_frame(Address(2, 1))] * 3000, peers=3000)
     assert len(bridge.link.udp._peers) == MAX_PEERS
     assert len(bridge.link._reception) == MAX_DECODERS
-    assert len(bridge.link._routes._ways[Source(2, 1)]) == MAX_WAYS
+    assert len(bridge.link._routes._ways[Address(2, 1)]) == MAX_WAYS
     bridge.check_service()
 
 
@@ -160,7 +160,7 @@ def test_a_flood_of_peers_that_claim_to_be_the_light_takes_it_from_nobody(
 def test_a_flood_of_unknown_messages_leaves_nothing_behind(bridge: BridgeSiege) -> None:
     unknown = (number for number in range(1 << 20, 1 << 24) if number not in LAYOUTS)
     before = len(bridge.link._traffic.sources)
-    flood(bridge, [raw_v2(message_id, b'x', crc_extra=0, source=Source(9, 9))
+    flood(bridge, [raw_v2(message_id, b'x', crc_extra=0, source=Address(9, 9))
                    for message_id in itertools.islice(unknown, 5000)])
     assert len(bridge.link._traffic.sources) == before
     assert bridge.link._reception.counters.unknown_ids >= 5000

@@ -16,7 +16,7 @@
 
 from illuminator_ros.illuminator.identification import MAX_QUESTIONS, SETTLING_TIME
 from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.mavlink.dialect import INFORMATION_ID, MavCmd, MavResult
+from illuminator_ros.mavlink.messages import INFORMATION_ID, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

@@ -15,7 +15,7 @@
 """COMPONENT_INFORMATION_BASIC, whose strings cannot be trusted to end."""
 
 from illuminator_ros.illuminator.identity import Identity, text
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
     ComponentInformationBasic,
     decode_payload,
     encode_payload,

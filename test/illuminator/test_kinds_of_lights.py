@@ -16,7 +16,7 @@
 
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Limits
-from illuminator_ros.mavlink.dialect import CommandInt, MavCmd, MavResult, Source
+from illuminator_ros.mavlink.messages import Address, CommandInt, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -28,7 +28,7 @@ class GuideEmulator(FakeLight):
     """Address 255/0, acknowledges first and without a target, has no clock and no COMMAND_INT."""
 
     def __init__(self):
-        super().__init__(Source(255, 0), min_strobe_period=0.0)
+        super().__init__(Address(255, 0), min_strobe_period=0.0)
         self.targeted = False
         self.apply_after = 0.001
         self.boot = None
@@ -42,7 +42,7 @@ class ArduSub(FakeLight):
     """The lights of an autopilot: no heartbeat as a light, and on is what has a brightness."""
 
     def __init__(self):
-        super().__init__(Source(1, 1), heartbeat_type=12, mode_bitmask=2, brightness=0.0,
+        super().__init__(Address(1, 1), heartbeat_type=12, mode_bitmask=2, brightness=0.0,
                          temp_c=0.0, min_strobe_period=0.0, max_strobe_period=0.0)
         self.last = 50.0
 
@@ -62,7 +62,7 @@ class TestGuideEmulator:
         return Pair(GuideEmulator()).settle()
 
     def test_it_is_found_and_served(self, pair):
-        assert pair.light.source == Source(255, 0)
+        assert pair.light.source == Address(255, 0)
         assert pair.enable(True).success
         assert pair.configure(brightness=30, strobe_period=1, strobe_duty_cycle=50).success
         assert pair.other.fields['brightness'] == 30.0
@@ -98,7 +98,7 @@ class TestArduSub:
         return Pair(ArduSub()).settle()
 
     def test_it_is_found_by_its_status(self, pair):
-        assert pair.light.source == Source(1, 1)
+        assert pair.light.source == Address(1, 1)
         assert pair.recorder.events == ['connected']
 
     def test_what_it_does_not_measure_is_not_known(self, pair):

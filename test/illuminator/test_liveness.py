@@ -16,7 +16,7 @@
 
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
-from illuminator_ros.mavlink.dialect import heartbeat, MavCmd, MavType, STATUS_ID
+from illuminator_ros.mavlink.messages import heartbeat, MavCmd, MavType, STATUS_ID
 import pytest
 from support.back_to_back import BRIDGE, Pair, START
 from support.fake_light import FakeLight, LIGHT

@@ -24,7 +24,7 @@ from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.thermal import ThermalProperties
-from illuminator_ros.mavlink.dialect import MavCmd, Source
+from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
@@ -40,7 +40,7 @@ QUIET = 3.0
 # s; two setpoints one after the other, each of which may take its 0.85 s.
 LONGEST_SET = 1.75
 # Lights that stay as bright as they are told: what heat does is another test's subject.
-LIGHTS = [DeviceProperties(source=Source(1, one), thermal=ThermalProperties(rise=0.0))
+LIGHTS = [DeviceProperties(source=Address(1, one), thermal=ThermalProperties(rise=0.0))
           for one in (243, 244, 245, 246)]
 
 # What the line does: by name, towards the lights and back.

@@ -18,7 +18,7 @@ from illuminator_ros.illuminator.agreement import RESTORE_INTERVAL
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.observer import Cause
-from illuminator_ros.mavlink.dialect import MavCmd, MavResult
+from illuminator_ros.mavlink.messages import MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight

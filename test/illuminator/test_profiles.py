@@ -14,10 +14,12 @@
 
 """Lights as they are seen in the field."""
 
+from illuminator_ros.cli.simulator.settings import properties
 from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandLong,
     decode_payload,
@@ -27,13 +29,11 @@ from illuminator_ros.mavlink.dialect import (
     INFORMATION_ID,
     MavCmd,
     MavResult,
-    Source,
     STATUS_ID,
 )
-from illuminator_ros.simulator.settings import properties
 import pytest
 
-GROUND = Source(255, 190)
+GROUND = Address(255, 190)
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 NAN = float('nan')
 
@@ -82,7 +82,7 @@ class TestReference:
     def test_it_sends_from_255_0_with_a_state_that_is_not_initialized(self):
         lamp = Lamp('reference')
         (beat,) = beats(lamp.run(0.5))
-        assert lamp.device.source == Source(255, 0)
+        assert lamp.device.source == Address(255, 0)
         assert (beat.type, beat.autopilot, beat.system_status) == (44, 8, 0)
 
     def test_it_acknowledges_to_nobody_in_particular_before_it_applies(self):
@@ -140,7 +140,7 @@ class TestArduSub:
     def test_it_is_the_autopilot(self):
         lamp = Lamp('ardusub')
         (beat,) = beats(lamp.run(0.5))
-        assert lamp.device.source == Source(1, 1)
+        assert lamp.device.source == Address(1, 1)
         assert (beat.type, beat.autopilot) == (12, 3)
 
     def test_what_it_does_not_measure_is_0_and_its_bitmask_is_shifted(self):

@@ -17,7 +17,7 @@
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING
-from illuminator_ros.mavlink.dialect import MavCmd, MavResult, Source
+from illuminator_ros.mavlink.messages import Address, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
@@ -114,7 +114,7 @@ def test_a_closed_link_leaves_nothing_that_is_sent_later(fake, faked):
 
 
 def test_many_lights_are_served_at_the_same_time():
-    sources = [Source(1, component) for component in range(100, 130)]
+    sources = [Address(1, component) for component in range(100, 130)]
     pair = Pair([DeviceProperties(source=source) for source in sources],
                 there=Faults(latency=0.05)).settle()
     answers = [pair.ask_enable(True, light) for light in pair.controller.lights.values()]

@@ -15,7 +15,7 @@
 """Asking a light again for its status and its identity."""
 
 from illuminator_ros.illuminator.refresh import REFRESH_LIMIT
-from illuminator_ros.mavlink.dialect import INFORMATION_ID, MavCmd, MavResult, STATUS_ID
+from illuminator_ros.mavlink.messages import INFORMATION_ID, MavCmd, MavResult, STATUS_ID
 import pytest
 from support.back_to_back import Pair
 from support.records import Answer

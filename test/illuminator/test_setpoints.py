@@ -15,7 +15,7 @@
 """A stream of brightness setpoints: the newest wins, one command is in flight."""
 
 from illuminator_ros.illuminator.model import Mode
-from illuminator_ros.mavlink.dialect import CommandAck, MavCmd, MavResult
+from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

@@ -17,13 +17,13 @@
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.dialect import MavCmd, Source
+from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
 from support.shared_address import SharedAddress
 
-AUTOPILOT = Source(1, 1)
+AUTOPILOT = Address(1, 1)
 
 
 def two(*, second_boot=0.0, offset=0.01, **second):
@@ -141,7 +141,7 @@ def test_one_light_that_somebody_changes_there_and_back_is_followed(fake):
 @pytest.mark.parametrize('instance', [0, 2])
 def test_commands_carry_the_instance_of_the_light_and_0_is_all(instance):
     sent = []
-    light = Light(AUTOPILOT, CommandSender(sent.append, Source(1, 194)), Settings(),
+    light = Light(AUTOPILOT, CommandSender(sent.append, Address(1, 194)), Settings(),
                   instance=instance)
     light.heard(0.0)
     light.enable(True, 0.0, lambda result, now: None)

@@ -21,7 +21,7 @@ from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.thermal import ThermalProperties
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
@@ -33,7 +33,7 @@ SECONDS = 90.0
 RECOVERY = 12.0
 # s; the tries of a command, its confirmation, and those that were before it in the queue.
 LONGEST = 32.0
-LIGHTS = [DeviceProperties(source=Source(1, one), thermal=ThermalProperties(rise=0.0))
+LIGHTS = [DeviceProperties(source=Address(1, one), thermal=ThermalProperties(rise=0.0))
           for one in (243, 244)]
 
 

@@ -18,7 +18,7 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.agenda import Agenda
+from illuminator_ros.mavlink.deadline_queue import Agenda
 
 TIMES = st.integers(0, 20)
 STEPS = st.lists(st.one_of(

@@ -20,8 +20,8 @@ import itertools
 import threading
 from types import SimpleNamespace
 
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.opener import Backoff, Opener
+from illuminator_ros.mavlink import connector as opener
+from illuminator_ros.mavlink.connector import Backoff, Opener
 from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
 from illuminator_ros.mavlink.url import MemoryUrl, Url

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from illuminator_ros.mavlink.command import Ending
-from illuminator_ros.mavlink.dialect import CommandInt, CommandLong, MavResult
+from illuminator_ros.mavlink.messages import CommandInt, CommandLong, MavResult
 import pytest
 from support.command_rig import (
     ACCEPTED,

@@ -17,16 +17,16 @@
 from __future__ import annotations
 
 from illuminator_ros.mavlink.command import Ending
-from illuminator_ros.mavlink.dialect import MavResult, Source
+from illuminator_ros.mavlink.messages import Address, MavResult
 import pytest
 from support.command_rig import ACCEPTED, DENIED, LIGHT, LONG, OURS, Rig
 
-AUTOPILOT = Source(1, 1)
+AUTOPILOT = Address(1, 1)
 
 
 @pytest.mark.parametrize('source', [
-    AUTOPILOT, Source(2, 243), Source(1, 244), Source(0, 0), OURS])
-def test_acknowledgement_from_another_component_does_not_count(source: Source) -> None:
+    AUTOPILOT, Address(2, 243), Address(1, 244), Address(0, 0), OURS])
+def test_acknowledgement_from_another_component_does_not_count(source: Address) -> None:
     rig = Rig()
     run = rig.start()
     rig.ack(MavResult.UNSUPPORTED, source=source)
@@ -44,8 +44,8 @@ def test_acknowledgement_of_another_command_does_not_count() -> None:
 
 
 @pytest.mark.parametrize('target', [
-    Source(255, 190), Source(1, 191), Source(2, 194), Source(255, 0), Source(0, 191)])
-def test_acknowledgement_for_somebody_else_does_not_count(target: Source) -> None:
+    Address(255, 190), Address(1, 191), Address(2, 194), Address(255, 0), Address(0, 191)])
+def test_acknowledgement_for_somebody_else_does_not_count(target: Address) -> None:
     rig = Rig()
     run = rig.start()
     rig.ack(DENIED, target=target)
@@ -54,8 +54,8 @@ def test_acknowledgement_for_somebody_else_does_not_count(target: Source) -> Non
     assert rig.sender.counters.unexpected_acks == 0
 
 
-@pytest.mark.parametrize('target', [OURS, Source(0, 0), Source(1, 0), Source(0, 194)])
-def test_acknowledgement_for_us_or_for_nobody_counts(target: Source) -> None:
+@pytest.mark.parametrize('target', [OURS, Address(0, 0), Address(1, 0), Address(0, 194)])
+def test_acknowledgement_for_us_or_for_nobody_counts(target: Address) -> None:
     rig = Rig()
     run = rig.start()
     rig.ack(ACCEPTED, target=target)
@@ -106,7 +106,7 @@ def test_late_acknowledgement_of_an_earlier_try_counts() -> None:
 
 def test_one_component_does_not_answer_for_all() -> None:
     rig = Rig()
-    run = rig.start(target=Source(1, 0))
+    run = rig.start(target=Address(1, 0))
     rig.ack(ACCEPTED, source=LIGHT)
     rig.run(LONG)
     assert run.ending is Ending.NO_ANSWER

@@ -20,7 +20,7 @@ import math
 
 from illuminator_ros.mavlink.command import format_seconds
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, OURS, Rig
 
@@ -75,9 +75,9 @@ def test_counters_tell_first_tries_resends_and_silence() -> None:
     rig = Rig(retries=2)
     rig.ended()
     for component in (98, 99):
-        rig.start(target=Source(1, component))
-        rig.ack(ACCEPTED, source=Source(1, component))
-    rig.ack(ACCEPTED, source=Source(1, 99))
+        rig.start(target=Address(1, component))
+        rig.ack(ACCEPTED, source=Address(1, component))
+    rig.ack(ACCEPTED, source=Address(1, 99))
     counters = rig.sender.counters
     assert (counters.sent, counters.resent, counters.unanswered, counters.unexpected_acks) == (
         5, 2, 1, 1)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from illuminator_ros.mavlink.command import Ending
 from illuminator_ros.mavlink.command_sender import PROGRESS_TIMEOUT
-from illuminator_ros.mavlink.dialect import MavResult
+from illuminator_ros.mavlink.messages import MavResult
 import pytest
 from support.command_rig import ACCEPTED, FAILED, IN_PROGRESS, LONG, REJECTED, Rig
 

@@ -23,12 +23,12 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 from illuminator_ros.mavlink.command import Ending
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig, Run
 from support.faulty_wire import Faults, FaultyWire
 
-COMPONENTS = st.sampled_from([LIGHT, Source(1, 244)])
+COMPONENTS = st.sampled_from([LIGHT, Address(1, 244)])
 COMMANDS = st.sampled_from([405, 406])
 # Half of them those that do not simply end a command.
 RESULTS = st.one_of(st.integers(0, 255), st.sampled_from([0, 1, 5, 7, 8]))
@@ -45,15 +45,15 @@ class AnyCourseOfEvents(RuleBasedStateMachine):
 
     @rule(component=COMPONENTS, command=COMMANDS,
           limit=st.one_of(st.just(float('inf')), st.floats(0, 5)), count=st.integers(1, 3))
-    def start(self, component: Source, command: int, limit: float, count: int) -> None:
+    def start(self, component: Address, command: int, limit: float, count: int) -> None:
         for _ in range(count):
             run = self.rig.start(command, component, limit=limit)
             self.limits.append((run, self.rig.now + limit))
 
     @rule(source=COMPONENTS, command=COMMANDS, result=RESULTS, progress=st.integers(0, 255),
-          addressee=st.sampled_from([Source(1, 194), Source(0, 0), Source(9, 9)]))
-    def acknowledge(self, source: Source, command: int, result: int, progress: int,
-                    addressee: Source) -> None:
+          addressee=st.sampled_from([Address(1, 194), Address(0, 0), Address(9, 9)]))
+    def acknowledge(self, source: Address, command: int, result: int, progress: int,
+                    addressee: Address) -> None:
         self.rig.ack(result, command, source=source, progress=progress, target=addressee)
 
     @rule(seconds=TIMES)
@@ -67,7 +67,7 @@ class AnyCourseOfEvents(RuleBasedStateMachine):
 
     @rule(component=st.one_of(st.none(), COMPONENTS),
           ending=st.sampled_from([Ending.LINK_LOST, Ending.CANCELLED]))
-    def link_is_lost(self, component: Source | None, ending: Ending) -> None:
+    def link_is_lost(self, component: Address | None, ending: Ending) -> None:
         self.rig.sender.end_all(self.rig.now, ending, component)
         for run in self.rig.runs:
             assert run.outcomes or component not in (None, run.command.target)

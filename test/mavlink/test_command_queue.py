@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from illuminator_ros.mavlink.command import Command, Ending, Outcome
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig
 
-OTHER = Source(1, 244)
+OTHER = Address(1, 244)
 
 
 # One of a kind at a time
@@ -119,7 +119,7 @@ def test_dead_light_does_not_delay_another() -> None:
 
 def test_fifty_targets_get_an_answer_each_in_any_order() -> None:
     rig = Rig()
-    targets = [Source(system, component) for system in (1, 2) for component in range(1, 26)]
+    targets = [Address(system, component) for system in (1, 2) for component in range(1, 26)]
     runs = {target: rig.start(target=target) for target in targets}
     for place, target in enumerate(reversed(targets)):
         rig.ack(100 + place, source=target)

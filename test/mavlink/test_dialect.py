@@ -23,8 +23,9 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink import dialect
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink import messages as dialect
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     ComponentInformationBasic,
     decode_payload,
@@ -37,7 +38,6 @@ from illuminator_ros.mavlink.dialect import (
     MavResult,
     MavType,
     result_name,
-    Source,
     STATUS_ID,
 )
 from pymavlink.dialects.v20 import common
@@ -261,4 +261,4 @@ def test_heartbeat_is_that_of_a_component_and_not_of_an_autopilot() -> None:
 
 
 def test_source_reads_as_system_and_component() -> None:
-    assert str(Source(1, 243)) == '1/243'
+    assert str(Address(1, 243)) == '1/243'

@@ -14,12 +14,12 @@
 
 """Our own frames that come back are told from those of somebody else with our address."""
 
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.echoes import Echoes, MAX_FRAMES, MEMORY
-from illuminator_ros.mavlink.framing import Frame
+from illuminator_ros.mavlink.frame import Frame
+from illuminator_ros.mavlink.loopback_filter import Echoes, MAX_FRAMES, MEMORY
+from illuminator_ros.mavlink.messages import Address
 import pytest
 
-OURS = Source(1, 194)
+OURS = Address(1, 194)
 SENT = {'source': OURS, 'sequence': 7, 'message_id': 0, 'payload': b'\x01\x02\0\0'}
 
 
@@ -49,7 +49,7 @@ def test_it_is_one_however_often_it_comes(echoes):
 
 
 @pytest.mark.parametrize('changes', [
-    {'sequence': 8}, {'payload': b'\x01\x03'}, {'message_id': 76}, {'source': Source(1, 195)}])
+    {'sequence': 8}, {'payload': b'\x01\x03'}, {'message_id': 76}, {'source': Address(1, 195)}])
 def test_what_differs_in_anything_is_of_somebody_else(echoes, changes):
     assert not echoes.has(frame(**changes), 100.1)
 

@@ -21,9 +21,9 @@ from collections.abc import Callable
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.dialect import FOREIGN, HANDLED, LAYOUTS, Source
-from illuminator_ros.mavlink.framing import Decoder, DecoderCounters, FLAG_SIGNED, Frame
-from illuminator_ros.mavlink.reception import Reception, RENEWAL
+from illuminator_ros.mavlink.frame import Decoder, DecoderCounters, FLAG_SIGNED, Frame
+from illuminator_ros.mavlink.messages import Address, FOREIGN, HANDLED, LAYOUTS
+from illuminator_ros.mavlink.receiver import Reception, RENEWAL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import AUTOPILOT, foreign_frame, frame_of, LIGHT, raw_v1, raw_v2, spoilt
@@ -61,7 +61,7 @@ def test_they_are_passed_over_behind_anything(before: bytes) -> None:
 
 
 @pytest.mark.parametrize('frame', [
-    foreign_frame(source=Source(8, 1)),
+    foreign_frame(source=Address(8, 1)),
     raw_v1(30, bytes(28), source=AUTOPILOT),
     raw_v2(30, bytes(28), incompat=FLAG_SIGNED, source=AUTOPILOT) + bytes(13),
 ], ids=['other source', 'MAVLink 1', 'signed'])

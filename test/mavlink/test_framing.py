@@ -18,17 +18,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandLong,
     decode_payload,
     encode_payload,
     Heartbeat,
     LAYOUTS,
-    Source,
     STATUS_ID,
 )
-from illuminator_ros.mavlink.framing import Decoder, encode_frame
 from illuminator_ros.mavlink.signing import signature
 import pytest
 from support.frames import decoded, frame_of, LIGHT, only, raw_v1, raw_v2, spoilt
@@ -50,7 +50,7 @@ def name(message: Any) -> str:
 
 @pytest.mark.parametrize('message', EVERY_MESSAGE, ids=name)
 def test_pymavlink_reads_what_we_write(message: Any) -> None:
-    (read,) = Peer().decode(frame_of(message, 200, Source(7, 9)))
+    (read,) = Peer().decode(frame_of(message, 200, Address(7, 9)))
     assert read.to_dict() == message.to_dict()
     assert (read.get_seq(), read.get_srcSystem(), read.get_srcComponent()) == (200, 7, 9)
 
@@ -64,8 +64,8 @@ def test_we_write_what_pymavlink_writes(message: Any) -> None:
     *((1, message) for message in FITS_V1), *((2, message) for message in EVERY_MESSAGE),
 ], ids=lambda value: name(value) if hasattr(value, 'msgname') else f'v{value}')
 def test_we_read_what_pymavlink_writes(version: int, message: Any) -> None:
-    frame = only(Peer(Source(255, 0)).encode(twin(message), 99, version=version))
-    assert (frame.version, frame.sequence, frame.source) == (version, 99, Source(255, 0))
+    frame = only(Peer(Address(255, 0)).encode(twin(message), 99, version=version))
+    assert (frame.version, frame.sequence, frame.source) == (version, 99, Address(255, 0))
     assert frame.signature is None
     read = decode_payload(frame.message_id, frame.payload)
     assert fields_of([read]) == fields_of([message])

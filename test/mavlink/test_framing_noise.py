@@ -20,8 +20,8 @@ import random
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.dialect import LAYOUTS
-from illuminator_ros.mavlink.framing import Decoder, FLAG_SIGNED, Frame, MAX_FRAME
+from illuminator_ros.mavlink.frame import Decoder, FLAG_SIGNED, Frame, MAX_FRAME
+from illuminator_ros.mavlink.messages import LAYOUTS
 from illuminator_ros.mavlink.signing import signature
 import pytest
 from support.frames import FILLER, frame_of, raw_v1, raw_v2

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.reception import MAX_DECODERS, Reception, STALL
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.receiver import MAX_DECODERS, Reception, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import LIGHT, raw_v1
@@ -34,7 +34,7 @@ def reception() -> Reception:
     return Reception(Signing())
 
 
-def sources(frames: list) -> list[Source]:
+def sources(frames: list) -> list[Address]:
     """Return where frames come from."""
     return [frame.source for frame in frames]
 
@@ -46,11 +46,11 @@ def test_pieces_of_one_peer_are_put_together(reception: Reception) -> None:
 
 
 def test_pieces_of_different_peers_are_kept_apart(reception: Reception) -> None:
-    one, other = heartbeat_frame(Source(1, 1)), heartbeat_frame(Source(2, 2))
+    one, other = heartbeat_frame(Address(1, 1)), heartbeat_frame(Address(2, 2))
     reception.take('a', one[:9], 0.0, UNIX)
     reception.take('b', other[:9], 0.0, UNIX)
-    assert sources(reception.take('a', one[9:], 0.1, UNIX)) == [Source(1, 1)]
-    assert sources(reception.take('b', other[9:], 0.1, UNIX)) == [Source(2, 2)]
+    assert sources(reception.take('a', one[9:], 0.1, UNIX)) == [Address(1, 1)]
+    assert sources(reception.take('b', other[9:], 0.1, UNIX)) == [Address(2, 2)]
 
 
 @pytest.mark.parametrize('noise', FALSE_STARTS, ids=['MAVLink 1', 'MAVLink 2'])

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.dialect import MavResult, Source
+from illuminator_ros.mavlink.messages import Address, MavResult
 from illuminator_ros.mavlink.round_trip import ENOUGH, FLOOR, RoundTrip, WINDOW
 import pytest
 from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig
@@ -122,7 +122,7 @@ def test_one_target_does_not_teach_about_another() -> None:
     rig = Rig()
     for _ in range(ENOUGH):
         answered(rig, 0.01)
-    assert rig.sender.round_trip(Source(1, 244)).timeout(0.5) == 0.5
+    assert rig.sender.round_trip(Address(1, 244)).timeout(0.5) == 0.5
 
 
 def samples_of(rig: Rig) -> int:
@@ -174,6 +174,6 @@ def test_answer_to_the_command_int_that_follows_is_not_measured() -> None:
 def test_answer_that_does_not_count_is_not_measured() -> None:
     rig = Rig()
     rig.start()
-    rig.ack(ACCEPTED, target=Source(255, 190))
+    rig.ack(ACCEPTED, target=Address(255, 190))
     rig.ack(ACCEPTED, 406)
     assert samples_of(rig) == 0

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
-from illuminator_ros.mavlink.routes import (
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat
+from illuminator_ros.mavlink.router import (
     EXPIRY,
     LOOK_INTERVAL,
     MAX_ROUTES,
@@ -30,7 +30,7 @@ from support.frames import LIGHT
 PEERS = ('a', 'b', 'c')
 
 
-def to(target: Source) -> CommandLong:
+def to(target: Address) -> CommandLong:
     """Return a message with a target."""
     return CommandLong(*target, 512, 0, 0, 0, 0, 0, 0, 0, 0)
 
@@ -51,9 +51,10 @@ def test_a_message_goes_where_its_target_was_heard(routes: Routes) -> None:
     assert routes.towards(to(LIGHT), PEERS, 0.0) == ['b']
 
 
-@pytest.mark.parametrize('target', [Source(0, 0), Source(0, 243), Source(1, 0), Source(2, 243)],
+@pytest.mark.parametrize('target', [
+    Address(0, 0), Address(0, 243), Address(1, 0), Address(2, 243)],
                          ids=['everybody', 'any system', 'a whole system', 'never heard'])
-def test_a_message_to_nobody_that_was_heard_goes_to_all(routes: Routes, target: Source) -> None:
+def test_a_message_to_nobody_that_was_heard_goes_to_all(routes: Routes, target: Address) -> None:
     assert routes.towards(to(target), PEERS, 0.0) == PEERS
 
 
@@ -96,24 +97,24 @@ def test_a_component_on_few_peers_again_is_sent_to_over_those() -> None:
 
 def test_more_components_than_are_remembered_take_nobodys_way(routes: Routes) -> None:
     for number in range(2 * MAX_ROUTES):
-        routes.heard(Source(2 + number // 256, number % 256), 'a', 0.0)
+        routes.heard(Address(2 + number // 256, number % 256), 'a', 0.0)
     assert len(routes) == MAX_ROUTES
     assert routes.towards(to(LIGHT), PEERS, 0.0) == ['b']
 
 
 def test_components_that_have_fallen_silent_make_room(routes: Routes) -> None:
     for number in range(MAX_ROUTES - 1):
-        routes.heard(Source(2, number), 'a', 0.0)
-    routes.heard(Source(3, 0), 'c', EXPIRY + 1)
-    assert routes.towards(to(Source(3, 0)), PEERS, EXPIRY + 1) == ['c']
+        routes.heard(Address(2, number), 'a', 0.0)
+    routes.heard(Address(3, 0), 'c', EXPIRY + 1)
+    assert routes.towards(to(Address(3, 0)), PEERS, EXPIRY + 1) == ['c']
     assert len(routes) == 1
 
 
 def test_a_full_table_is_looked_through_once_in_a_while(routes: Routes) -> None:
     # A look costs as much as hundreds of frames.
     for number in range(MAX_ROUTES - 1):
-        routes.heard(Source(2, number), 'a', 0.0)
-    new = Source(3, 0)
+        routes.heard(Address(2, number), 'a', 0.0)
+    new = Address(3, 0)
     remembered = []
     for now in (EXPIRY - 0.1, EXPIRY + 0.1, EXPIRY + LOOK_INTERVAL):
         routes.heard(new, 'c', now)
@@ -126,13 +127,13 @@ def test_what_is_known_of_crowded_components_is_bounded_too() -> None:
     for batch in range(3):
         for number in range(MAX_ROUTES):
             for peer in range(MAX_WAYS + 1):
-                routes.heard(Source(batch, number), peer, batch * (EXPIRY + LOOK_INTERVAL))
+                routes.heard(Address(batch, number), peer, batch * (EXPIRY + LOOK_INTERVAL))
     assert len(routes._crowded) <= MAX_ROUTES
 
 
 def test_peers_are_counted_while_something_comes_from_them(routes: Routes) -> None:
-    routes.heard(Source(9, 9), 'b', 1.0)
-    routes.heard(Source(9, 9), 'c', 5.0)
+    routes.heard(Address(9, 9), 'b', 1.0)
+    routes.heard(Address(9, 9), 'c', 5.0)
     assert [routes.peer_count(now) for now in (5.0, EXPIRY + 2, EXPIRY + 6)] == [2, 1, 0]
 
 

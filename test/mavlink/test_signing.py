@@ -19,8 +19,8 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import decode_payload, Source
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address, decode_payload
 from illuminator_ros.mavlink.signing import (
     KEY_SIZE,
     MAX_STREAMS,
@@ -162,11 +162,11 @@ def test_forged_frame_moves_nothing(stamp: int) -> None:
     signing, untouched = checker(timestamp=STAMP), checker(timestamp=STAMP)
     for one in (signing, untouched):
         assert one.accepts(signed(STAMP), NOW)
-    for source in (LIGHT, Source(9, 9)):
+    for source in (LIGHT, Address(9, 9)):
         assert not signing.accepts(signed(stamp, key=WRONG_KEY, source=source), NOW)
     assert signing.timestamp == untouched.timestamp
     assert signing.accepts(signed(STAMP + 1), NOW)
-    assert signing.accepts(signed(STAMP, source=Source(9, 9)), NOW)
+    assert signing.accepts(signed(STAMP, source=Address(9, 9)), NOW)
 
 
 def test_replayed_frame_moves_nothing() -> None:
@@ -188,7 +188,7 @@ def test_time_stamp_must_grow_within_a_stream() -> None:
 
 
 @pytest.mark.parametrize('other', [
-    {'link_id': 1}, {'source': Source(1, 244)}, {'source': Source(2, 243)}])
+    {'link_id': 1}, {'source': Address(1, 244)}, {'source': Address(2, 243)}])
 def test_streams_are_told_apart_by_link_system_and_component(other: dict[str, Any]) -> None:
     signing = checker()
     assert signing.accepts(signed(STAMP + 100), NOW)
@@ -253,7 +253,7 @@ def fill(signing: Signing, now: float) -> None:
     """Have as many streams as are remembered heard at a time."""
     for number in range(MAX_STREAMS):
         assert signing.accepts(
-            signed(stamp_at(now), source=Source(100 + number // 256, number % 256)), now)
+            signed(stamp_at(now), source=Address(100 + number // 256, number % 256)), now)
 
 
 def test_table_that_is_full_of_live_streams_takes_no_other() -> None:
@@ -261,8 +261,8 @@ def test_table_that_is_full_of_live_streams_takes_no_other() -> None:
     fill(signing, NOW)
     assert not signing.accepts(signed(STAMP + 1), NOW)
     # Nor does it forget any, whose frames could then be replayed.
-    assert not signing.accepts(signed(STAMP, source=Source(100, 0)), NOW)
-    assert signing.accepts(signed(STAMP + 1, source=Source(100, 0)), NOW)
+    assert not signing.accepts(signed(STAMP, source=Address(100, 0)), NOW)
+    assert signing.accepts(signed(STAMP + 1, source=Address(100, 0)), NOW)
 
 
 def test_streams_that_have_fallen_silent_make_room() -> None:
@@ -284,11 +284,11 @@ def test_forgotten_stream_lets_no_replay_in_even_if_the_clock_steps_back(
     fill(signing, NOW)
     assert signing.accepts(signed(stamp_at(NOW + newcomer)), NOW + 61)
     for now in (NOW + 61, NOW, NOW - 3600):
-        assert not signing.accepts(signed(STAMP, source=Source(100, 0)), now)
+        assert not signing.accepts(signed(STAMP, source=Address(100, 0)), now)
 
 
 def test_a_mad_clock_is_believed_and_not_followed() -> None:
     signing = checker()
     assert signing.accepts(signed(LAST_STAMP), NOW)
     assert signing.timestamp <= STAMP
-    assert signing.accepts(signed(STAMP, source=Source(1, 9)), NOW)
+    assert signing.accepts(signed(STAMP, source=Address(1, 9)), NOW)

@@ -19,8 +19,8 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink import signing as module
-from illuminator_ros.mavlink.dialect import encode_payload, Source, STATUS_ID
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address, encode_payload, STATUS_ID
 from illuminator_ros.mavlink.signing import (
     MAX_STREAMS,
     Signing,
@@ -60,11 +60,11 @@ def test_3_forged_frames_do_not_fill_the_table_of_streams() -> None:
     signing = checker()
     for number in range(20_000):
         frame = signed(STAMP, key=WRONG_KEY, link_id=number % 7,
-                       source=Source(number // 256, number % 256))
+                       source=Address(number // 256, number % 256))
         assert not signing.accepts(frame, NOW)
     assert signing.counters == SigningCounters(bad=20_000)
     # There is room for as many genuine ones as ever.
-    assert all(signing.accepts(signed(STAMP, source=Source(1, number)), NOW)
+    assert all(signing.accepts(signed(STAMP, source=Address(1, number)), NOW)
                for number in range(MAX_STREAMS))
 
 
@@ -118,7 +118,7 @@ def test_7_change_of_the_protocol_version_loses_no_state() -> None:
 
 # What pymavlink has no bound for, under everything that can happen
 
-SOURCES = [Source(1, number) for number in range(6)]
+SOURCES = [Address(1, number) for number in range(6)]
 
 
 @given(st.lists(st.tuples(
@@ -128,7 +128,7 @@ SOURCES = [Source(1, number) for number in range(6)]
     max_size=40))
 @settings(derandomize=True, deadline=None, max_examples=100)
 def test_nothing_is_ever_believed_twice_though_streams_are_forgotten(
-        events: list[tuple[Source, float, float]]) -> None:
+        events: list[tuple[Address, float, float]]) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, 'MAX_STREAMS', 3)
         signing = checker()

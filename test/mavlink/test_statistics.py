@@ -20,7 +20,7 @@ from collections.abc import Iterable
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.statistics import (
     LATELY,
     Lately,
@@ -31,7 +31,7 @@ from illuminator_ros.mavlink.statistics import (
 )
 import pytest
 
-LIGHT = Source(1, 243)
+LIGHT = Address(1, 243)
 
 
 def after(sequences: Iterable[int]) -> SequenceCounter:
@@ -218,9 +218,9 @@ def test_each_source_has_its_own_sequence() -> None:
     traffic = Traffic()
     for number in range(10):
         traffic.count(LIGHT, number)
-        traffic.count(Source(1, 1), 3 * number)
+        traffic.count(Address(1, 1), 3 * number)
     assert counts(traffic.sources[LIGHT]) == (10, 0, 0, 0)
-    assert counts(traffic.sources[Source(1, 1)]) == (10, 18, 0, 0)
+    assert counts(traffic.sources[Address(1, 1)]) == (10, 18, 0, 0)
     assert traffic.frames_received == 20
 
 
@@ -228,7 +228,7 @@ def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
     traffic = Traffic()
     traffic.count(LIGHT, 0)
     for number in range(2 * MAX_SOURCES):
-        traffic.count(Source(2 + number // 256, number % 256), 0)
+        traffic.count(Address(2 + number // 256, number % 256), 0)
     traffic.count(LIGHT, 1)
     assert len(traffic.sources) == MAX_SOURCES
     assert traffic.frames_received == 2 * MAX_SOURCES + 2

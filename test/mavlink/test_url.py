@@ -19,8 +19,8 @@ from __future__ import annotations
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.url import (
-    Address,
     EXAMPLES,
+    HostPort,
     MemoryUrl,
     parse_url,
     SerialUrl,
@@ -32,23 +32,23 @@ from illuminator_ros.mavlink.url import (
 import pytest
 
 # All interfaces, any free port.
-ANY = Address('', 0)
+ANY = HostPort('', 0)
 
 
 def listen(host: str, port: int) -> UdpUrl:
-    return UdpUrl(Address(host, port))
+    return UdpUrl(HostPort(host, port))
 
 
-def send(host: str, port: int, bind: Address = ANY, broadcast: str = '') -> UdpUrl:
-    return UdpUrl(bind, Address(host, port), broadcast)
+def send(host: str, port: int, bind: HostPort = ANY, broadcast: str = '') -> UdpUrl:
+    return UdpUrl(bind, HostPort(host, port), broadcast)
 
 
 def connect(host: str, port: int) -> TcpUrl:
-    return TcpUrl(Address(host, port))
+    return TcpUrl(HostPort(host, port))
 
 
 def serve(host: str, port: int) -> TcpUrl:
-    return TcpUrl(Address(host, port), listen=True)
+    return TcpUrl(HostPort(host, port), listen=True)
 
 
 MAVROS: dict[str, Url] = {
@@ -56,18 +56,18 @@ MAVROS: dict[str, Url] = {
     'udp://:14540@': listen('', 14540),
     'udp://0.0.0.0:14540@': listen('0.0.0.0', 14540),
     'udp://192.168.1.2@': listen('192.168.1.2', 14555),
-    'udp://:14540@127.0.0.1:14557': send('127.0.0.1', 14557, Address('', 14540)),
-    'udp://127.0.0.1:14540@10.0.0.2:14557': send('10.0.0.2', 14557, Address('127.0.0.1', 14540)),
-    'udp://@10.0.0.2': send('10.0.0.2', 14550, Address('', 14555)),
-    'udp://@drone.local:14551': send('drone.local', 14551, Address('', 14555)),
+    'udp://:14540@127.0.0.1:14557': send('127.0.0.1', 14557, HostPort('', 14540)),
+    'udp://127.0.0.1:14540@10.0.0.2:14557': send('10.0.0.2', 14557, HostPort('127.0.0.1', 14540)),
+    'udp://@10.0.0.2': send('10.0.0.2', 14550, HostPort('', 14555)),
+    'udp://@drone.local:14551': send('drone.local', 14551, HostPort('', 14555)),
     'udp://0.0.0.0:14555@:14550': listen('0.0.0.0', 14555),
-    'udp://:14540@127.0.0.1:14557/': send('127.0.0.1', 14557, Address('', 14540)),
+    'udp://:14540@127.0.0.1:14557/': send('127.0.0.1', 14557, HostPort('', 14540)),
     'UDP://:14540@': listen('', 14540),
-    'udp-b://@': send('255.255.255.255', 14550, Address('', 14555), 'until_peer'),
-    'udp-b://:14540@:14551': send('255.255.255.255', 14551, Address('', 14540), 'until_peer'),
-    'udp-b://@10.0.0.255': send('10.0.0.255', 14550, Address('', 14555), 'until_peer'),
-    'udp-pb://@': send('255.255.255.255', 14550, Address('', 14555), 'always'),
-    'udp-pb://:14540@:14551': send('255.255.255.255', 14551, Address('', 14540), 'always'),
+    'udp-b://@': send('255.255.255.255', 14550, HostPort('', 14555), 'until_peer'),
+    'udp-b://:14540@:14551': send('255.255.255.255', 14551, HostPort('', 14540), 'until_peer'),
+    'udp-b://@10.0.0.255': send('10.0.0.255', 14550, HostPort('', 14555), 'until_peer'),
+    'udp-pb://@': send('255.255.255.255', 14550, HostPort('', 14555), 'always'),
+    'udp-pb://:14540@:14551': send('255.255.255.255', 14551, HostPort('', 14540), 'always'),
     'tcp://': connect('localhost', 5760),
     'tcp://10.0.0.2': connect('10.0.0.2', 5760),
     'tcp://10.0.0.2:5762': connect('10.0.0.2', 5762),
@@ -128,8 +128,8 @@ OURS: dict[str, Url] = {
     'udpin:[::]:14550': listen('::', 14550),
     'udp://[::]:14550': listen('::', 14550),
     'udpout://[fe80::1%eth0]:14550': send('fe80::1%eth0', 14550),
-    'udp://[::1]:14541@[::1]:14540': send('::1', 14540, Address('::1', 14541)),
-    'udp://@[2001:db8::1]': send('2001:db8::1', 14550, Address('', 14555)),
+    'udp://[::1]:14541@[::1]:14540': send('::1', 14540, HostPort('::1', 14541)),
+    'udp://@[2001:db8::1]': send('2001:db8::1', 14550, HostPort('', 14555)),
     'tcp://[::1]': connect('::1', 5760),
     '[::1]:14550': listen('::1', 14550),
     'udpin://:55': listen('', 55),
@@ -251,7 +251,7 @@ def test_example_of_the_error_message_is_right(text: str) -> None:
 
 
 def test_address_reads_as_it_is_written() -> None:
-    assert [str(Address('::1', 5)), str(Address('h', 5)), str(Address('', 5))] == [
+    assert [str(HostPort('::1', 5)), str(HostPort('h', 5)), str(HostPort('', 5))] == [
         '[::1]:5', 'h:5', ':5']
 
 

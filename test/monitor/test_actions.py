@@ -14,7 +14,7 @@
 
 """What keys ask of a light, given what is known of it."""
 
-from illuminator_ros.monitor.actions import (
+from illuminator_ros.cli.monitor.actions import (
     dim,
     refresh,
     Request,
@@ -23,7 +23,7 @@ from illuminator_ros.monitor.actions import (
     switch,
     switch_off,
 )
-from illuminator_ros.monitor.model import Light
+from illuminator_ros.cli.monitor.model import Light
 import pytest
 
 

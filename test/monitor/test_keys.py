@@ -14,7 +14,7 @@
 
 """Keys, as a terminal sends them."""
 
-from illuminator_ros.monitor.keys import HELP, KeyDecoder
+from illuminator_ros.cli.monitor.keys import HELP, KeyDecoder
 import pytest
 
 

@@ -14,7 +14,7 @@
 
 """What the monitor knows of lights, moment by moment."""
 
-from illuminator_ros.monitor.model import (
+from illuminator_ros.cli.monitor.model import (
     Diagnosis,
     Fleet,
     MAX_LIGHTS,

@@ -14,10 +14,10 @@
 
 """What keys do: to the selection, and to the lights."""
 
-from illuminator_ros.monitor.actions import Ask
-from illuminator_ros.monitor.keys import HELP
-from illuminator_ros.monitor.model import Light
-from illuminator_ros.monitor.operator import Operator
+from illuminator_ros.cli.monitor.actions import Ask
+from illuminator_ros.cli.monitor.keys import HELP
+from illuminator_ros.cli.monitor.model import Light
+from illuminator_ros.cli.monitor.operator import Operator
 import pytest
 
 

@@ -19,7 +19,7 @@ import os
 import pty
 import termios
 
-from illuminator_ros.monitor.terminal import Keyboard, quiet_errors, unbuffered
+from illuminator_ros.cli.monitor.terminal import Keyboard, quiet_errors, unbuffered
 import pytest
 
 

@@ -17,10 +17,10 @@
 import io
 import re
 
-from illuminator_ros.monitor.keys import HELP
-from illuminator_ros.monitor.model import Diagnosis, Fleet, Light, Outcome
-from illuminator_ros.monitor.texts import bar, BLOCKS, sparkline
-from illuminator_ros.monitor.view import columns_for, plain, Scene, screen
+from illuminator_ros.cli.monitor.keys import HELP
+from illuminator_ros.cli.monitor.model import Diagnosis, Fleet, Light, Outcome
+from illuminator_ros.cli.monitor.texts import bar, BLOCKS, sparkline
+from illuminator_ros.cli.monitor.view import columns_for, plain, Scene, screen
 import pytest
 from rich.console import Console
 from rich.screen import Screen

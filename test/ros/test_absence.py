@@ -19,9 +19,9 @@ from typing import Any
 
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
-from illuminator_ros.mavlink.framing import DecoderCounters
+from illuminator_ros.mavlink.frame import DecoderCounters
 from illuminator_ros.mavlink.link_state import LinkState
+from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
 from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import SequenceCounter, Traffic
 from illuminator_ros.ros.diagnostics import link_findings, WARN, why_no_light, why_nothing_is_heard
@@ -31,7 +31,7 @@ import pytest
 @pytest.mark.parametrize(('traffic', 'signing', 'reason'), [
     ({}, {}, 'nothing comes in'),
     ({'bytes_received': 90}, {}, '90 bytes came and no good frame, as with a wrong baud rate'),
-    ({'bytes_received': 90, 'sources': {Source(1, 1): SequenceCounter(received=4)}}, {},
+    ({'bytes_received': 90, 'sources': {Address(1, 1): SequenceCounter(received=4)}}, {},
      '4 frames came, none from an illuminator'),
     ({'bytes_received': 90}, {'bad': 3},
      '3 frames refused for their signature, made with another key'),
@@ -51,9 +51,9 @@ def state(reason: str = '') -> LinkState:
                      SigningCounters())
 
 
-def controller(*lights: Source, only_target: bool = False) -> Controller:
+def controller(*lights: Address, only_target: bool = False) -> Controller:
     """Return one that has heard these lights."""
-    one = Controller(Source(1, 194), Settings(), wanted=lambda source: not only_target)
+    one = Controller(Address(1, 194), Settings(), wanted=lambda source: not only_target)
     for source in lights:
         one.receive(source, heartbeat(MavType.ILLUMINATOR), 0.0)
     return one
@@ -61,21 +61,21 @@ def controller(*lights: Source, only_target: bool = False) -> Controller:
 
 @pytest.mark.parametrize('only_target', [False, True])
 def test_lights_outside_the_target_are_named(only_target: bool) -> None:
-    heard = controller(Source(1, 243), Source(1, 244), only_target=only_target)
+    heard = controller(Address(1, 243), Address(1, 244), only_target=only_target)
     assert why_no_light(state(), heard) == '1/243, 1/244 heard, none of which is the target'
 
 
 def test_only_some_lights_outside_the_target_are_remembered() -> None:
-    heard = controller(*(Source(1, one) for one in range(1, 100)), only_target=True)
+    heard = controller(*(Address(1, one) for one in range(1, 100)), only_target=True)
     assert len(heard.left_alone) == 8
 
 
 def test_diagnostics_and_answers_give_the_same_reason() -> None:
-    heard = controller(Source(1, 243))
+    heard = controller(Address(1, 243))
     found = link_findings(state(), heard, None, now=7.3, started=0.0)
     assert found == [(WARN, f'no light connected for 7.30 s: {why_no_light(state(), heard)}')]
 
 
 def test_a_link_that_is_not_open_is_the_reason_before_all_others() -> None:
-    assert why_no_light(state('no such file'), controller(Source(1, 243))) == (
+    assert why_no_light(state('no such file'), controller(Address(1, 243))) == (
         'the link is not open: no such file')

@@ -21,7 +21,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
-from support.light import free_port, ServedLight, Source
+from support.light import Address, free_port, ServedLight
 from support.ros import Ros, running_bridge, STREAM
 import yaml
 
@@ -49,7 +49,7 @@ def test_the_analyzer_has_parameters_that_it_reads() -> None:
 def test_all_that_a_bridge_with_two_lights_publishes_is_found(own_ros: Ros) -> None:
     port = free_port()
     with (running_bridge(own_ros.domain, port, target_component=243), ServedLight(port),
-          ServedLight(port, Source(1, 244))):
+          ServedLight(port, Address(1, 244))):
         recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
         names = set()
         for node in ('illuminator', 'illuminator_1_244'):

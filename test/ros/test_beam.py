@@ -23,7 +23,7 @@ import pytest
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from support.embedded import embedded_bridge
-from support.light import free_port, ServedLight, Source
+from support.light import Address, free_port, ServedLight
 from support.processes import environment
 from support.recording import Recorder
 from support.ros import Parameters, Ros, running_bridge, STREAM
@@ -212,7 +212,7 @@ def test_each_light_may_have_a_frame_and_a_beam_of_its_own(own_ros: Ros) -> None
             own_ros.domain, port, '-p', 'belly:beam_range:=3.0', '-p', 'belly:frame_id:=keel',
             beam_range=20.0, frame_id='mast', target_component=243,
             names='["1/244=belly"]'),
-          ServedLight(port, enable=1), ServedLight(port, Source(1, 244), enable=1)):
+          ServedLight(port, enable=1), ServedLight(port, Address(1, 244), enable=1)):
         first = own_ros.subscribe(Marker, '/illuminator/beam').wait(shown)
         further = own_ros.subscribe(Marker, '/belly/beam').wait(shown)
 

@@ -21,7 +21,7 @@ from illuminator_ros.mavlink.url import parse_url
 import pytest
 from std_msgs.msg import Bool
 from support.fake_light import FakeLight
-from support.light import Source
+from support.light import Address
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, STREAM
@@ -37,8 +37,8 @@ def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
     port = free_port()
     url = f'udpout://127.0.0.1:{port}'
     lights = SharedAddress(
-        FakeLight(Source(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=100.0),
-        FakeLight(Source(1, 1), heartbeat_type=None, stream=0.1 * SPEED, enable=1,
+        FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=100.0),
+        FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, enable=1,
                   brightness=40.0))
     with running_bridge(domain, port) as bridge:
         link = SlowLink(parse_url(url), lights, label=url)

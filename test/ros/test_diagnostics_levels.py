@@ -19,9 +19,9 @@ import math
 import socket
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from illuminator_ros.mavlink.dialect import heartbeat, MavType
+from illuminator_ros.mavlink.messages import heartbeat, MavType
 import pytest
-from support.light import CONFIGURE, MavResult, ServedLight, Source
+from support.light import Address, CONFIGURE, MavResult, ServedLight
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import CLOCK, pass_time_until
 
@@ -148,7 +148,7 @@ def test_somebody_else_with_our_address_is_an_error(
 ) -> None:
     diagnostics.recorder.clear()
 
-    light.send(heartbeat(MavType.ONBOARD_CONTROLLER), Source(1, 194))
+    light.send(heartbeat(MavType.ONBOARD_CONTROLLER), Address(1, 194))
 
     diagnostics.wait('link', ERROR, 'another sender uses our address 1/194')
 

@@ -20,16 +20,16 @@ import re
 from typing import Any
 
 from bench.subjects import SUBJECTS
-from illuminator_ros.bridge import usage
+from illuminator_ros.cli.bridge import usage
+from illuminator_ros.cli.monitor import graph, keys, model, requests
+from illuminator_ros.cli.monitor.options import parser
 from illuminator_ros.illuminator.error_flags import ErrorFlag
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
     CommandAck,
     ComponentInformationBasic,
     IlluminatorStatus,
     MavCmd,
 )
-from illuminator_ros.monitor import graph, keys, model, requests
-from illuminator_ros.monitor.options import parser
 from illuminator_ros.ros import beam, beam_output, mounting
 from illuminator_ros.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.ros.parameter_spec import ParameterSpec

@@ -18,7 +18,7 @@ import re
 
 import pytest
 from std_srvs.srv import SetBool
-from support.light import MavCmd, MavResult, ON_OFF, ServedLight, Source
+from support.light import Address, MavCmd, MavResult, ON_OFF, ServedLight
 from support.recording import Call
 from support.ros import Ros
 from support.slow import CLOCK, SPEED
@@ -213,7 +213,7 @@ def test_an_acknowledgement_from_somebody_else_does_not_count(
     call = start(ros)
     light.wait_for(ON_OFF)
 
-    light.acknowledge(ON_OFF, MavResult.ACCEPTED, source=Source(1, 1))
+    light.acknowledge(ON_OFF, MavResult.ACCEPTED, source=Address(1, 1))
     light.acknowledge(ON_OFF, MavResult.DENIED)
 
     assert call.result().message.startswith('refused: MAV_RESULT_DENIED')

@@ -21,14 +21,14 @@ import math
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
-from support.light import eventually, ON_OFF, ServedLight, Source
+from support.light import Address, eventually, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 
 # s; the default.
 HEARTBEAT_TIMEOUT = 3.0
-SOURCES = [Source(1, component) for component in (243, 244, 245)]
+SOURCES = [Address(1, component) for component in (243, 244, 245)]
 NAMES = ['illuminator (1/243)', 'illuminator_1_244 (1/244)', 'tail (1/245)']
 
 

@@ -22,13 +22,13 @@ from illuminator_ros.ros.light_names import PATIENCE
 import pytest
 from std_msgs.msg import Float32
 from std_srvs.srv import SetBool
-from support.light import CONFIGURE, eventually, ServedLight, Source
+from support.light import Address, CONFIGURE, eventually, ServedLight
 from support.ports import free_port
 from support.processes import Program, run
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK
 
-FIRST, SECOND, OTHER = Source(1, 243), Source(1, 244), Source(7, 243)
+FIRST, SECOND, OTHER = Address(1, 243), Address(1, 244), Address(7, 243)
 Start = Callable[..., tuple[Program, list[ServedLight]]]
 
 
@@ -37,8 +37,8 @@ def start(own_ros: Ros) -> Iterator[Start]:
     """Return a function that runs a bridge and lets lights appear one after the other."""
     with contextlib.ExitStack() as stack:
         def run_all(
-            *arguments: str, sources: tuple[Source, ...] = (FIRST, SECOND),
-            unserved: tuple[Source, ...] = (), **parameters: object,
+            *arguments: str, sources: tuple[Address, ...] = (FIRST, SECOND),
+            unserved: tuple[Address, ...] = (), **parameters: object,
         ) -> tuple[Program, list[ServedLight]]:
             port = free_port()
             bridge = stack.enter_context(running_bridge(
@@ -59,7 +59,7 @@ def nodes(ros: Ros) -> set[str]:
             in ros.node.get_node_names_and_namespaces()} - {'/tester'}
 
 
-def light_of(ros: Ros, node: str, lights: list[ServedLight]) -> Source:
+def light_of(ros: Ros, node: str, lights: list[ServedLight]) -> Address:
     """Return the address of the light that a node switches on."""
     assert ros.call(SetBool, f'{node}/enable', SetBool.Request(data=True)).success
     (light,) = [light for light in lights if light.fake.fields['enable']]
@@ -81,7 +81,7 @@ def test_the_first_one_heard_is_illuminator_where_no_target_is_given(
     ({'target_system': 1, 'target_component': 244}, SECOND),
 ], ids=['component', 'system', 'both'])
 def test_the_target_chooses_who_is_illuminator(
-    own_ros: Ros, start: Start, target: dict[str, int], chosen: Source,
+    own_ros: Ros, start: Start, target: dict[str, int], chosen: Address,
 ) -> None:
     _, lights = start(sources=(FIRST, SECOND, OTHER), **target)
     assert light_of(own_ros, '/illuminator', lights) == chosen

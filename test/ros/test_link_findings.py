@@ -18,15 +18,15 @@ from __future__ import annotations
 
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
-from illuminator_ros.mavlink.framing import DecoderCounters
+from illuminator_ros.mavlink.frame import DecoderCounters
 from illuminator_ros.mavlink.link_state import LinkState
+from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
 from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.ros.diagnostics import link_findings, WARN
 import pytest
 
-LIGHT = Source(1, 243)
+LIGHT = Address(1, 243)
 # s; longer than all that is asked when a light is found, and sent again.
 LONG = 30.0
 
@@ -34,7 +34,7 @@ LONG = 30.0
 @pytest.fixture
 def controller() -> Controller:
     """Return one that has asked a light, and was not answered."""
-    one = Controller(Source(1, 194), Settings(), command_timeout=0.1, command_retries=0)
+    one = Controller(Address(1, 194), Settings(), command_timeout=0.1, command_retries=0)
     hear(one, 0.0)
     while (due := one.next_deadline()) < LONG:
         one.poll(due)

@@ -22,7 +22,7 @@ from illuminator_ros.mavlink.signing_files import TimestampStore
 import pytest
 from std_srvs.srv import SetBool
 from support.embedded import resting_bridge
-from support.light import MavCmd, ON_OFF, params, ServedLight, Source
+from support.light import Address, MavCmd, ON_OFF, params, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until
 
@@ -34,7 +34,7 @@ def test_our_address_is_1_194_by_default(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port), ServedLight(port) as light:
         light.wait_for(MavCmd.REQUEST_MESSAGE)
 
-        assert light.fake.heard_from == {Source(1, 194)}
+        assert light.fake.heard_from == {Address(1, 194)}
 
 
 def test_our_address_is_what_system_id_and_component_id_say(own_ros: Ros, port: int) -> None:
@@ -42,7 +42,7 @@ def test_our_address_is_what_system_id_and_component_id_say(own_ros: Ros, port: 
           ServedLight(port) as light):
         light.wait_for(MavCmd.REQUEST_MESSAGE)
 
-        assert light.fake.heard_from == {Source(7, 42)}
+        assert light.fake.heard_from == {Address(7, 42)}
 
 
 def test_status_interval_is_asked_for_in_microseconds(own_ros: Ros, port: int) -> None:

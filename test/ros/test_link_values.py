@@ -19,9 +19,9 @@ from __future__ import annotations
 from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.command_sender import CommandCounters
-from illuminator_ros.mavlink.dialect import heartbeat, MavType
-from illuminator_ros.mavlink.framing import DecoderCounters
+from illuminator_ros.mavlink.frame import DecoderCounters
 from illuminator_ros.mavlink.link_state import LinkState
+from illuminator_ros.mavlink.messages import heartbeat, MavType
 from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import SequenceCounter, Traffic
 from illuminator_ros.ros.diagnostics import link_status

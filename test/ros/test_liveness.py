@@ -18,11 +18,11 @@ from collections.abc import Iterator
 import random
 import socket
 
-from illuminator_ros.mavlink.dialect import heartbeat
+from illuminator_ros.mavlink.messages import heartbeat
 import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool
-from support.light import ServedLight, Source
+from support.light import Address, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until
@@ -147,7 +147,7 @@ class TestWhatIsALight:
     def test_one_that_sends_only_statuses(
         self, own_ros: Ros, port: int, bridge: Program,
     ) -> None:
-        with ServedLight(port, source=Source(1, 1), heartbeat_type=None):
+        with ServedLight(port, source=Address(1, 1), heartbeat_type=None):
             bridge.wait_for('light 1/1 connected')
 
             assert enable(own_ros)
@@ -156,7 +156,7 @@ class TestWhatIsALight:
         self, own_ros: Ros, port: int, bridge: Program,
     ) -> None:
         with ServedLight(port) as light:
-            light.send(heartbeat(AUTOPILOT), Source(1, 1))
+            light.send(heartbeat(AUTOPILOT), Address(1, 1))
             bridge.wait_for('light 1/243 connected')
 
             assert enable(own_ros)
@@ -164,7 +164,7 @@ class TestWhatIsALight:
 
     def test_the_target_parameters_choose_one(self, own_ros: Ros, port: int) -> None:
         with (running_bridge(own_ros.domain, port, target_component=244) as bridge,
-              ServedLight(port) as other, ServedLight(port, source=Source(1, 244)) as chosen):
+              ServedLight(port) as other, ServedLight(port, source=Address(1, 244)) as chosen):
             bridge.wait_for('light 1/244 connected')
             bridge.wait_for('light 1/243 connected')
 

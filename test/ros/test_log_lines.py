@@ -17,11 +17,11 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     ComponentInformationBasic,
     heartbeat,
     MavType,
-    Source,
 )
 from illuminator_ros.ros.node import PATIENCE
 from illuminator_ros.ros.process import BridgeProcess
@@ -30,7 +30,7 @@ from support.embedded import resting_bridge
 from support.fake_light import LIGHT, status_message
 
 NOW = 1000.0
-OTHER = Source(1, 244)
+OTHER = Address(1, 244)
 FLOOD = 2000
 
 
@@ -60,7 +60,7 @@ def process(domain: int, parameters: dict[str, Any]) -> Iterator[BridgeProcess]:
         yield process
 
 
-def hear(process: BridgeProcess, *sources: Source) -> None:
+def hear(process: BridgeProcess, *sources: Address) -> None:
     for source in sources:
         process.controller.receive(source, heartbeat(MavType.ILLUMINATOR), NOW)
 
@@ -109,7 +109,7 @@ def test_a_second_light_and_no_target_are_told_once(
     hear(process, LIGHT)
     assert 'besides' not in ''.join(capfd.readouterr())
 
-    hear(process, OTHER, Source(1, 245))
+    hear(process, OTHER, Address(1, 245))
 
     [line] = [line for line in ''.join(capfd.readouterr()).splitlines() if 'besides' in line]
     assert line.endswith(

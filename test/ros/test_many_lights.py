@@ -21,7 +21,7 @@ import pytest
 from rclpy.node import NodeNameNonExistentError
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
-from support.light import eventually, MavResult, ON_OFF, ServedLight, Source
+from support.light import Address, eventually, MavResult, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
@@ -30,8 +30,8 @@ from support.slow import pass_time_until
 # s; the default.
 HEARTBEAT_TIMEOUT = 3.0
 # The first one is that which the target selects, whoever is heard first.
-NODES = {'/illuminator': Source(1, 244), '/illuminator_1_243': Source(1, 243),
-         '/belly': Source(7, 243)}
+NODES = {'/illuminator': Address(1, 244), '/illuminator_1_243': Address(1, 243),
+         '/belly': Address(7, 243)}
 FURTHER = [node for node in NODES if node != '/illuminator']
 FLEET_ONLY = {'/enable_all', '/cmd/enable_all'}
 

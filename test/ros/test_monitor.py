@@ -17,13 +17,13 @@
 from collections.abc import Iterator
 import threading
 
-from illuminator_ros.monitor.actions import dim, refresh, Request, strobe, switch, switch_off
-from illuminator_ros.monitor.graph import lights_among, TOPICS, type_name
-from illuminator_ros.monitor.model import Light, Outcome, State
+from illuminator_ros.cli.monitor.actions import dim, refresh, Request, strobe, switch, switch_off
+from illuminator_ros.cli.monitor.graph import lights_among, TOPICS, type_name
+from illuminator_ros.cli.monitor.model import Light, Outcome, State
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from std_srvs.srv import SetBool
-from support.light import CONFIGURE, eventually, free_port, MavResult, ServedLight, Source
+from support.light import Address, CONFIGURE, eventually, free_port, MavResult, ServedLight
 from support.monitors import Watching, watching
 from support.ros import Ros, running_bridge, STATE
 from support.slow import pass_time_until
@@ -230,7 +230,7 @@ def test_two_bridges_with_nodes_of_one_name_are_told_apart(own_ros: Ros) -> None
     with (running_bridge(own_ros.domain, ports['/uav1'], '-r', '__ns:=/uav1'),
           running_bridge(own_ros.domain, ports['/uav2'], '-r', '__ns:=/uav2'),
           ServedLight(ports['/uav1'], brightness=10.0),
-          ServedLight(ports['/uav2'], Source(9, 9), brightness=20.0),
+          ServedLight(ports['/uav2'], Address(9, 9), brightness=20.0),
           watching(own_ros) as monitor):
         monitor.wait_names('/uav1/illuminator', '/uav2/illuminator')
         for name, address, brightness in (('/uav1/illuminator', '1/243', 10.0),

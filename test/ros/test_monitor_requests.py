@@ -17,9 +17,9 @@
 import threading
 from typing import Any
 
-from illuminator_ros.monitor.actions import dim, strobe, switch
-from illuminator_ros.monitor.model import Fleet, Outcome
-from illuminator_ros.monitor.requests import ANSWER_LIMIT, Requests
+from illuminator_ros.cli.monitor.actions import dim, strobe, switch
+from illuminator_ros.cli.monitor.model import Fleet, Outcome
+from illuminator_ros.cli.monitor.requests import ANSWER_LIMIT, Requests
 import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically

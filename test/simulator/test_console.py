@@ -14,12 +14,12 @@
 
 """What can be done to simulated lights while they run."""
 
+from illuminator_ros.cli.simulator.console import COMMANDS, describe_commands, execute
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.error_flags import ErrorFlag
 from illuminator_ros.illuminator.faults import FAULTS
-from illuminator_ros.mavlink.dialect import IlluminatorStatus, Source
-from illuminator_ros.simulator.console import COMMANDS, describe_commands, execute
+from illuminator_ros.mavlink.messages import Address, IlluminatorStatus
 import pytest
 
 
@@ -27,8 +27,8 @@ class Bench:
 
     def __init__(self):
         self.lights = Devices([
-            DeviceProperties(source=Source(1, 243), name='bow'),
-            DeviceProperties(source=Source(1, 244))], 0.0)
+            DeviceProperties(source=Address(1, 243), name='bow'),
+            DeviceProperties(source=Address(1, 244))], 0.0)
         self.bow, self.other = self.lights.devices
         self.lights.poll(0.0)
         self.lights.outgoing.clear()
@@ -54,7 +54,7 @@ def test_a_button_is_seen_at_once_in_the_status(bench):
     bench.enter('bow brightness 30')
     ((source, status),) = bench.lights.outgoing
     assert isinstance(status, IlluminatorStatus)
-    assert (source, status.brightness) == (Source(1, 243), 30.0)
+    assert (source, status.brightness) == (Address(1, 243), 30.0)
 
 
 def test_the_rest_of_a_configuration_stays(bench):

@@ -14,12 +14,12 @@
 
 """Which lights the command line and a file describe."""
 
+from illuminator_ros.cli.simulator.lights import lights, load, Scene, scene
+from illuminator_ros.cli.simulator.options import parser
+from illuminator_ros.cli.simulator.settings import SettingError, SETTINGS
 from illuminator_ros.illuminator.faults import active
 from illuminator_ros.illuminator.model import Limits, Mode
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.simulator.lights import lights, load, Scene, scene
-from illuminator_ros.simulator.options import parser
-from illuminator_ros.simulator.settings import SettingError, SETTINGS
+from illuminator_ros.mavlink.messages import Address
 import pytest
 
 
@@ -37,7 +37,7 @@ def faults(light):
 
 def test_without_arguments_there_is_one_ordinary_light():
     (light,) = described()
-    assert light.source == Source(1, 243)
+    assert light.source == Address(1, 243)
     assert light.limits == Limits(0.05, 10.0)
     assert light.identity.serial_number == 'SIM-1-243'
     assert light.mode_bitmask == 3
@@ -200,7 +200,7 @@ def test_a_yaml_file_is_read(tmp_path):
     path.write_text('url: udpin://127.0.0.1:1\nlights:\n  - {id: 1/9, ambient: 3}\n')
     found = load(str(path))
     assert (found.url, found.lights) == (
-        'udpin://127.0.0.1:1', [(Source(1, 9), '', {'ambient': 3.0})])
+        'udpin://127.0.0.1:1', [(Address(1, 9), '', {'ambient': 3.0})])
 
 
 def test_what_is_no_yaml_is_said(tmp_path):

@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from illuminator_ros.command_line import signing
+from illuminator_ros.cli.options import signing
+from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.mavlink.signing import Signing, SigningMode, ticks
 from illuminator_ros.mavlink.signing_files import TimestampStore
-from illuminator_ros.simulator.options import parser
 import pytest
 
 NAME = 'simulator 1/243'

@@ -19,18 +19,18 @@ import os
 import re
 import shutil
 
+from illuminator_ros.cli.simulator.view import glance, LiveView, PlainView
 from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import with_fault
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.simulator.view import glance, LiveView, PlainView
+from illuminator_ros.mavlink.messages import Address
 import pytest
 
 
 @pytest.fixture
 def device():
-    return Device(DeviceProperties(source=Source(1, 243), name='bow'), 0.0)
+    return Device(DeviceProperties(source=Address(1, 243), name='bow'), 0.0)
 
 
 class Terminal(io.StringIO):
@@ -170,7 +170,7 @@ class TestLiveView:
         assert terminal.getvalue() == before
 
     def test_more_lights_than_lines_are_counted(self, terminal):
-        lights = [Device(DeviceProperties(source=Source(1, n)), 0.0) for n in range(1, 21)]
+        lights = [Device(DeviceProperties(source=Address(1, n)), 0.0) for n in range(1, 21)]
         LiveView(terminal).show([glance(one, 0.0) for one in lights])
         screen = terminal.screen()
         assert len(screen) == 7

@@ -22,7 +22,8 @@ import random
 import struct
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
@@ -32,7 +33,6 @@ from illuminator_ros.mavlink.dialect import (
     IlluminatorStatus,
     LAYOUTS,
     MavType,
-    Source,
 )
 from illuminator_ros.mavlink.signing import MAX_TICKS, signature, ticks
 from support.frames import raw_v1, raw_v2
@@ -52,7 +52,7 @@ class Attacker:
     :param sources: addresses worth claiming to be.
     """
 
-    def __init__(self, seed: object, key: bytes, sources: list[Source]) -> None:
+    def __init__(self, seed: object, key: bytes, sources: list[Address]) -> None:
         self._random = random.Random(repr(seed))
         self._key = key
         self._sources = sources
@@ -134,7 +134,7 @@ class Attacker:
             self._any_heartbeat, self._status, self._status, self._information, self._ack,
             self._ack, self._command_long, self._command_int))(), self._source(), now)
 
-    def _framed(self, message: Any, source: Source, now: float) -> bytes:
+    def _framed(self, message: Any, source: Address, now: float) -> bytes:
         cls = type(message)
         payload = self._pack(message)
         if self._random.random() < 0.1:
@@ -150,7 +150,7 @@ class Attacker:
         return raw_v2(cls.id, payload, incompat=flags, sequence=sequence, source=source)
 
     def _signed(
-        self, message_id: int, payload: bytes, sequence: int, source: Source, now: float,
+        self, message_id: int, payload: bytes, sequence: int, source: Address, now: float,
     ) -> bytes:
         frame = raw_v2(message_id, payload, incompat=1, sequence=sequence, source=source)
         fresh = ticks(1.7e9 + now) + self._random.randrange(1000)
@@ -162,7 +162,7 @@ class Attacker:
 
     @staticmethod
     def _pack(message: Any) -> bytes:
-        from illuminator_ros.mavlink.dialect import encode_payload
+        from illuminator_ros.mavlink.messages import encode_payload
         return encode_payload(message)
 
     def _payload(self) -> bytes:
@@ -170,13 +170,13 @@ class Attacker:
 
     # Fields
 
-    def _source(self) -> Source:
+    def _source(self) -> Address:
         if self._random.random() < 0.6:
             return self._random.choice(self._sources)
         return self._any_source()
 
-    def _any_source(self) -> Source:
-        return Source(self._random.randrange(256), self._random.randrange(256))
+    def _any_source(self) -> Address:
+        return Address(self._random.randrange(256), self._random.randrange(256))
 
     def _float(self) -> float:
         if self._random.random() < 0.2:

@@ -26,7 +26,10 @@ from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Result
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandInt,
     CommandLong,
     decode_payload,
@@ -34,14 +37,11 @@ from illuminator_ros.mavlink.dialect import (
     HANDLED,
     LAYOUTS,
     MavCmd,
-    Source,
 )
-from illuminator_ros.mavlink.endpoint import Endpoint
-from illuminator_ros.mavlink.framing import Decoder, encode_frame
 from support.faulty_wire import Faults, FaultyWire
 from support.records import Answer, Recorder
 
-BRIDGE = Source(1, 194)
+BRIDGE = Address(1, 194)
 ONE_LIGHT = (DeviceProperties(),)
 # s on the clock of a pair at its beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
@@ -57,8 +57,8 @@ class _End:
         self.wire = wire
         self.decoder = Decoder()
         self.sent: list[tuple[float, Any]] = []
-        self.received: list[tuple[float, Source, Any]] = []
-        self._sequences: dict[Source, int] = {}
+        self.received: list[tuple[float, Address, Any]] = []
+        self._sequences: dict[Address, int] = {}
 
     def flush(self, now: float) -> None:
         while self.endpoint.outgoing:
@@ -101,7 +101,7 @@ class Pair:
         on_light: Callable[[Light], None] = lambda light: None,
     ) -> None:
         self.now = START
-        self.recorders: dict[Source, Recorder] = {}
+        self.recorders: dict[Address, Recorder] = {}
         self._on_light = on_light
         self.controller = Controller(
             BRIDGE, settings or Settings(), command_timeout=command_timeout,

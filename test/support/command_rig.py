@@ -24,10 +24,10 @@ from typing import Any
 
 from illuminator_ros.mavlink.command import Command, Ending, Outcome
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.dialect import CommandAck, CommandInt, MavResult, Source
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, MavResult
 
-OURS = Source(1, 194)
-LIGHT = Source(1, 243)
+OURS = Address(1, 194)
+LIGHT = Address(1, 243)
 # s from a frame to its acknowledgement.
 DELAY = 0.02
 # s after which whatever was started has ended.
@@ -85,11 +85,11 @@ class Rig:
         self.answers: Callable[[Any, int], Sequence[int]] = (
             lambda message, number: answers[number] if number < len(answers) else ())
         self.runs: list[Run] = []
-        self._acks: list[tuple[float, int, Source, Any]] = []
+        self._acks: list[tuple[float, int, Address, Any]] = []
 
     # What the sender's owner does
 
-    def start(self, command: int = 405, target: Source = LIGHT, *,
+    def start(self, command: int = 405, target: Address = LIGHT, *,
               params: tuple[float, ...] | None = None, limit: float = math.inf) -> Run:
         """Start a command; the limit is s from now. With params its frames are not told apart."""
         number = len(self.runs) + 1.0
@@ -119,16 +119,16 @@ class Rig:
 
     # What its target does
 
-    def ack(self, result: int, command: int = 405, *, source: Source = LIGHT, progress: int = 0,
-            target: Source = OURS, result_param2: int = 0) -> None:
+    def ack(self, result: int, command: int = 405, *, source: Address = LIGHT, progress: int = 0,
+            target: Address = OURS, result_param2: int = 0) -> None:
         """Acknowledge a command at once."""
         self.sender.acknowledge(
             source, CommandAck(command, result, progress, result_param2, *target), self.now)
 
     def _send(self, message: Any) -> None:
-        key = Source(message.target_system, message.target_component), message.command
+        key = Address(message.target_system, message.target_component), message.command
         number = sum(1 for _, sent in self.frames if key == (
-            Source(sent.target_system, sent.target_component), sent.command))
+            Address(sent.target_system, sent.target_component), sent.command))
         self.frames.append((self.now, message))
         number_of_run = int(message.z if isinstance(message, CommandInt) else message.param7)
         if 0 < number_of_run <= len(self.runs):

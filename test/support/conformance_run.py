@@ -18,16 +18,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from illuminator_ros.conformance.bench import Bench
-from illuminator_ros.conformance.requirement import Verdict
-from illuminator_ros.conformance.suite import Suite
+from illuminator_ros.illuminator.checks.bench import Bench
+from illuminator_ros.illuminator.checks.requirement import Verdict
+from illuminator_ros.illuminator.checks.suite import Suite
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.faults import with_fault
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 from support.virtual_link import START, VirtualLink
 
-TESTER = Source(255, 190)
+TESTER = Address(255, 190)
 # s for which the lights have been on when a run begins.
 UPTIME = 100.0
 

@@ -21,7 +21,9 @@ import math
 from typing import Any
 
 from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.component import Endpoint, Heartbeat
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
@@ -31,12 +33,10 @@ from illuminator_ros.mavlink.dialect import (
     MavCmd,
     MavResult,
     MavType,
-    Source,
     STATUS_ID,
 )
-from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
 
-LIGHT = Source(1, 243)
+LIGHT = Address(1, 243)
 DEFAULT_STATUS = {
     'enable': 0, 'mode_bitmask': 3, 'error_status': 0, 'mode': 1, 'brightness': 100.0,
     'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'temp_c': 25.0, 'min_strobe_period': 0.05,
@@ -66,7 +66,7 @@ class FakeLight(Endpoint):
     """
 
     def __init__(
-        self, source: Source = LIGHT, *, heartbeat_type: int | None = MavType.ILLUMINATOR,
+        self, source: Address = LIGHT, *, heartbeat_type: int | None = MavType.ILLUMINATOR,
         stream: float = 1.0, results: Mapping[int, Any] | None = None, **fields: Any,
     ) -> None:
         super().__init__()
@@ -101,7 +101,7 @@ class FakeLight(Endpoint):
         """Have the statuses of the stream come later."""
         self._status_due += seconds
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         if self.silent or not isinstance(message, CommandLong | CommandInt):
             return
         if (message.target_system, message.target_component) != self.source:

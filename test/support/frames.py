@@ -19,17 +19,17 @@ from __future__ import annotations
 from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
-from illuminator_ros.mavlink.dialect import encode_payload, LAYOUTS, Source
-from illuminator_ros.mavlink.framing import Decoder, encode_frame, Frame
+from illuminator_ros.mavlink.frame import Decoder, encode_frame, Frame
+from illuminator_ros.mavlink.messages import Address, encode_payload, LAYOUTS
 from support.messages import STATUS
 
-LIGHT = Source(1, 243)
-AUTOPILOT = Source(7, 1)
+LIGHT = Address(1, 243)
+AUTOPILOT = Address(7, 1)
 # Never the beginning of a frame, and long enough to end the wait for the rest of any.
 FILLER = bytes(300)
 
 
-def frame_of(message: Any = STATUS, sequence: int = 0, source: Source = LIGHT, *,
+def frame_of(message: Any = STATUS, sequence: int = 0, source: Address = LIGHT, *,
              signed: bool = False) -> bytes:
     """Return a frame of ours, without the signature that a signed one still needs."""
     return encode_frame(
@@ -38,7 +38,7 @@ def frame_of(message: Any = STATUS, sequence: int = 0, source: Source = LIGHT, *
 
 
 def raw_v2(message_id: int, payload: bytes, *, crc_extra: int | None = None, incompat: int = 0,
-           compat: int = 0, sequence: int = 0, source: Source = LIGHT) -> bytes:
+           compat: int = 0, sequence: int = 0, source: Address = LIGHT) -> bytes:
     """Return a MAVLink 2 frame as it is not written by us: any flags, any length, any seed."""
     if crc_extra is None:
         crc_extra = LAYOUTS[message_id].crc_extra
@@ -47,13 +47,13 @@ def raw_v2(message_id: int, payload: bytes, *, crc_extra: int | None = None, inc
     return b'\xfd' + body + mcrf4xx(body + bytes((crc_extra,))).to_bytes(2, 'little')
 
 
-def foreign_frame(sequence: int = 0, source: Source = AUTOPILOT) -> bytes:
+def foreign_frame(sequence: int = 0, source: Address = AUTOPILOT) -> bytes:
     """Return a frame with a message that is nothing to us: ATTITUDE."""
     return raw_v2(30, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)
 
 
 def raw_v1(message_id: int, payload: bytes, *, crc_extra: int | None = None, sequence: int = 0,
-           source: Source = LIGHT) -> bytes:
+           source: Address = LIGHT) -> bytes:
     """Return a MAVLink 1 frame of any length."""
     if crc_extra is None:
         crc_extra = LAYOUTS[message_id].crc_extra

@@ -16,19 +16,19 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.dialect import heartbeat, MavType, Source
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
 from support.frames import frame_of, LIGHT
 
 
 def heartbeat_frame(
-    source: Source = LIGHT, sequence: int = 0, mav_type: int = MavType.ILLUMINATOR,
+    source: Address = LIGHT, sequence: int = 0, mav_type: int = MavType.ILLUMINATOR,
 ) -> bytes:
     """Return the heartbeat of a light, or of something else."""
     return frame_of(heartbeat(mav_type), sequence, source)
 
 
-def numbered_frames(count: int, source: Source = LIGHT) -> list[bytes]:
+def numbered_frames(count: int, source: Address = LIGHT) -> list[bytes]:
     """Return heartbeats that can be told apart: each carries its number as its custom_mode."""
     frames = []
     for number in range(count):

@@ -24,23 +24,23 @@ import time
 from types import TracebackType
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandInt,
     CommandLong,
     MavCmd,
     MavResult,
-    Source,
     STATUS_ID,
 )
-from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
 from support.fake_light import FakeLight
 from support.ports import free_port
 from support.slow import CLOCK, SlowLink, SPEED
 from support.waiting import PATIENCE
 
-LIGHT = Source(1, 243)
+LIGHT = Address(1, 243)
 # s of the slow clock between statuses: ten in a real second.
 STREAM = 0.1 * SPEED
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
@@ -56,18 +56,18 @@ class _Recorder(FakeLight):
     :ivar most_at_once: how many commands, resends not counted, it ever had to take at a time.
     """
 
-    def __init__(self, source: Source, **how: Any) -> None:
+    def __init__(self, source: Address, **how: Any) -> None:
         super().__init__(source, **how)
         self.pushes = True
         self.received: list[Any] = []
         self.changed = threading.Condition()
         self.delays: dict[int, float] = {}
         self.steps = 0.0
-        self.heard_from: set[Source] = set()
+        self.heard_from: set[Address] = set()
         self.most_at_once = 0
-        self._late: list[tuple[float, Source, Any]] = []
+        self._late: list[tuple[float, Address, Any]] = []
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         if not isinstance(message, CommandLong | CommandInt):
             return
         with self.changed:
@@ -110,7 +110,7 @@ class ServedLight:
     :param link: what it is served by, a plain Link for a light that lives by the usual clock.
     """
 
-    def __init__(self, port: int, source: Source = LIGHT, *, link: type[Link] = SlowLink,
+    def __init__(self, port: int, source: Address = LIGHT, *, link: type[Link] = SlowLink,
                  **how: Any) -> None:
         self.port = port
         self._kind = link
@@ -176,12 +176,12 @@ class ServedLight:
         """Lose power and come back with the default settings, or others."""
         self.do(lambda now: self.fake.restart(now, **fields))
 
-    def send(self, message: Any, source: Source | None = None) -> None:
+    def send(self, message: Any, source: Address | None = None) -> None:
         """Send any message, if wanted as somebody else."""
         self.do(lambda now: self.fake.outgoing.append((source or self.fake.source, message)))
 
     def acknowledge(
-        self, command: int, result: int, *, progress: int = 0, source: Source = LIGHT,
+        self, command: int, result: int, *, progress: int = 0, source: Address = LIGHT,
     ) -> None:
         """Send an acknowledgement of its own accord."""
         self.send(CommandAck(command, result, progress, 0, 0, 0), source)
@@ -233,4 +233,4 @@ def eventually(condition: Callable[[], Any], timeout: float = PATIENCE) -> Any:
 
 
 __all__ = ['CONFIGURE', 'eventually', 'free_port', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
-           'ServedLight', 'Source']
+           'ServedLight', 'Address']

@@ -28,14 +28,14 @@ from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.observer import LightObserver
 from illuminator_ros.illuminator.operation import Result
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.endpoint import Endpoint, Heartbeat
+from illuminator_ros.mavlink.component import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url, Url
 from support.waiting import eventually, Log, PATIENCE
 
-BRIDGE = Source(1, 194)
+BRIDGE = Address(1, 194)
 OPENER = 'mavlink-open'
 
 
@@ -48,10 +48,10 @@ class Talker(Endpoint):
     :ivar turns: how often the link's thread has gone round.
     """
 
-    def __init__(self, source: Source = BRIDGE, mav_type: int = 18) -> None:
+    def __init__(self, source: Address = BRIDGE, mav_type: int = 18) -> None:
         super().__init__()
         self.heartbeat = Heartbeat(source, mav_type)
-        self.heard: Log[tuple[Source, Any]] = Log()
+        self.heard: Log[tuple[Address, Any]] = Log()
         self.greetings: Log[float] = Log()
         self.closings: Log[float] = Log()
         self.turns = 0
@@ -63,7 +63,7 @@ class Talker(Endpoint):
     def link_closed(self, now: float) -> None:
         self.closings.append(now)
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         self.heard.append((source, message))
 
     def poll(self, now: float) -> None:
@@ -73,7 +73,7 @@ class Talker(Endpoint):
         self.turns += 1
         return self.heartbeat.due
 
-    def wait_for(self, source: Source, since: int = 0) -> Any:
+    def wait_for(self, source: Address, since: int = 0) -> Any:
         """Return the first message of a source, of those from a position on."""
         return self.heard.wait_for(lambda entry: entry[0] == source, since=since)[1]
 

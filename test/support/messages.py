@@ -18,7 +18,7 @@ One message of each kind that is handled.
 No field is at its default, and float32 has each number exactly.
 """
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
     CommandAck,
     CommandInt,
     CommandLong,

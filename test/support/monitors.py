@@ -30,9 +30,9 @@ import termios
 import threading
 from typing import Any
 
-from illuminator_ros.monitor.actions import Ask
-from illuminator_ros.monitor.model import Light, Outcome
-from illuminator_ros.monitor.run import Monitor
+from illuminator_ros.cli.monitor.actions import Ask
+from illuminator_ros.cli.monitor.model import Light, Outcome
+from illuminator_ros.cli.monitor.run import Monitor
 from rclpy.node import Node
 from support.light import eventually
 from support.processes import end_with_parent, environment, ROOT, slow_environment

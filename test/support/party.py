@@ -18,14 +18,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.messages import (
+    Address,
     decode_payload,
     encode_payload,
     HANDLED,
     LAYOUTS,
-    Source,
 )
-from illuminator_ros.mavlink.framing import Decoder, encode_frame
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 
 # Of all who sign.
@@ -35,7 +35,7 @@ KEY = bytes(range(32))
 class Party:
     """Makes frames of messages, signed and numbered, and messages of frames."""
 
-    def __init__(self, source: Source, mode: SigningMode) -> None:
+    def __init__(self, source: Address, mode: SigningMode) -> None:
         self.source = source
         self._signing = Signing(mode, KEY if mode is not SigningMode.OFF else b'', link_id=7)
         self._sequence = 0

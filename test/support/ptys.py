@@ -26,8 +26,8 @@ import threading
 
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
-from illuminator_ros.mavlink.dialect import decode_payload, HANDLED
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import decode_payload, HANDLED
 from support.frames import frame_of
 from support.waiting import PATIENCE
 

@@ -30,7 +30,7 @@ from pathlib import Path
 import tempfile
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink.messages import Address
 from pymavlink.generator import mavgen
 
 # Message id, name and fields (type, name, further attributes), in the order of common.xml.
@@ -70,7 +70,7 @@ DEFINITIONS: dict[int, tuple[str, list[tuple[str, str, str] | None]]] = {
         ('float', 'temp_c', ''), ('float', 'min_strobe_period', 'units="s"'),
         ('float', 'max_strobe_period', 'units="s"')]),
 }
-LIGHT = Source(1, 243)
+LIGHT = Address(1, 243)
 ENUMS = ('MAV_PROTOCOL_CAPABILITY', 'ILLUMINATOR_MODE', 'ILLUMINATOR_ERROR_FLAGS')
 
 
@@ -118,7 +118,7 @@ class Peer:
     """
 
     def __init__(
-        self, source: Source = LIGHT, *, key: bytes | None = None, link_id: int = 0,
+        self, source: Address = LIGHT, *, key: bytes | None = None, link_id: int = 0,
         timestamp: int = 0,
     ) -> None:
         self.mavlink = reference().MAVLink(None, source.system, source.component)

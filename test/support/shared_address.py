@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import CommandAck, Source
-from illuminator_ros.mavlink.endpoint import Endpoint
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.messages import Address, CommandAck
 from support.fake_light import FakeLight
 
 
@@ -43,7 +43,7 @@ class SharedAddress(Endpoint):
         for light in self.lights:
             light.link_opened(now)
 
-    def receive(self, source: Source, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Any, now: float) -> None:
         for number, light in enumerate(self.lights):
             before = len(self.outgoing)
             light.receive(source, message, now)

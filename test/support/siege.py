@@ -29,9 +29,9 @@ from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Done, Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
-from illuminator_ros.mavlink.dialect import CommandLong, MavResult, Source
-from illuminator_ros.mavlink.reception import MAX_DECODERS
-from illuminator_ros.mavlink.routes import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
+from illuminator_ros.mavlink.receiver import MAX_DECODERS
+from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
@@ -40,8 +40,8 @@ from support.party import KEY, Party
 from support.sceptic import Sceptic
 from support.simulated_link import SimulatedLink
 
-BRIDGE = Source(1, 194)
-GENUINE = Source(1, 243)
+BRIDGE = Address(1, 194)
+GENUINE = Address(1, 243)
 GENUINE_PEER = ('127.0.0.1', 20_000)
 # s after which every request has been answered.
 ANSWERED_WITHIN = 120.0
@@ -63,7 +63,7 @@ class Siege:
         self.link = SimulatedLink(
             self.make_endpoint(), self.take, signing=Signing(
                 mode, KEY if mode is not SigningMode.OFF else b''))
-        self.attacker = Attacker(seed, KEY, [GENUINE, BRIDGE, Source(1, 244), Source(1, 1)])
+        self.attacker = Attacker(seed, KEY, [GENUINE, BRIDGE, Address(1, 244), Address(1, 1)])
         self.get_ready()
 
     def make_endpoint(self) -> Any:
@@ -229,7 +229,7 @@ class LightSiege(Siege):
     """Simulated lights, with a genuine drone that they are to obey all the time."""
 
     def make_endpoint(self) -> Any:
-        return Devices([DeviceProperties(source=Source(1, 243 + i)) for i in range(3)], 1000.0)
+        return Devices([DeviceProperties(source=Address(1, 243 + i)) for i in range(3)], 1000.0)
 
     def get_ready(self) -> None:
         self._party = Party(BRIDGE, self.mode)

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.framing import Frame
+from illuminator_ros.mavlink.frame import Frame
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import (
     EPOCH,
     signature,
@@ -38,7 +38,7 @@ NOW = EPOCH + 400_000_000.0
 LAST_STAMP = 2 ** 48 - 1
 
 
-def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Source = LIGHT,
+def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Address = LIGHT,
            message: Any = STATUS, sequence: int = 0) -> Frame:
     """Return a frame signed with any key and time stamp."""
     data = (frame_of(message, sequence, source, signed=True)
@@ -46,7 +46,7 @@ def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Source = L
     return only(data + signature(key, data))
 
 
-def unsigned(source: Source = LIGHT) -> Frame:
+def unsigned(source: Address = LIGHT) -> Frame:
     """Return a frame without signature."""
     return only(frame_of(source=source))
 

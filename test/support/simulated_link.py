@@ -21,15 +21,15 @@ from collections.abc import Callable
 import selectors
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.endpoint import Endpoint
+from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import Signing
 from illuminator_ros.mavlink.transport.udp import UdpChannel
-from illuminator_ros.mavlink.url import Address, UdpUrl
+from illuminator_ros.mavlink.url import HostPort, UdpUrl
 
 Datagram = tuple[bytes, Any]
-URL = UdpUrl(Address('127.0.0.1', 0))
+URL = UdpUrl(HostPort('127.0.0.1', 0))
 # Turns of the link without anything coming in or time passing: more, and its thread would spin.
 MAX_IDLE_TURNS = 200
 
@@ -90,10 +90,10 @@ class _Collection:
         self._link.now = min(self._link.now + milliseconds / 1000, self._link.until)
 
 
-class _FromZero(dict[Source, int]):
+class _FromZero(dict[Address, int]):
     """Sequence numbers that begin with 0, so that the same run gives the same bytes."""
 
-    def get(self, key: Source, default: Any = None) -> Any:
+    def get(self, key: Address, default: Any = None) -> Any:
         return super().get(key, 0)
 
 

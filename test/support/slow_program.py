@@ -24,8 +24,8 @@ from typing import Any
 
 # Where each of them has what it makes that has a clock: a link, or a monitor.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.process',
-          'illuminator_ros.simulator': 'illuminator_ros.simulator.run',
-          'illuminator_ros.monitor': 'illuminator_ros.monitor.run'}
+          'illuminator_ros.simulator': 'illuminator_ros.cli.simulator.run',
+          'illuminator_ros.monitor': 'illuminator_ros.cli.monitor.run'}
 
 
 def main(module: str) -> int:
@@ -42,7 +42,7 @@ def main(module: str) -> int:
     if hasattr(place, 'Monitor'):
         place.Monitor = partial(place.Monitor, clock=CLOCK)
     # What it takes to end in order on a busy machine it is to have.
-    import_module('illuminator_ros.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
+    import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):
         place.OFF_LIMIT = PATIENCE / 2
     return int(import_module(module).main())

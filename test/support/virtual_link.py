@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import decode_payload, encode_payload, HANDLED, Source
-from illuminator_ros.mavlink.endpoint import Endpoint
-from illuminator_ros.mavlink.framing import Decoder, encode_frame
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.messages import Address, decode_payload, encode_payload, HANDLED
 
 # s on the clock at the beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
@@ -41,7 +41,7 @@ class VirtualLink:
         self.now = START
         self.ends = (first, second)
         self.decoders = (Decoder(), Decoder())
-        self._sequences: dict[Source, int] = {}
+        self._sequences: dict[Address, int] = {}
         self._turns = 0
         for end in self.ends:
             end.link_opened(self.now)

@@ -25,14 +25,14 @@ from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.model import Mode
-from illuminator_ros.mavlink.dialect import (
+from illuminator_ros.mavlink.messages import (
+    Address,
     CommandAck,
     CommandLong,
     Heartbeat,
     IlluminatorStatus,
     MavCmd,
     MavResult,
-    Source,
 )
 from support.back_to_back import Pair, START
 from support.records import Answer
@@ -74,7 +74,7 @@ class Witness:
                 'strobe_period': configuration.strobe_period,
                 'strobe_duty_cycle': configuration.strobe_duty_cycle}
 
-    def _watched(self, source: Source, message: Any, now: float) -> None:
+    def _watched(self, source: Address, message: Any, now: float) -> None:
         self._receive(source, message, now)
         fields = self._fields()
         if fields != self._states[-1].fields:

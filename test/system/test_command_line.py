@@ -20,8 +20,8 @@ import subprocess
 import sys
 
 from illuminator_ros import __version__
+from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
-from illuminator_ros.simulator.options import parser
 import pytest
 from support.open_channel import bound_socket
 from support.processes import ended, environment, Program, ROOT, run

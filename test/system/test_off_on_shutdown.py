@@ -22,7 +22,7 @@ from illuminator_ros.ros import process as process_module
 import pytest
 from std_srvs.srv import SetBool
 from support.embedded import embedded_bridge
-from support.light import CONFIGURE, eventually, MavResult, ON_OFF, ServedLight, Source
+from support.light import Address, CONFIGURE, eventually, MavResult, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, start_bridge, start_slow_bridge
 from support.slow import CLOCK, pass_time_until
@@ -62,7 +62,7 @@ def test_the_light_is_switched_off(own_ros: Ros, port: int, number: int) -> None
 
 def test_every_light_is_switched_off(own_ros: Ros, port: int) -> None:
     with (lit(own_ros, port) as (program, light),
-          ServedLight(port, source=Source(1, 244), enable=1) as other):
+          ServedLight(port, source=Address(1, 244), enable=1) as other):
         Parameters(own_ros, '/illuminator_1_244').wait(brightness=100.0)
 
         assert ends(program)

@@ -24,7 +24,7 @@ import subprocess
 import sys
 import time
 
-from illuminator_ros import termination
+from illuminator_ros.cli import termination
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros import process
 import pytest
@@ -42,7 +42,7 @@ LEASE = 20.0
 
 HANGING = """
 import threading
-from illuminator_ros.entry import enter
+from illuminator_ros.cli.program import enter
 def hang(termination):
     termination.calls(threading.Event().wait, last=lambda: print('at last', flush=True))
     print('hanging', flush=True)

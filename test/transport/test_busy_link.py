@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from illuminator_ros.mavlink.crowd import COLLECTION
-from illuminator_ros.mavlink.dialect import CommandLong
+from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.mavlink.transport.udp import BATCH, PEER_EXPIRY
 import pytest
 from support.frames import AUTOPILOT, foreign_frame, LIGHT

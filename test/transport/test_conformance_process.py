@@ -23,7 +23,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from illuminator_ros.conformance.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 import pytest
 from support.ports import free_port
 from support.processes import environment, Program, ROOT, run

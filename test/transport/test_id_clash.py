@@ -20,7 +20,7 @@ import socket
 import threading
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import MavType
+from illuminator_ros.mavlink.messages import MavType
 import pytest
 from support.heartbeats import heartbeat_frame
 from support.live_link import BRIDGE, Bridge

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink import connector as opener
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
 import pytest
 from support.frames import LIGHT

@@ -21,9 +21,9 @@ import contextlib
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink import connector as opener
 from illuminator_ros.mavlink import link as link_module
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.opener import FIRST_PAUSE
+from illuminator_ros.mavlink.connector import FIRST_PAUSE
 from illuminator_ros.mavlink.standing import MAX_REASONS
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 import pytest

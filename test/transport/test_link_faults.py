@@ -22,10 +22,11 @@ import math
 import threading
 from typing import Any
 
+from illuminator_ros.mavlink import connector as opener
 from illuminator_ros.mavlink import link as link_module
-from illuminator_ros.mavlink import opener, worker
-from illuminator_ros.mavlink.dialect import heartbeat
+from illuminator_ros.mavlink import worker
 from illuminator_ros.mavlink.link_state import LinkEvent
+from illuminator_ros.mavlink.messages import heartbeat
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame

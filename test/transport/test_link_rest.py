@@ -20,8 +20,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 import socket
 
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.reception import STALL
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.receiver import STALL
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
@@ -93,7 +93,7 @@ class Simulation:
         self.heard_at: list[float] = []
         taken = self.endpoint.receive
 
-        def receive(source: Source, message: object, now: float) -> None:
+        def receive(source: Address, message: object, now: float) -> None:
             self.heard_at.append(now)
             taken(source, message, now)
 

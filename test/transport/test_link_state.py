@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 import threading
 
-from illuminator_ros.mavlink import opener
-from illuminator_ros.mavlink.dialect import Source
+from illuminator_ros.mavlink import connector as opener
 from illuminator_ros.mavlink.link_state import LinkState
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
@@ -179,8 +179,8 @@ def test_reading_it_while_everything_changes_is_no_error(
         for count in range(10):
             with server.accept()[0] as connection:
                 for number in range(20):
-                    connection.sendall(heartbeat_frame(Source(1 + count, 1 + number)))
-                link.endpoint.wait_for(Source(1 + count, 20))
+                    connection.sendall(heartbeat_frame(Address(1 + count, 1 + number)))
+                link.endpoint.wait_for(Address(1 + count, 20))
     ended.set()
     for reader in readers:
         reader.join()

@@ -22,7 +22,7 @@ import socket
 import threading
 from typing import Any
 
-from illuminator_ros.mavlink import opener
+from illuminator_ros.mavlink import connector as opener
 from illuminator_ros.mavlink.transport import resolve, tcp
 import pytest
 from support.frames import LIGHT

@@ -21,8 +21,8 @@ from pathlib import Path
 import socket
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import Source
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.live_link import Bridge
 from support.ports import free_port
@@ -53,4 +53,4 @@ def test_it_serves_a_serial_line(tmp_path: Path) -> None:
         while not frames and (data := device.read()):
             frames = list(decoder.feed(data))
     device.pull_out()
-    assert frames[0].source == Source(1, 243)
+    assert frames[0].source == Address(1, 243)

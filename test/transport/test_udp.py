@@ -23,7 +23,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.transport import ChannelLost, open_channel
 from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM, RECEIVE_BUFFER
-from illuminator_ros.mavlink.url import Address, UdpUrl
+from illuminator_ros.mavlink.url import HostPort, UdpUrl
 import pytest
 from support.open_channel import bound_socket, has_nothing, OpenChannel
 from support.ports import free_port
@@ -41,7 +41,7 @@ def test_a_listening_socket_hears_everybody(channel: OpenFunction, loopback: str
 
 
 def test_a_socket_keeps_as_much_as_the_kernel_allows(channel: OpenFunction) -> None:
-    ours: Any = channel(UdpUrl(Address('127.0.0.1', 0))).channel
+    ours: Any = channel(UdpUrl(HostPort('127.0.0.1', 0))).channel
     with socket.socket(type=socket.SOCK_DGRAM) as other:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         most = other.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
@@ -64,7 +64,7 @@ def test_a_listening_socket_sends_to_whom_it_has_checked(
 
 
 def test_a_listening_socket_has_nobody_to_send_to_at_first(channel: OpenFunction) -> None:
-    assert not channel(UdpUrl(Address('127.0.0.1', 0))).channel.peers(0.0)
+    assert not channel(UdpUrl(HostPort('127.0.0.1', 0))).channel.peers(0.0)
 
 
 def test_a_fixed_remote_is_sent_to_unheard(channel: OpenFunction, loopback: str) -> None:
@@ -124,8 +124,8 @@ def test_a_broadcast_goes_on_once_a_peer_is_known_only_where_that_is_asked_for(
     channel: OpenFunction, kind: str, reached: str,
 ) -> None:
     with bound_socket('0.0.0.0') as everybody, bound_socket() as peer:
-        remote = Address('127.255.255.255', everybody.getsockname()[1])
-        ours = channel(UdpUrl(Address('', 0), remote, kind))
+        remote = HostPort('127.255.255.255', everybody.getsockname()[1])
+        ours = channel(UdpUrl(HostPort('', 0), remote, kind))
         ours.broadcast(b'first')
         assert everybody.recv(100) == b'first'
         ours.channel.heard(peer.getsockname(), 0.0)
@@ -137,11 +137,11 @@ def test_a_broadcast_goes_on_once_a_peer_is_known_only_where_that_is_asked_for(
 
 def test_addresses_of_different_ip_versions_are_refused_by_name() -> None:
     with pytest.raises(OSError, match=r'127\.0\.0\.1:1.*\[::1\]:2.*different IP versions'):
-        open_channel(UdpUrl(Address('127.0.0.1', 1), Address('::1', 2)))
+        open_channel(UdpUrl(HostPort('127.0.0.1', 1), HostPort('::1', 2)))
 
 
 def test_a_learnt_peer_out_of_reach_is_forgotten_and_no_loss(channel: OpenFunction) -> None:
-    ours = channel(UdpUrl(Address('127.0.0.1', 0)))
+    ours = channel(UdpUrl(HostPort('127.0.0.1', 0)))
     with bound_socket() as good:
         # Nothing can be sent to port 0.
         ours.channel.heard(('127.0.0.1', 0), 0.0)

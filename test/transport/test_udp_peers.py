@@ -20,10 +20,10 @@ from collections.abc import Callable
 import socket
 from typing import Any
 
-from illuminator_ros.mavlink.dialect import CommandLong, heartbeat, Source
-from illuminator_ros.mavlink.framing import Decoder
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
-from illuminator_ros.mavlink.url import Address, UdpUrl
+from illuminator_ros.mavlink.url import HostPort, UdpUrl
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
@@ -44,7 +44,7 @@ def peer(number: int) -> tuple[str, int]:
 @pytest.fixture
 def ours(channel: Callable[[UdpUrl], OpenChannel]) -> Any:
     """Return a channel that listens."""
-    return channel(UdpUrl(Address('127.0.0.1', 0))).channel
+    return channel(UdpUrl(HostPort('127.0.0.1', 0))).channel
 
 
 @pytest.fixture
@@ -139,7 +139,7 @@ def test_who_claims_to_be_a_light_takes_no_command_away_from_it(
 
 def test_addressed_messages_go_only_where_the_target_was_heard(bridge: Any, port: int) -> None:
     with bound_socket() as light, bound_socket() as other:
-        hear(bridge, port, [(light, LIGHT), (other, Source(7, 1))])
+        hear(bridge, port, [(light, LIGHT), (other, Address(7, 1))])
         say(bridge, COMMAND, MARK)
         assert COMMAND.id in ids_until_mark(light)
         assert COMMAND.id not in ids_until_mark(other)
@@ -147,7 +147,7 @@ def test_addressed_messages_go_only_where_the_target_was_heard(bridge: Any, port
 
 def test_messages_to_who_was_heard_nowhere_go_to_everybody(bridge: Any, port: int) -> None:
     with bound_socket() as one, bound_socket() as other:
-        hear(bridge, port, [(one, Source(7, 1)), (other, Source(8, 1))])
+        hear(bridge, port, [(one, Address(7, 1)), (other, Address(8, 1))])
         say(bridge, COMMAND, MARK)
         assert COMMAND.id in ids_until_mark(one)
         assert COMMAND.id in ids_until_mark(other)
@@ -155,14 +155,14 @@ def test_messages_to_who_was_heard_nowhere_go_to_everybody(bridge: Any, port: in
 
 def test_what_is_said_together_comes_in_one_datagram(bridge: Any, port: int) -> None:
     with bound_socket() as one:
-        hear(bridge, port, [(one, Source(7, 1))])
+        hear(bridge, port, [(one, Address(7, 1))])
         say(bridge, COMMAND, MARK)
         while COMMAND.id not in (ids := ids_in(one.recv(65536))):
             pass
         assert ids == [COMMAND.id, MARK.id]
 
 
-def hear(bridge: Any, port: int, talkers: list[tuple[socket.socket, Source]]) -> None:
+def hear(bridge: Any, port: int, talkers: list[tuple[socket.socket, Address]]) -> None:
     """Have a link hear several senders."""
     for count, (sender, source) in enumerate(talkers, 1):
         sender.sendto(heartbeat_frame(source), ('127.0.0.1', port))

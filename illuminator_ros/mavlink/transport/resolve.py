@@ -19,10 +19,10 @@ from __future__ import annotations
 import socket
 from typing import Any
 
-from ..url import Address
+from ..url import HostPort
 
 
-def resolve(address: Address, kind: socket.SocketKind) -> list[tuple[int, Any]]:
+def resolve(address: HostPort, kind: socket.SocketKind) -> list[tuple[int, Any]]:
     """
     Return families and socket addresses; IPv4 goes first, as most MAVLink programs know no other.
 

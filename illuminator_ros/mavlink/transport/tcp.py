@@ -26,7 +26,7 @@ from typing import Any
 
 from .base import Channel, ChannelLost, FrameQueue, MAX_QUEUED, Peer
 from .resolve import resolve
-from ..url import Address
+from ..url import HostPort
 
 # s over all addresses of a name; the link must be back within 1 s of the other side.
 CONNECT_TIMEOUT = 0.8
@@ -86,7 +86,7 @@ class _Stream:
 class TcpClient(Channel):
     """A connection to a server."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: HostPort) -> None:
         self._stream = _Stream(_connect(address))
         self.name = f'tcp to {address}'
 
@@ -132,7 +132,7 @@ class TcpClient(Channel):
         self._stream.socket.close()
 
 
-def _connect(address: Address) -> socket.socket:
+def _connect(address: HostPort) -> socket.socket:
     """Return a connection to the first of a name's addresses that answers."""
     found = resolve(address, socket.SOCK_STREAM)
     reason = OSError(f'cannot connect to {address}')
@@ -161,7 +161,7 @@ class TcpServer(Channel):
     for longest; it is turned away where all have sent something good within :data:`EXPIRY`.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: HostPort) -> None:
         family, sockaddr = resolve(address, socket.SOCK_STREAM)[0]
         self._listener = socket.socket(family, socket.SOCK_STREAM)
         try:
@@ -176,7 +176,7 @@ class TcpServer(Channel):
         # When something good last came, s.
         self._heard: dict[socket.socket, float] = {}
         self._now = -math.inf
-        self.name = f'tcp server {Address(*self._listener.getsockname()[:2])}'
+        self.name = f'tcp server {HostPort(*self._listener.getsockname()[:2])}'
 
     def register(self, selector: selectors.BaseSelector) -> None:
         """See :meth:`Channel.register`."""

@@ -26,7 +26,7 @@ from typing import Any
 
 from .base import Channel, ChannelLost, Peer
 from .resolve import resolve
-from ..url import Address, UdpUrl
+from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new one is not let in over a live one.
 MAX_PEERS = 32
@@ -77,7 +77,7 @@ class UdpChannel(Channel):
             self._socket.close()
             raise OSError(error.errno, f'cannot listen on {url.bind}: {error.strerror}') from None
         self.name = 'udp ' + ' to '.join(filter(None, (
-            str(Address(*self._socket.getsockname()[:2])), str(url.remote or ''))))
+            str(HostPort(*self._socket.getsockname()[:2])), str(url.remote or ''))))
 
     def register(self, selector: selectors.BaseSelector) -> None:
         """See :meth:`Channel.register`."""

@@ -1,0 +1,136 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The executable ``bridge``: a MAVLink illuminator as a ROS 2 node."""
+
+from __future__ import annotations
+
+import sys
+
+from .program import enter, one_line
+from .termination import Termination
+
+
+def usage() -> str:
+    """Return what ``--help`` prints."""
+    from ..ros.parameter_spec import ParameterSpec
+    from ..ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
+
+    def row(spec: ParameterSpec, default: str) -> str:
+        limits = f'{spec.shown_range} {spec.unit}'.strip()
+        return (f'  {spec.name:22} {default:27} {spec.description}'
+                + (f' ({limits})' if limits else ''))
+
+    link = '\n'.join(row(spec, spec.shown_default) for spec in LINK_PARAMETERS)
+    device = '\n'.join(row(spec, '') for spec in DEVICE_PARAMETERS)
+    return f"""\
+usage: bridge [-h | --version] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
+
+Makes a MAVLink illuminator (searchlight, torch, strobe) a ROS 2 node, /illuminator.
+
+examples:
+  ros2 run illuminator_ros bridge
+  ros2 run illuminator_ros bridge --ros-args -p connection_url:=serial:///dev/ttyACM0:57600
+  ros2 run illuminator_ros bridge --ros-args -p connection_url:=udpin://0.0.0.0:14550
+
+  ros2 service call /illuminator/enable std_srvs/srv/SetBool "{{data: true}}"
+  ros2 param set /illuminator brightness 60
+
+parameters of the link, fixed at the start, with their defaults:
+{link}
+
+parameters of the light, sent to it when it connects and whenever they are set:
+{device}
+
+connection URLs, each meaning what it means in MAVROS, MAVSDK or pymavlink:
+  udp://[BIND][:PORT]@[HOST][:PORT]   udpin://BIND:PORT   udpout://HOST:PORT
+  tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
+  serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
+
+exit status: 0 after SIGINT, SIGTERM or SIGHUP; 1 if a package is missing; 2 if an argument or
+parameter is wrong.
+"""
+
+
+def main(args: list[str] | None = None) -> int:
+    """
+    Run the bridge until a signal; see :func:`usage`.
+
+    :param args: the command line without the program's name.
+    """
+    arguments = sys.argv[1:] if args is None else args
+    return enter('bridge', lambda termination: _run(arguments, termination))
+
+
+def _run(arguments: list[str], termination: Termination) -> int:
+    own = arguments
+    if '--ros-args' in arguments:
+        # Slow to import, as all else that is imported in a function here.
+        from rclpy.utilities import remove_ros_args
+        try:
+            own = remove_ros_args(['bridge', *arguments])[1:]
+        except Exception as error:
+            return _wrong(f'wrong ROS arguments: {error}')
+    if '-h' in own or '--help' in own:
+        print(usage(), end='')
+        return 0
+    if '--version' in own:
+        from .. import __version__
+        print(__version__)
+        return 0
+    if own:
+        return _wrong(f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
+                      'bridge --help')
+    return _serve(arguments, termination)
+
+
+def _wrong(what: str) -> int:
+    """Say in one line what is wrong with the command line, and return the exit status for it."""
+    print(f'bridge: {one_line(what)}', file=sys.stderr)
+    return 2
+
+
+def _serve(arguments: list[str], termination: Termination) -> int:
+    import gc
+
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+
+    from ..ros.node import IlluminatorNode
+    from ..ros.parameter_spec import ParameterError
+    from ..ros.process import BridgeProcess
+
+    # From here on the ROS graph has to be left in order, so a signal only has effect later.
+    termination.calls(lambda: None)
+    try:
+        rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        node = IlluminatorNode()
+    except Exception as error:
+        # rclpy has an exception of its own for each thing that can be wrong with an argument.
+        return _wrong(f'wrong ROS arguments: {error}')
+    try:
+        process = BridgeProcess(node, arguments)
+    except ParameterError as error:
+        return _wrong(f'parameter {error}')
+    # What is there now stays: to look for garbage among it would only hold up an answer.
+    gc.collect()
+    gc.freeze()
+    termination.calls(process.end)
+    process.run()
+    rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,42 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The executable ``conformance``: checks any light against the illuminator protocol, without ROS.
+
+``bench`` talks to the light, ``requirements`` has the checks, ``suite`` runs them: all without
+I/O. ``run`` is the command line.
+"""
+
+from __future__ import annotations
+
+import signal
+
+from ..program import explained
+
+
+def main(args: list[str] | None = None) -> int:
+    """
+    Check a light; see :mod:`~.run`.
+
+    :param args: the command line without the program's name.
+    """
+    # Until something has been changed there is nothing to bring back, nor to say.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    def start() -> int:
+        from .run import run
+        return run(args)
+
+    return explained('conformance', start)

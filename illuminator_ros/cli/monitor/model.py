@@ -1,0 +1,237 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is known of the lights in a ROS graph. No ROS, no clock: time is passed in."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+from typing import Any
+
+from ...illuminator.error_flags import flag_names
+
+# s without anything from a light, or about it, after which what is shown is not up to date any
+# more: bridges ask for a status after 2.5 s, and publish diagnostics once a second.
+SILENCE = 6.0
+# s; one value of temperature for each, and so many of them.
+TREND_STEP = 2.0
+TREND_SIZE = 60
+# Anybody can publish topics like those of a light.
+MAX_LIGHTS = 256
+
+
+class State(Enum):
+    """What there is to say of a light first."""
+
+    ON = 'ON'
+    OFF = 'off'
+    UNKNOWN = '?'
+    LOST = 'LOST'
+    SILENT = 'silent'
+    GONE = 'gone'
+
+
+class Trend:
+    """The newest value in each of the last time steps; None where there was none."""
+
+    def __init__(self, step: float = TREND_STEP, size: int = TREND_SIZE) -> None:
+        self._step = step
+        self._values: deque[tuple[int, float]] = deque(maxlen=size)
+        self._size = size
+
+    def add(self, value: float, now: float) -> None:
+        """Take a value."""
+        at = math.floor(now / self._step)
+        if self._values and self._values[-1][0] == at:
+            self._values.pop()
+        self._values.append((at, value))
+
+    def last(self, count: int, now: float) -> list[float | None]:
+        """Return the values of the last ``count`` steps, the newest last."""
+        known = dict(self._values)
+        end = math.floor(now / self._step)
+        return [known.get(at) for at in range(end - min(count, self._size) + 1, end + 1)]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A status on /diagnostics: 0 is OK, 1 WARN, 2 ERROR, 3 STALE."""
+
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+    def number(self, key: str) -> float | None:
+        """Return a value that is a number, None if it is none."""
+        try:
+            value = float(self.values[key])
+        except (KeyError, ValueError):
+            return None
+        return value if math.isfinite(value) else None
+
+
+class Outcome(Enum):
+    """What has become of a request."""
+
+    PENDING = '...'
+    DONE = 'done'
+    FAILED = 'FAILED'
+
+
+@dataclass(frozen=True)
+class Action:
+    """The last thing that was asked of a light from here."""
+
+    text: str
+    outcome: Outcome
+    answer: str
+    at: float
+
+
+@dataclass
+class Light:
+    """
+    One light; None is what it has not told.
+
+    :param name: of its node, with namespace.
+    :param heard_at: when anything came from it, or about it.
+    :ivar setpoint: the brightness that is agreed with it, %; it may shine less, being hot.
+    :ivar wanted: what has been asked for and not been answered: parameters, ``enabled``.
+    :ivar values: its last values by topic.
+    """
+
+    name: str
+    heard_at: float
+    gone_at: float | None = None
+    values: dict[str, Any] = field(default_factory=dict)
+    setpoint: float | None = None
+    wanted: dict[str, Any] = field(default_factory=dict)
+    temperatures: Trend = field(default_factory=Trend)
+    link: Diagnosis | None = None
+    lamp: Diagnosis | None = None
+    action: Action | None = None
+
+    def state(self, now: float) -> State:
+        """Return what there is to say of it first."""
+        if self.gone_at is not None:
+            return State.GONE
+        if self.silence(now) > SILENCE:
+            return State.SILENT
+        if self.values.get('connected') is False:
+            return State.LOST
+        return {True: State.ON, False: State.OFF, None: State.UNKNOWN}[self.values.get('enabled')]
+
+    def silence(self, now: float) -> float:
+        """Return the s since anything came from it."""
+        return now - self.heard_at
+
+    def value(self, name: str) -> Any:
+        """Return the last value of a topic, None if there was none."""
+        return self.values.get(name)
+
+    @property
+    def flags(self) -> list[str]:
+        """Return the names of its error flags."""
+        return flag_names(self.values.get('error_flags') or 0)
+
+    @property
+    def level(self) -> int:
+        """Return the worst of what the diagnostics say of it."""
+        return max((one.level for one in (self.link, self.lamp) if one), default=0)
+
+
+class Fleet:
+    """All lights that have been seen, by name."""
+
+    def __init__(self) -> None:
+        self._lights: dict[str, Light] = {}
+
+    @property
+    def lights(self) -> list[Light]:
+        """Return the lights, sorted by their names."""
+        return [self._lights[name] for name in sorted(self._lights)]
+
+    def get(self, name: str | None) -> Light | None:
+        """Return a light, None if there is none of this name."""
+        return self._lights.get(name or '')
+
+    def seen(self, names: Iterable[str], now: float) -> list[str]:
+        """Take which lights are in the graph now; return the names of those that are new."""
+        present = set(names)
+        for light in self._lights.values():
+            if light.name in present:
+                if light.gone_at is not None:
+                    # Another bridge may serve it now, and have agreed on something else.
+                    light.gone_at = light.setpoint = None
+            elif light.gone_at is None:
+                light.gone_at = now
+        new = sorted(present - set(self._lights))[:MAX_LIGHTS - len(self._lights)]
+        for name in new:
+            self._lights[name] = Light(name, now)
+        return new
+
+    def clear_gone(self) -> list[str]:
+        """Forget the lights that are not in the graph any more, and return their names."""
+        gone = [light.name for light in self._lights.values() if light.gone_at is not None]
+        for name in gone:
+            del self._lights[name]
+        return gone
+
+    def take(self, name: str, topic: str, value: Any, now: float) -> None:
+        """Take a value that a light has published."""
+        light = self._lights.get(name)
+        if light is None:
+            return
+        light.heard_at = now
+        light.values[topic] = printable(value) if isinstance(value, str) else value
+        if topic == 'temperature' and math.isfinite(value):
+            light.temperatures.add(value, now)
+
+    def agreed(self, name: str, brightness: float) -> None:
+        """Take the brightness that a light's parameter has, %."""
+        light = self._lights.get(name)
+        if light is not None:
+            light.setpoint = brightness
+
+    def diagnosed(self, name: str, kind: str, diagnosis: Diagnosis, now: float) -> None:
+        """
+        Take a diagnosis.
+
+        :param kind: ``link`` or ``lamp``; others are passed over.
+        """
+        light = self._lights.get(name)
+        if light is None:
+            return
+        light.heard_at = now
+        clean = Diagnosis(diagnosis.level, printable(diagnosis.message), {
+            printable(key): printable(value) for key, value in diagnosis.values.items()})
+        if kind == 'link':
+            light.link = clean
+        elif kind == 'lamp':
+            light.lamp = clean
+
+    def acted(self, name: str, text: str, outcome: Outcome, answer: str, now: float) -> None:
+        """Note what has been asked of a light, and what has become of it."""
+        light = self._lights.get(name)
+        if light is not None:
+            light.action = Action(text, outcome, printable(answer), now)
+
+
+def printable(text: str) -> str:
+    """Return a text without what could do something to a terminal."""
+    return ''.join(c if c.isprintable() else ' ' for c in text)

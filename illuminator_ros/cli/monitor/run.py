@@ -1,0 +1,195 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The monitor as a process: command line, node, and what is shown until the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import copy
+import sys
+import threading
+import time
+from typing import Any
+import uuid
+
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from rich.console import Console
+from rich.live import Live
+
+from .graph import Graph
+from .keys import KeyDecoder
+from .model import Fleet, Light
+from .operator import Operator
+from .options import parser
+from .terminal import (
+    ESCAPE_TIMEOUT,
+    Keyboard,
+    quiet_errors,
+    suspend,
+    suspended_by,
+    unbuffered,
+    while_it_lasts,
+)
+from .view import plain, Scene, screen
+from ..program import discard_output, one_line
+from ..termination import Termination
+from ...ros.spinner import Spinner
+
+# s between pictures.
+INTERVAL = 0.25
+# s without a new light after which there are no more.
+SETTLING = 1.0
+# Characters: enough for every column of a table that nobody looks at on a terminal.
+PLAIN_WIDTH = 400
+
+
+class Monitor:
+    """
+    The lights as a node sees them, in a thread of its own.
+
+    :ivar clock: returns the time, s.
+    """
+
+    def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
+        self._fleet = Fleet()
+        self._lock = threading.Lock()
+        self.graph = Graph(node, self._fleet, self._lock, clock)
+        self._spinner = Spinner(node)
+        self._thread = threading.Thread(target=self._spinner.run, name='ros', daemon=True)
+        self._thread.start()
+
+    def lights(self) -> list[Light]:
+        """Return the lights as they are now."""
+        with self._lock:
+            return copy.deepcopy(self._fleet.lights)
+
+    def end(self) -> None:
+        """End the thread."""
+        self._spinner.end()
+        self._thread.join(0.3)
+
+
+def run(args: list[str] | None, termination: Termination) -> int:
+    """Run the monitor; see the text of ``--help``."""
+    arguments = sys.argv[1:] if args is None else args
+    try:
+        own = remove_ros_args(['monitor', *arguments])[1:]
+        options = parser().parse_args(own)
+        termination.calls(lambda: None)
+        rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        # There may be several, and they are not worth a place in anybody's log.
+        node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
+                    start_parameter_services=False)
+    except SystemExit as end:
+        return int(end.code or 0)
+    except Exception as error:
+        # rclpy has an exception of its own for each thing that can be wrong with an argument.
+        print(f'monitor: wrong ROS arguments: {one_line(error)}', file=sys.stderr)
+        return 2
+    monitor = Monitor(node)
+    console = Console(highlight=False)
+    interactive = (sys.stdin is not None and sys.stdin.isatty() and console.is_terminal
+                   and not console.is_dumb_terminal and not options.once)
+    try:
+        if interactive:
+            with while_it_lasts():
+                _watch(monitor, console, termination, ascii_only=options.ascii)
+            return 0
+        return _print_once(monitor, options, termination)
+    finally:
+        monitor.end()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _watch(
+    monitor: Monitor, console: Console, termination: Termination, *, ascii_only: bool,
+) -> None:
+    """Show the lights until somebody has had enough."""
+    operator = Operator(monitor.graph)
+    keyboard = Keyboard(sys.stdin.fileno())
+    decoder = KeyDecoder()
+    stopped = threading.Event()
+    ascii_only = ascii_only or console.options.ascii_only
+
+    def stop() -> None:
+        stopped.set()
+        keyboard.wake()
+
+    def end() -> None:
+        operator.quit = True
+        keyboard.wake()
+
+    while not operator.quit:
+        stopped.clear()
+        with (quiet_errors(), unbuffered(sys.stdin.fileno()) as restore, suspended_by(stop),
+              Live(console=console, screen=True, auto_refresh=False) as live):
+            termination.calls(end, last=restore)
+            while not (operator.quit or operator.stop or stopped.is_set()):
+                lights = monitor.lights()
+                operator.look(lights)
+                scene = Scene(lights, operator.selected, monitor.clock(), operator.show_help,
+                              ascii_only=ascii_only)
+                live.update(screen(scene, console.width, console.height), refresh=True)
+                data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
+                for key in decoder.feed(data):
+                    operator.press(key, lights, monitor.clock())
+        if not operator.quit:
+            suspend(job=operator.stop)
+            operator.stop = False
+    keyboard.close()
+
+
+def told(light: Light) -> bool:
+    """Return whether a light has said what there is to say of it."""
+    return light.link is not None and (
+        light.value('connected') is False or light.value('enabled') is not None)
+
+
+def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int:
+    """Print one table."""
+    ended = threading.Event()
+    termination.calls(ended.set)
+    lights = monitor.lights()
+    until = time.monotonic() + options.wait
+    # Lights are found one after the other, and tell of themselves in several messages.
+    complete_since = time.monotonic()
+    while not ended.wait(0.1) and time.monotonic() < min(until, complete_since + SETTLING):
+        before, lights = lights, monitor.lights()
+        if len(lights) != len(before) or not lights or not all(map(told, lights)):
+            complete_since = time.monotonic()
+    if not lights:
+        print('monitor: no lights found', file=sys.stderr)
+        return 1
+    console = Console(width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True)
+    status = 0
+    try:
+        with console.capture() as captured:
+            console.print(plain(Scene(lights, None, monitor.clock())))
+        for line in captured.get().splitlines():
+            print(line.rstrip())
+        sys.stdout.flush()
+    except OSError as error:
+        # Of a pipe, whoever reads has seen enough.
+        if not isinstance(error, BrokenPipeError):
+            print(f'monitor: standard output: {error.strerror}', file=sys.stderr)
+            status = 1
+        # The interpreter would say so again at its end.
+        discard_output()
+    return status

@@ -1,0 +1,153 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The terminal: keys one by one, nothing else written on it, and all as before at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import errno
+import functools
+import os
+import select
+import signal
+import sys
+import tempfile
+import termios
+import threading
+
+from ..program import discard_output
+
+# s after an escape in which what belongs to it must have come.
+ESCAPE_TIMEOUT = 0.05
+
+
+@contextlib.contextmanager
+def while_it_lasts() -> Iterator[None]:
+    """Leave what is in it without an error once the terminal is gone."""
+    try:
+        yield
+    except (OSError, termios.error) as error:
+        if error.args[0] != errno.EIO:
+            raise
+        # The interpreter would try at its end to write what is left.
+        discard_output()
+
+
+@contextlib.contextmanager
+def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
+    """
+    Have a terminal pass on each key at once, without showing it.
+
+    Yield what brings it back without waiting for what is still to be written, for an end by force.
+    """
+    before = termios.tcgetattr(descriptor)
+    changed = termios.tcgetattr(descriptor)
+    changed[3] &= ~(termios.ICANON | termios.ECHO)
+    changed[6][termios.VMIN], changed[6][termios.VTIME] = 1, 0
+    # Ctrl-\ and ctrl-z as signals would end or stop "ros2 run" at once, and the shell have the
+    # terminal before it is brought back.
+    changed[6][termios.VQUIT] = changed[6][termios.VSUSP] = b'\0'
+    try:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
+        yield functools.partial(termios.tcsetattr, descriptor, termios.TCSANOW, before)
+    finally:
+        # Blocked, it lets a terminal be set that the shell has taken back already.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTTOU])
+        # Or the terminal is gone.
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextlib.contextmanager
+def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
+    """Have ``on_stop()`` called instead of being stopped, by SIGTSTP."""
+    before = signal.signal(signal.SIGTSTP, lambda *_: on_stop())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTSTP, before)
+
+
+def suspend(job: bool) -> None:
+    """
+    Be stopped until a shell continues it; where none could, nothing happens.
+
+    :param job: stop the whole job, as ctrl-z does: "ros2 run", too.
+    """
+    if job:
+        before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        os.kill(0, signal.SIGTSTP)
+        signal.signal(signal.SIGTSTP, before)
+    # Not to the process: another thread would take it, and this one have the terminal meanwhile.
+    signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
+
+
+@contextlib.contextmanager
+def quiet_errors() -> Iterator[None]:
+    """Keep what the middleware writes to standard error off the screen, and show it afterwards."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield
+        finally:
+            sys.stderr.flush()
+            os.dup2(kept, 2)
+            os.close(kept)
+            file.seek(0)
+            while chunk := file.read(1 << 16):
+                os.write(2, chunk)
+
+
+class Keyboard:
+    """What is typed, and :meth:`wake` from other threads."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._woken, self._waker = os.pipe()
+        os.set_blocking(self._waker, False)
+
+    def close(self) -> None:
+        """Free what it uses."""
+        os.close(self._woken)
+        os.close(self._waker)
+
+    def wake(self) -> None:
+        """Have :meth:`read` return; callable from any thread."""
+        with contextlib.suppress(OSError):
+            os.write(self._waker, b'\0')
+
+    def read(self, timeout: float, on_end: Callable[[], None]) -> bytes:
+        """
+        Wait for keys and return what they send, b'' if none was pressed.
+
+        :param timeout: s.
+        :param on_end: called if the terminal is gone.
+        """
+        ready, _, _ = select.select([self._descriptor, self._woken], [], [], timeout)
+        if self._woken in ready:
+            os.read(self._woken, 4096)
+        if self._descriptor not in ready:
+            return b''
+        try:
+            data = os.read(self._descriptor, 4096)
+        except OSError:
+            data = b''
+        if not data:
+            on_end()
+        return data

@@ -1,0 +1,93 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the command lines of the executables without ROS have in common."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import time
+from typing import NoReturn
+
+from ..mavlink.messages import Address
+from ..mavlink.signing import Signing, SigningMode
+from ..mavlink.signing_files import keyed, TimestampStore
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says in one line what is wrong; the usage would bury it."""
+
+    def error(self, message: str) -> NoReturn:
+        """See :meth:`argparse.ArgumentParser.error`."""
+        self.exit(2, f'{self.prog}: {message}; see {self.prog} --help\n')
+
+
+def number(low: float, high: float) -> Callable[[str], float]:
+    """Return what reads a number of a range."""
+    def read(text: str) -> float:
+        value = float(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'{text} is outside {low:g} to {high:g}')
+        return value
+    read.__name__ = 'number'
+    return read
+
+
+def integer(low: int, high: int) -> Callable[[str], int]:
+    """Return what reads an integer of a range."""
+    def read(text: str) -> int:
+        value = int(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'{text} is outside {low} to {high}')
+        return value
+    read.__name__ = 'integer'
+    return read
+
+
+def address(text: str) -> Address:
+    """
+    Read ``SYSTEM/COMPONENT``.
+
+    :raises ValueError: if it is not that.
+    """
+    system, slash, component = text.partition('/')
+    if not (slash and system.isdecimal() and component.isdecimal()
+            and 1 <= int(system) <= 255 and int(component) <= 255):
+        raise ValueError(f'{text!r} is no address such as 1/243')
+    return Address(int(system), int(component))
+
+
+def add_signing(parser: argparse.ArgumentParser) -> None:
+    """Add the options of message signing."""
+    parser.add_argument('--signing-mode', choices=[mode.value for mode in SigningMode],
+                        default='off', help='MAVLink 2 message signing (default: off)')
+    parser.add_argument('--signing-key-file', default='', metavar='PATH',
+                        help='signing key: 32 bytes, 64 hex digits or a passphrase')
+
+
+def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampStore | None]:
+    """
+    Return what the options of message signing ask for.
+
+    :param name: whose time stamps are kept.
+    :raises ValueError: if a key is given and not used, which would look like protection.
+    :raises KeyFileError: if the key cannot be used.
+    """
+    mode = SigningMode(options.signing_mode)
+    if mode is SigningMode.OFF:
+        if options.signing_key_file:
+            raise ValueError('--signing-key-file is given, but --signing-mode is off')
+        return Signing(), None
+    return keyed(mode, options.signing_key_file, name, time.time())

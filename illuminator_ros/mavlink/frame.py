@@ -1,0 +1,275 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+MAVLink frames from and to bytes; no I/O and no clock.
+
+Reads MAVLink 1 and 2 and writes MAVLink 2 (MAVLink guide, "Packet Serialization"). A frame
+counts only when its checksum is right. After anything else the search goes on one byte later,
+never behind the length that a bad header claims: whatever stands between good frames, no good
+frame is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+import re
+
+from fastcrc.crc16 import mcrf4xx
+
+from .messages import Address, FOREIGN, HANDLED_IDS, Layout, LAYOUTS
+
+STX_V1 = 0xFE
+STX_V2 = 0xFD
+HEADER_V1 = 6
+HEADER_V2 = 10
+CHECKSUM = 2
+SIGNATURE = 13
+FLAG_SIGNED = 0x01
+MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
+
+STARTS = (b'\xfd', b'\xfe')
+# The sources whose foreign frames are passed over: what to call with the sequence number of each
+# one, by the two bytes that hold the address in a frame.
+Known = Mapping[bytes, Callable[[int], None]]
+NOBODY: Known = {}
+_START = re.compile(b'[\xfd\xfe]')
+
+
+@dataclass(slots=True)
+class Frame:
+    """
+    A frame whose checksum is right.
+
+    :param version: 1 or 2.
+    :param signature: the 13 bytes of a signed frame: link id, 6 bytes of time stamp, 6 bytes of
+        signature; None where it is not signed.
+    :param signed_part: the bytes that the signature covers before it, from STX to the checksum.
+    """
+
+    version: int
+    sequence: int
+    source: Address
+    message_id: int
+    payload: bytes
+    signature: bytes | None = None
+    signed_part: bytes = b''
+
+
+@dataclass(slots=True)
+class DecoderCounters:
+    """What a :class:`Decoder` has met: bytes and frames since it was made."""
+
+    frames: int = 0
+    crc_errors: int = 0
+    unknown_ids: int = 0
+    skipped_bytes: int = 0
+
+
+def encode_frame(
+    message_id: int, payload: bytes, *, sequence: int, source: Address, crc_extra: int,
+    signed: bool = False,
+) -> bytes:
+    """
+    Return a MAVLink 2 frame, without the signature that a signed one still needs.
+
+    :param payload: at most 255 bytes; its trailing zeros are cut, all but the first byte.
+    :param sequence: 0..255.
+    """
+    body = payload.rstrip(b'\0') or payload[:1]
+    frame = bytes((
+        STX_V2, len(body), FLAG_SIGNED if signed else 0, 0, sequence, source.system,
+        source.component, message_id & 0xFF, message_id >> 8 & 0xFF, message_id >> 16,
+    )) + body
+    checksum = mcrf4xx(frame[1:] + bytes((crc_extra,)))
+    return frame + checksum.to_bytes(CHECKSUM, 'little')
+
+
+@dataclass
+class Decoder:
+    """
+    Checked frames from a stream of bytes, in whatever pieces it comes.
+
+    Keeps at most one incomplete frame (:data:`MAX_FRAME` bytes). Frames with an id that is not
+    in ``layouts`` cannot be checked and are never returned.
+
+    :ivar taken: the bytes taken, which are the position in the stream.
+    """
+
+    layouts: Mapping[int, Layout] = field(default_factory=lambda: LAYOUTS)
+    counters: DecoderCounters = field(default_factory=DecoderCounters)
+    taken: int = 0
+    _rest: bytes = b''
+    # How much of the rest may be the signature of the frame before.
+    _signature_end: int = 0
+
+    @property
+    def incomplete(self) -> int | None:
+        """Where in the stream the frame begins whose rest is awaited, None if there is none."""
+        return self.taken - len(self._rest) if self._rest else None
+
+    def give_up(self, position: int) -> list[Frame]:
+        """Return the good frames behind beginnings before a position whose rest does not come."""
+        frames: list[Frame] = []
+        while self.incomplete is not None and self.incomplete < position:
+            rest, self._rest = self._rest[1:], b''
+            self._signature_end = max(self._signature_end - 1, 0)
+            self.taken -= len(rest)
+            self.counters.skipped_bytes += 1
+            frames += self.feed(rest)
+        return frames
+
+    def feed(self, data: bytes, known: Known = NOBODY) -> list[Frame]:
+        """
+        Return the frames that ``data`` completes, in order.
+
+        Foreign ones of known sources are checked, counted and passed over.
+        """
+        self.taken += len(data)
+        data = self._rest + data if self._rest else data
+        frames: list[Frame] = []
+        position = end = 0
+        signature_end = self._signature_end
+        while match := _START.search(data, position):
+            start = match.start()
+            if known and start >= signature_end:
+                passed = self._pass_over(data, start, known)
+                if passed > start:
+                    self.counters.skipped_bytes += start - end
+                    position = end = passed
+                    continue
+            found = self._read(data, start)
+            if found is None:
+                if start < signature_end and self._is_frame(data, signature_end):
+                    # The signature was whole, and only looks like the beginning of a frame.
+                    position = signature_end
+                    continue
+                break
+            size, frame = found
+            if frame is None:
+                position = start + 1
+                continue
+            frames.append(frame)
+            self.counters.skipped_bytes += start - end
+            position = end = start + size
+            if frame.signature is not None:
+                # The checksum does not cover the signature. Where that was cut short, what looks
+                # like its end is the beginning of the next frame.
+                within = data.find(STX_V2, end - SIGNATURE, end)
+                position = within if within >= 0 else end
+                signature_end = end
+        else:
+            start = len(data)
+        self.counters.frames += len(frames)
+        self.counters.skipped_bytes += start - end
+        self._rest = data[start:]
+        self._signature_end = max(signature_end - start, 0)
+        return frames
+
+    def _pass_over(self, data: bytes, start: int, known: Known) -> int:
+        """
+        Pass over whole, unsigned and foreign frames of known sources, if they are good.
+
+        Most of what a busy link carries is of this kind, so it is made nothing of. What cannot be
+        checked, since its id is unknown, is searched for a beginning as everywhere.
+
+        :param start: where a frame may begin.
+        :return: where something else begins.
+        """
+        size = len(data)
+        passed = 0
+        while (start_of_payload := start + HEADER_V2) < size and data[start] == STX_V2:
+            id_ = data[start + 7:start_of_payload]
+            crc_extra = FOREIGN.get(id_)
+            if crc_extra is None:
+                if id_ in HANDLED_IDS:
+                    break
+                match = _START.search(data, start + 1)
+                begin = match.start() if match else size
+                self.counters.unknown_ids += 1
+                self.counters.skipped_bytes += begin - start
+                start = begin
+                continue
+            count = known.get(data[start + 5:start + 7])
+            end = start_of_payload + CHECKSUM + data[start + 1]
+            if (count is None or data[start + 2] or end > size
+                    or mcrf4xx(data[start + 1:end - CHECKSUM] + crc_extra)
+                    != data[end - 2] | data[end - 1] << 8):
+                break
+            count(data[start + 4])
+            passed += 1
+            start = end
+        self.counters.frames += passed
+        return start
+
+    def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""
+        if data[start] == STX_V2:
+            return self._read_v2(data, start)
+        return self._read_v1(data, start)
+
+    def _is_frame(self, data: bytes, start: int) -> bool:
+        """Return whether a whole and good frame begins here."""
+        found = self._read(data, start) if data[start:start + 1] in STARTS else None
+        return found is not None and found[1] is not None
+
+    def _read_v2(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        if len(data) - start < HEADER_V2:
+            return None
+        length, flags, _, sequence, system, component = data[start + 1:start + 7]
+        message_id = int.from_bytes(data[start + 7:start + HEADER_V2], 'little')
+        layout = self.layouts.get(message_id)
+        # "Incompatibility flags": a frame with a flag that is not understood must be dropped.
+        if layout is None or flags & ~FLAG_SIGNED:
+            self.counters.unknown_ids += layout is None
+            return 1, None
+        end = start + HEADER_V2 + length + CHECKSUM
+        size = end - start + (SIGNATURE if flags & FLAG_SIGNED else 0)
+        if len(data) < start + size:
+            return None
+        if not self._checksum_right(data, start, end, layout.crc_extra):
+            return 1, None
+        frame = Frame(
+            2, sequence, Address(system, component), message_id,
+            data[start + HEADER_V2:end - CHECKSUM])
+        if flags & FLAG_SIGNED:
+            frame.signature = data[end:start + size]
+            frame.signed_part = data[start:end]
+        return size, frame
+
+    def _read_v1(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        if len(data) - start < HEADER_V1:
+            return None
+        length, sequence, system, component, message_id = data[start + 1:start + HEADER_V1]
+        layout = self.layouts.get(message_id)
+        # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting
+        # for the rest of it would hold back the good frames behind.
+        if layout is None or length > layout.size:
+            self.counters.unknown_ids += layout is None
+            return 1, None
+        end = start + HEADER_V1 + length + CHECKSUM
+        if len(data) < end:
+            return None
+        if not self._checksum_right(data, start, end, layout.crc_extra):
+            return 1, None
+        return end - start, Frame(
+            1, sequence, Address(system, component), message_id,
+            data[start + HEADER_V1:end - CHECKSUM])
+
+    def _checksum_right(self, data: bytes, start: int, end: int, crc_extra: int) -> bool:
+        body = data[start + 1:end - CHECKSUM] + bytes((crc_extra,))
+        right = mcrf4xx(body) == int.from_bytes(data[end - CHECKSUM:end], 'little')
+        self.counters.crc_errors += not right
+        return right

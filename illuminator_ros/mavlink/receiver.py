@@ -1,0 +1,152 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Believed frames from the bytes of many peers; no I/O, and time is passed in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+from .frame import Decoder, DecoderCounters, Frame
+from .messages import Address
+from .signing import Signing, SigningMode
+from .transport import Peer
+
+# Peers whose incomplete frames are kept apart.
+MAX_DECODERS = 64
+# s; the longest frame takes 0.3 s at 9600 baud. What has not come by then is no frame but noise
+# that looks like the beginning of one, and good frames are held back behind it.
+STALL = 0.5
+# s after which the first frame of each source is looked at again as if it were not known: routes
+# and peers live on what is seen of it.
+RENEWAL = 0.5
+
+
+class _Wait(NamedTuple):
+    """For the rest of a frame: where it begins, what had come of the stream, and when (s)."""
+
+    start: int
+    taken: int
+    since: float
+
+
+class _Stream:
+    """What comes from one peer."""
+
+    def __init__(self, counters: DecoderCounters) -> None:
+        self.decoder = Decoder(counters=counters)
+        self.known: dict[bytes, Callable[[int], None]] = {}
+        self.renewal = 0.0
+        # Whether anything to be believed has ever come.
+        self.good = False
+
+
+class Reception:
+    """
+    The way in of a link: framing and signing.
+
+    :ivar counters: what was met, over all peers and since it was made.
+    """
+
+    def __init__(self, signing: Signing) -> None:
+        self.counters = DecoderCounters()
+        self._signing = signing
+        self._streams: dict[Peer, _Stream] = {}
+        self._waits: dict[Peer, _Wait] = {}
+
+    def __len__(self) -> int:
+        return len(self._streams)
+
+    def take(self, peer: Peer, data: bytes, now: float, unix_time: float) -> list[Frame]:
+        """
+        Return the frames that bytes of a peer complete and that are to be believed.
+
+        Foreign ones of sources that are known on this peer are only counted.
+        """
+        stream = self._streams.get(peer)
+        if stream is None:
+            stream = self._new_stream(peer)
+        if now >= stream.renewal:
+            stream.renewal = now + RENEWAL
+            stream.known.clear()
+        decoder = stream.decoder
+        frames = decoder.feed(data, stream.known)
+        if decoder.incomplete is not None or self._waits:
+            self._watch(peer, decoder, now)
+        if frames:
+            frames = self._believed(frames, unix_time)
+            stream.good = stream.good or bool(frames)
+        return frames
+
+    def _new_stream(self, peer: Peer) -> _Stream:
+        if len(self._streams) >= MAX_DECODERS:
+            # Garbage from ever new ports takes nothing from those that send good frames.
+            oldest = next((old for old, stream in self._streams.items() if not stream.good),
+                          next(iter(self._streams)))
+            del self._streams[oldest]
+            self._waits.pop(oldest, None)
+        self._streams[peer] = stream = _Stream(self.counters)
+        return stream
+
+    def know(self, peer: Peer, source: Address, count: Callable[[int], None]) -> None:
+        """
+        Have foreign frames of a source on a peer counted for a while, and nothing more.
+
+        Where signatures matter it changes nothing: each frame is then looked at.
+
+        :param count: called with the sequence number of each.
+        """
+        stream = self._streams.get(peer)
+        if stream is not None and self._signing.mode is SigningMode.OFF:
+            stream.known[bytes(source)] = count
+
+    def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
+        start = decoder.incomplete
+        if start is None:
+            self._waits.pop(peer, None)
+        elif peer not in self._waits or self._waits[peer].start != start:
+            self._waits[peer] = _Wait(start, decoder.taken, now)
+
+    def give_up(self, now: float, unix_time: float) -> list[tuple[Peer, Frame]]:
+        """
+        Return the frames behind what looked like the beginning of one for too long.
+
+        What has come since may be the beginning of a good one, and is waited for.
+        """
+        if now < self.next_deadline():
+            return []
+        found = []
+        for peer, wait in list(self._waits.items()):
+            if now >= wait.since + STALL:
+                decoder = self._streams[peer].decoder
+                frames = decoder.give_up(wait.taken)
+                self._watch(peer, decoder, now)
+                found += [(peer, frame) for frame in self._believed(frames, unix_time)]
+        return found
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`give_up` has something to do, infinity if never."""
+        if not self._waits:
+            return math.inf
+        return min(wait.since for wait in self._waits.values()) + STALL
+
+    def clear(self) -> None:
+        """Forget what is incomplete: the link is closed."""
+        self._streams.clear()
+        self._waits.clear()
+
+    def _believed(self, frames: list[Frame], unix_time: float) -> list[Frame]:
+        return [frame for frame in frames if self._signing.accepts(frame, unix_time)]
