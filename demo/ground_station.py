@@ -20,7 +20,7 @@ import math
 import threading
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, Outcome
+from illuminator_ros.mavlink.command import Command, CommandResult
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link
@@ -37,20 +37,20 @@ class GroundStation(Endpoint):
     def __init__(self, url: str) -> None:
         super().__init__()
         self._heartbeat = Heartbeat(IDENTITY, MAV_TYPE_GCS)
-        self._sender = CommandSender(
-            lambda message: self.outgoing.append((IDENTITY, message)), IDENTITY)
+        self._sender = CommandSender(IDENTITY)
+        self.outgoing = self._sender.outgoing
         self._link = Link(parse_url(url), self, label=url)
         self._link.start()
 
     def configure(self, target: Address, mode: int, brightness: float, period: float,
-                  duty: float, timeout: float = 5.0) -> Outcome:
+                  duty: float, timeout: float = 5.0) -> CommandResult:
         """Send MAV_CMD_DO_ILLUMINATOR_CONFIGURE and return its outcome."""
         command = Command(
             target, MavCmd.DO_ILLUMINATOR_CONFIGURE, (mode, brightness, period, duty))
-        outcomes: list[Outcome] = []
+        outcomes: list[CommandResult] = []
         ended = threading.Event()
 
-        def done(outcome: Outcome, now: float) -> None:
+        def done(outcome: CommandResult, now: float) -> None:
             outcomes.append(outcome)
             ended.set()
 

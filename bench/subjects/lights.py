@@ -28,7 +28,6 @@ import socket
 import time
 from typing import Any
 
-from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.observer import LightObserver
@@ -43,6 +42,7 @@ from illuminator_ros.mavlink.messages import (
     MavType,
 )
 from illuminator_ros.mavlink.url import parse_url
+from support.client import Client
 
 from ..rig import Bench, free_port, interleaved, PATIENCE, simulator
 from ..rows import at_most, one, Row, Target
@@ -85,7 +85,7 @@ def listening(port: int, **options: Any) -> Iterator[tuple[Link, Watcher]]:
         light.observer = watcher
 
     link = Link(parse_url(f'udpin://127.0.0.1:{port}'),
-                Controller(Address(1, 194), Settings(), on_light=found, **options), label='')
+                Client(Address(1, 194), Settings(), on_light=found, **options), label='')
     link.start()
     until = time.monotonic() + PATIENCE
     while not link.state().is_open and time.monotonic() < until:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ending a process in order, and in time, on SIGINT, SIGTERM and SIGHUP."""
+"""CommandStatus a process in order, and in time, on SIGINT, SIGTERM and SIGHUP."""
 
 from __future__ import annotations
 

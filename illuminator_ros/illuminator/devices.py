@@ -22,7 +22,7 @@ from typing import Any
 from .device import Device
 from .device_properties import DeviceProperties
 from ..mavlink.component import Endpoint
-from ..mavlink.deadline_queue import Agenda
+from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import Address, CommandInt, CommandLong
 
 
@@ -32,7 +32,7 @@ class Devices(Endpoint):
     def __init__(self, properties: list[DeviceProperties], now: float) -> None:
         super().__init__()
         self.devices = [Device(one, now, self.outgoing) for one in properties]
-        self._agenda: Agenda[int] = Agenda()
+        self._agenda: DeadlineQueue[int] = DeadlineQueue()
         for index, device in enumerate(self.devices):
             device.changed = functools.partial(self._schedule, index)
             device.changed()

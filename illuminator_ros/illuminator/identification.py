@@ -21,7 +21,7 @@ import math
 from typing import TYPE_CHECKING
 
 from .identity import Identity
-from ..mavlink.command import Command, Ending, Outcome
+from ..mavlink.command import Command, CommandResult, CommandStatus
 from ..mavlink.messages import INFORMATION_ID, MavCmd, result_name
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Identification:
         self.identity = identity
         self._finish('', now)
 
-    def _answered(self, outcome: Outcome, now: float) -> None:
+    def _answered(self, outcome: CommandResult, now: float) -> None:
         if not self._asking:
             return
         if self._gives_way:
@@ -108,7 +108,7 @@ class Identification:
             return
         if outcome.accepted:
             self._message_until = now + MESSAGE_TIMEOUT
-        elif outcome.ending is Ending.ANSWERED and outcome.result is not None:
+        elif outcome.ending is CommandStatus.ANSWERED and outcome.result is not None:
             self._finish(f'refused: {result_name(outcome.result)}', now)
         else:
             self._finish(outcome.verdict, now)

@@ -32,7 +32,7 @@ from .operation_queue import OperationQueue
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
-from ..mavlink.command import Command, Ending, format_seconds, Outcome
+from ..mavlink.command import Command, CommandResult, CommandStatus, format_seconds
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.messages import Address, MavCmd, STATUS_ID
 
@@ -216,7 +216,7 @@ class Light:
         """End all requests, so that the next one is sent at once: a node's last to its light."""
         self._switching.cancel(now)
         self.agreement.cancel(now)
-        self.sender.end_all(now, Ending.CANCELLED, self.source)
+        self.sender.end_all(now, CommandStatus.CANCELLED, self.source)
         self.changed()
 
     def refresh(self, now: float, done: Done) -> None:
@@ -227,8 +227,9 @@ class Light:
         self._refreshes.append(Refresh(self, now, done))
         self.changed()
 
-    def request_status(self, now: float, done: Callable[[Outcome, float], None] | None = None,
-                       ) -> None:
+    def request_status(
+        self, now: float, done: Callable[[CommandResult, float], None] | None = None,
+    ) -> None:
         """Ask for a status; without ``done`` only where no question is under way already."""
         if done is None and self.sender.pending(self.source, MavCmd.REQUEST_MESSAGE):
             return

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 from .error_flags import DIMMING_FLAGS, flag_names
 from .model import Status
-from ..mavlink.command import Command, Ending, format_seconds, Outcome
+from ..mavlink.command import Command, CommandResult, CommandStatus, format_seconds
 from ..mavlink.messages import MavResult
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Operation(ABC):
         self._done = done
         self._submitted = now
         self._started = math.inf
-        self._outcome: Outcome | None = None
+        self._outcome: CommandResult | None = None
         self._contradiction: Status | None = None
         self._outdated = False
         # Statuses in a row that show the change.
@@ -135,12 +135,12 @@ class Operation(ABC):
             self._started = now
             self.light.sender.start(self.command(), now, self._answered, limit=self.limit)
 
-    def _answered(self, outcome: Outcome, now: float) -> None:
+    def _answered(self, outcome: CommandResult, now: float) -> None:
         if not outcome.accepted:
-            refused = 'refused: ' if outcome.ending is Ending.ANSWERED else ''
+            refused = 'refused: ' if outcome.ending is CommandStatus.ANSWERED else ''
             self._finish(Result(
                 False, f'{refused}{outcome.verdict} ({outcome.spent(now - self._submitted)})',
-                outcome.ending is Ending.ANSWERED and outcome.result in _PERMANENT), now)
+                outcome.ending is CommandStatus.ANSWERED and outcome.result in _PERMANENT), now)
             return
         self._outcome = outcome
         self._accepted_at = now

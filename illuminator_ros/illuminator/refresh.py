@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .operation import Done, Result
-from ..mavlink.command import format_seconds, Outcome
+from ..mavlink.command import CommandResult, format_seconds
 
 if TYPE_CHECKING:
     from .light import Light
@@ -54,7 +54,7 @@ class Refresh:
         self._identity = failure
         self._check(now)
 
-    def _answered(self, outcome: Outcome, now: float) -> None:
+    def _answered(self, outcome: CommandResult, now: float) -> None:
         if not outcome.accepted and self._status is None:
             self._status = outcome.verdict
             self._check(now)

@@ -23,7 +23,7 @@ from enum import Enum
 from .messages import Address, MavResult, result_name
 
 
-class Ending(Enum):
+class CommandStatus(Enum):
     """How a command ended. Each ends in exactly one of these."""
 
     ANSWERED = 'answered'
@@ -56,7 +56,7 @@ class Command:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CommandResult:
     """
     The one outcome of a command.
 
@@ -66,7 +66,7 @@ class Outcome:
     :param progress: %, the last that was reported, None where unknown.
     """
 
-    ending: Ending
+    ending: CommandStatus
     result: int | None = None
     tries: int = 0
     elapsed: float = 0.0
@@ -76,12 +76,12 @@ class Outcome:
     @property
     def accepted(self) -> bool:
         """Whether the target acknowledged with MAV_RESULT_ACCEPTED."""
-        return self.ending is Ending.ANSWERED and self.result == MavResult.ACCEPTED
+        return self.ending is CommandStatus.ANSWERED and self.result == MavResult.ACCEPTED
 
     @property
     def verdict(self) -> str:
         """Return what happened, for people, with the name of the MAV_RESULT."""
-        if self.ending is Ending.ANSWERED and self.result is not None:
+        if self.ending is CommandStatus.ANSWERED and self.result is not None:
             return result_name(self.result)
         last = '' if self.result is None else f', last answer {result_name(self.result)}'
         if self.progress is not None:
@@ -98,12 +98,12 @@ class Outcome:
 
 
 _ENDINGS = {
-    Ending.NO_ANSWER: 'no acknowledgement',
-    Ending.PROGRESS_STOPPED: 'no final acknowledgement',
-    Ending.OUT_OF_TIME: 'not finished in time',
-    Ending.LINK_LOST: 'the link was lost',
-    Ending.CANCELLED: 'cancelled',
-    Ending.REFUSED_LOCALLY: 'too many commands are waiting for this component',
+    CommandStatus.NO_ANSWER: 'no acknowledgement',
+    CommandStatus.PROGRESS_STOPPED: 'no final acknowledgement',
+    CommandStatus.OUT_OF_TIME: 'not finished in time',
+    CommandStatus.LINK_LOST: 'the link was lost',
+    CommandStatus.CANCELLED: 'cancelled',
+    CommandStatus.REFUSED_LOCALLY: 'too many commands are waiting for this component',
 }
 
 
@@ -117,4 +117,4 @@ def format_seconds(seconds: float) -> str:
     return f'{seconds * 1000:.0f} ms' if seconds < 0.9995 else f'{seconds:.2f} s'
 
 
-Done = Callable[[Outcome, float], None]
+Done = Callable[[CommandResult, float], None]

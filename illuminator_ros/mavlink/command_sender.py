@@ -24,14 +24,13 @@ nothing but the command.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 from typing import Any
 
-from .command import Command, Done, Ending, Outcome
+from .command import Command, CommandResult, CommandStatus, Done
 from .messages import Address, CommandInt, CommandLong, MavResult
-from .round_trip import RoundTrip
+from .round_trip import RttEstimator
 
 # Between two reports of progress. The specification leaves it open; MAVSDK also takes 3 s.
 PROGRESS_TIMEOUT = 3.0
@@ -74,29 +73,33 @@ class CommandSender:
     """
     Sends commands to any number of components, in parallel across them.
 
-    :param send: takes each message that is to go out.
-    :param identity: our own address, which acknowledgements are matched against.
+    :param address: our own address, which acknowledgements are matched against.
     :param timeout: s, > 0: the longest wait for the acknowledgement of one try.
     :param retries: resends after the first try, >= 0.
+    :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command went without any acknowledgement.
     :raises ValueError: if one of the two is out of its range.
     """
 
-    send: Callable[[Any], None]
-    identity: Address
+    address: Address
     timeout: float = 0.5
     retries: int = 3
+    outgoing: deque[tuple[Address, Any]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: set[Address] = field(default_factory=set)
     _active: dict[tuple[Address, int], _Entry] = field(default_factory=dict)
     _waiting: dict[tuple[Address, int], deque[_Entry]] = field(default_factory=dict)
-    _round_trips: dict[Address, RoundTrip] = field(default_factory=dict)
+    _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.timeout) and self.timeout > 0):
             raise ValueError(f'timeout {self.timeout} s is not above 0')
         if self.retries < 0:
             raise ValueError(f'retries {self.retries} is below 0')
+
+    def send(self, message: Any) -> None:
+        """Send a message that is not a command from our address."""
+        self.outgoing.append((self.address, message))
 
     def start(self, command: Command, now: float, done: Done, *, limit: float = math.inf) -> None:
         """
@@ -107,11 +110,11 @@ class CommandSender:
         """
         entry = _Entry(command, done, limit)
         if now >= limit:
-            done(Outcome(Ending.OUT_OF_TIME), now)
+            done(CommandResult(CommandStatus.OUT_OF_TIME), now)
         elif command.key in self._active:
             waiting = self._waiting.setdefault(command.key, deque())
             if len(waiting) >= MAX_WAITING:
-                done(Outcome(Ending.REFUSED_LOCALLY), now)
+                done(CommandResult(CommandStatus.REFUSED_LOCALLY), now)
             else:
                 waiting.append(entry)
         else:
@@ -125,11 +128,11 @@ class CommandSender:
         """End a command that is under way, if it is; one of its kind that waits goes out."""
         entry = self._active.get(command.key)
         if entry is not None and entry.command is command:
-            self._end(entry, Ending.CANCELLED, now)
+            self._end(entry, CommandStatus.CANCELLED, now)
 
-    def round_trip(self, target: Address) -> RoundTrip:
+    def round_trip(self, target: Address) -> RttEstimator:
         """Return the round-trip times of a target's acknowledgements."""
-        return self._round_trips.setdefault(target, RoundTrip())
+        return self._round_trips.setdefault(target, RttEstimator())
 
     def acknowledge(self, source: Address, ack: Any, now: float) -> None:
         """
@@ -138,7 +141,7 @@ class CommandSender:
         It counts where source and command match what is under way and it is addressed to us or,
         as the extension fields may be missing, to nobody (target 0).
         """
-        ours = self.identity
+        ours = self.address
         entry = self._active.get((source, ack.command))
         if (ack.target_system not in (0, ours.system)
                 or ack.target_component not in (0, ours.component)):
@@ -163,15 +166,15 @@ class CommandSender:
             entry.rejected += 1
             if entry.due >= min(entry.deadline, entry.limit):
                 # A try that was never answered may be what keeps the target busy.
-                self._end(entry, Ending.ANSWERED if entry.rejected == entry.tries
-                          else Ending.OUT_OF_TIME, now)
+                self._end(entry, CommandStatus.ANSWERED if entry.rejected == entry.tries
+                          else CommandStatus.OUT_OF_TIME, now)
         elif (ack.result == MavResult.COMMAND_INT_ONLY and not entry.in_progress
                 and now < entry.limit):
             entry.as_int = True
             entry.rejected += 1
             self._transmit(entry, now)
         else:
-            self._end(entry, Ending.ANSWERED, now, ack.result_param2)
+            self._end(entry, CommandStatus.ANSWERED, now, ack.result_param2)
 
     def _answers_another_try(self, entry: _Entry, result: int) -> bool:
         """
@@ -192,19 +195,19 @@ class CommandSender:
             if self._active.get(entry.command.key) is not entry:
                 continue
             if now >= entry.limit:
-                self._end(entry, Ending.OUT_OF_TIME if entry.in_progress or entry.rejected
-                          else Ending.NO_ANSWER, now)
+                self._end(entry, CommandStatus.OUT_OF_TIME if entry.in_progress or entry.rejected
+                          else CommandStatus.NO_ANSWER, now)
             elif now >= entry.due:
                 self._overdue(entry, now)
         for waiting in list(self._waiting.values()):
             for entry in [entry for entry in waiting if now >= entry.limit]:
-                self._end(entry, Ending.OUT_OF_TIME, now)
+                self._end(entry, CommandStatus.OUT_OF_TIME, now)
 
     def _overdue(self, entry: _Entry, now: float) -> None:
         if entry.in_progress:
-            self._end(entry, Ending.PROGRESS_STOPPED, now)
+            self._end(entry, CommandStatus.PROGRESS_STOPPED, now)
         elif entry.tries - entry.rejected > self.retries or now >= entry.deadline:
-            self._end(entry, Ending.NO_ANSWER, now)
+            self._end(entry, CommandStatus.NO_ANSWER, now)
         else:
             self._transmit(entry, now)
 
@@ -214,7 +217,7 @@ class CommandSender:
         times += [entry.limit for waiting in self._waiting.values() for entry in waiting]
         return min(times, default=math.inf)
 
-    def end_all(self, now: float, ending: Ending, target: Address | None = None) -> None:
+    def end_all(self, now: float, ending: CommandStatus, target: Address | None = None) -> None:
         """End what is under way or waiting, to one target or to all."""
         for queue in [*self._waiting.values(), deque(self._active.values())]:
             for entry in list(queue):
@@ -237,7 +240,9 @@ class CommandSender:
         entry.due = now + min(timeout * 2 ** min(max(lost, 0), 16), self.timeout)
         self.send(_message(entry))
 
-    def _end(self, entry: _Entry, ending: Ending, now: float, result_param2: int = 0) -> None:
+    def _end(
+        self, entry: _Entry, ending: CommandStatus, now: float, result_param2: int = 0,
+    ) -> None:
         key = entry.command.key
         waiting = self._waiting.get(key)
         if self._active.get(key) is not entry:
@@ -246,7 +251,7 @@ class CommandSender:
             waiting.remove(entry)
             if not waiting:
                 del self._waiting[key]
-            entry.done(Outcome(ending), now)
+            entry.done(CommandResult(ending), now)
             return
         del self._active[key]
         late = []
@@ -258,14 +263,14 @@ class CommandSender:
                 late.append(following)
         if not waiting:
             self._waiting.pop(key, None)
-        if ending is Ending.NO_ANSWER:
+        if ending is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering.add(entry.command.target)
-        entry.done(Outcome(
+        entry.done(CommandResult(
             ending, entry.result, entry.tries, now - entry.first_sent, entry.progress,
             result_param2), now)
         for other in late:
-            other.done(Outcome(Ending.OUT_OF_TIME), now)
+            other.done(CommandResult(CommandStatus.OUT_OF_TIME), now)
 
 
 def _message(entry: _Entry) -> Any:

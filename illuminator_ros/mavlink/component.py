@@ -12,27 +12,33 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What speaks over a link: messages in, messages out, time passed in."""
+"""A MAVLink component: one address, one heartbeat, one command sender, any number of payloads."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import Any
+from collections.abc import Sequence
+import math
+from typing import Any, Protocol
 
-from .messages import Address, heartbeat
+from .command import CommandStatus
+from .command_sender import CommandSender
+from .messages import Address, CommandAck, heartbeat, MavType
 
-# s; heartbeat protocol: "usually 1 Hz".
+# s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0
+# s for which a message from our own address counts as an address conflict.
+CONFLICT_MEMORY = 10.0
 
 
 class Endpoint(ABC):
     """
-    One side of a protocol, without I/O.
+    One side of a protocol, without I/O; times are s on the link's clock.
 
-    A :class:`~.link.Link` calls it from its one thread and sends what it leaves in ``outgoing``.
+    A :class:`~.link.Link` calls it from its thread only and sends what it leaves in ``outgoing``.
 
-    :ivar outgoing: messages to send, each with the address that it is sent from.
+    :ivar outgoing: messages to send, each with the address that sends it.
     """
 
     def __init__(self) -> None:
@@ -41,13 +47,13 @@ class Endpoint(ABC):
     @abstractmethod
     def link_opened(self, now: float) -> None:
         """
-        Note that messages can be sent, or that somebody may have come within hearing.
+        Note that messages can be sent, or that a new peer may hear us.
 
-        It comes again and again while nobody is heard.
+        The link repeats the call while it hears no peer.
         """
 
-    def link_closed(self, now: float) -> None:  # noqa: B027 - not everybody cares
-        """Note that nothing can be sent any more."""
+    def link_closed(self, now: float, reason: str) -> None:  # noqa: B027 - optional
+        """Note that nothing can be sent any more, and why."""
 
     @abstractmethod
     def receive(self, source: Address, message: Any, now: float) -> None:
@@ -55,31 +61,122 @@ class Endpoint(ABC):
 
     @abstractmethod
     def poll(self, now: float) -> None:
-        """Do what is due."""
+        """Do everything that is due."""
 
     @abstractmethod
     def next_deadline(self) -> float:
-        """Return the time at which :meth:`poll` has something to do, infinity if never."""
+        """Return when :meth:`poll` is due, infinity if never."""
+
+
+class Payload(Protocol):
+    """What a component carries: the client of a light, a winch, a camera ..."""
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Endpoint.link_opened`."""
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Endpoint.link_closed`; all commands have ended by then."""
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        """Take a message from another address; COMMAND_ACK goes to the command sender instead."""
+
+    def poll(self, now: float) -> None:
+        """Do everything that is due."""
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
 
 
 class Heartbeat:
     """
     The heartbeat of one component (heartbeat protocol).
 
-    It goes out before anything else, since routers forward nothing to whom they have not heard.
+    It must be sent before anything else: routers forward nothing to a component that they have
+    not heard.
+
+    :ivar due: when the next one is sent, s.
     """
 
-    def __init__(self, source: Address, mav_type: int) -> None:
-        self.source = source
+    def __init__(self, address: Address, mav_type: int) -> None:
+        self.address = address
         self.mav_type = mav_type
         self.due = 0.0
 
     def poll(self, now: float, outgoing: deque[tuple[Address, Any]]) -> None:
-        """Append a heartbeat if one is due."""
+        """Send a heartbeat if one is due."""
         if now >= self.due:
             self.send(now, outgoing)
 
     def send(self, now: float, outgoing: deque[tuple[Address, Any]]) -> None:
-        """Append a heartbeat at once; the next is due an interval later."""
-        outgoing.append((self.source, heartbeat(self.mav_type)))
+        """Send a heartbeat now; the next is due an interval later."""
+        outgoing.append((self.address, heartbeat(self.mav_type)))
         self.due = now + HEARTBEAT_INTERVAL
+
+
+class Component(Endpoint):
+    """
+    The endpoint of one address.
+
+    :param commands: sends for all payloads, so that an acknowledgement has one receiver.
+    :param payloads: get each message from another address, and the link's state.
+    :param mav_type: MAV_TYPE of the heartbeat.
+    """
+
+    def __init__(
+        self, commands: CommandSender, payloads: Sequence[Payload], *,
+        mav_type: int = MavType.ONBOARD_CONTROLLER,
+    ) -> None:
+        self.outgoing = commands.outgoing
+        self.commands = commands
+        self.address = commands.address
+        self._payloads = tuple(payloads)
+        self._heartbeat = Heartbeat(self.address, mav_type)
+        self._link_open = False
+        self._conflict_at = -math.inf
+
+    def address_conflict(self, now: float) -> bool:
+        """Return whether another sender has lately used our address."""
+        return now - self._conflict_at < CONFLICT_MEMORY
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Endpoint.link_opened`."""
+        self._link_open = True
+        self._heartbeat.send(now, self.outgoing)
+        for payload in self._payloads:
+            payload.link_opened(now)
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Endpoint.link_closed`."""
+        self._link_open = False
+        self.commands.end_all(now, CommandStatus.LINK_LOST)
+        for payload in self._payloads:
+            payload.link_closed(now, reason)
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        """See :meth:`Endpoint.receive`."""
+        if not source.system:
+            # A component with system id 0 cannot be addressed: 0 is the broadcast address.
+            return
+        if source == self.address:
+            # The link has dropped our own frames that came back.
+            self._conflict_at = now
+            return
+        if isinstance(message, CommandAck):
+            self.commands.acknowledge(source, message, now)
+        for payload in self._payloads:
+            payload.receive(source, message, now)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Endpoint.poll`."""
+        if self._link_open:
+            self._heartbeat.poll(now, self.outgoing)
+        if now >= self.commands.next_deadline():
+            self.commands.poll(now)
+        for payload in self._payloads:
+            payload.poll(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Endpoint.next_deadline`."""
+        heartbeat = self._heartbeat.due if self._link_open else math.inf
+        return min(heartbeat, self.commands.next_deadline(),
+                   *(payload.next_deadline() for payload in self._payloads))

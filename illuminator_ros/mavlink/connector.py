@@ -70,7 +70,7 @@ class Backoff:
         return min(pause, max(LONGEST_PERIOD - spent, FIRST_PAUSE))
 
 
-class Opener:
+class Connector:
     """
     Tries to open a connection URL in a thread that ends when it has succeeded.
 

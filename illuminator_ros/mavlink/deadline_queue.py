@@ -25,7 +25,7 @@ from typing import Generic, TypeVar
 K = TypeVar('K', bound=Hashable)
 
 
-class Agenda(Generic[K]):
+class DeadlineQueue(Generic[K]):
     """
     The next deadline of each of many keys.
 

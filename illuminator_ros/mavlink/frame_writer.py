@@ -20,12 +20,12 @@ import random
 from typing import Any
 
 from .frame import encode_frame, Frame
-from .loopback_filter import Echoes
+from .loopback_filter import LoopbackFilter
 from .messages import Address, encode_payload
 from .signing import Signing
 
 
-class Departure:
+class FrameWriter:
     """
     Makes frames of messages, and recognises them when they come back.
 
@@ -35,7 +35,7 @@ class Departure:
     def __init__(self, signing: Signing) -> None:
         self.sequences: dict[Address, int] = {}
         self._signing = signing
-        self._echoes = Echoes()
+        self._echoes = LoopbackFilter()
 
     def frame(self, source: Address, message: Any, now: float, unix_time: float) -> bytes:
         """Return a message as it goes on the wire."""

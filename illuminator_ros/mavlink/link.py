@@ -25,14 +25,14 @@ import time
 from typing import Any
 
 from .component import Endpoint
-from .connector import Opener
+from .connector import Connector
 from .crowd import COLLECTION, Crowd
 from .frame import Frame
-from .frame_writer import Departure
+from .frame_writer import FrameWriter
 from .link_state import LinkEvent, LinkState
 from .messages import decode_payload, HANDLED
-from .receiver import Reception
-from .router import Routes
+from .receiver import Receiver
+from .router import Router
 from .signing import Signing
 from .signing_files import TimestampKeeper, TimestampStore
 from .standing import Standing
@@ -80,11 +80,11 @@ class Link(Worker):
         self._timestamps = TimestampKeeper(self._signing, store)
         self._store_due = 0.0
         self._wall_clock = wall_clock
-        self._opener = Opener(url, self._opened_elsewhere, self._failed_elsewhere)
+        self._opener = Connector(url, self._opened_elsewhere, self._failed_elsewhere)
         self._channel: Channel | None = None
-        self._departure = Departure(self._signing)
-        self._reception = Reception(self._signing)
-        self._routes = Routes()
+        self._departure = FrameWriter(self._signing)
+        self._reception = Receiver(self._signing)
+        self._routes = Router()
         self._traffic = Traffic()
         self._standing = Standing(label, functools.partial(self._guarded, on_event), clock())
         # When the channel counts as one that leads somewhere, infinity once it does; and
@@ -282,8 +282,9 @@ class Link(Worker):
         self._close()
         self._opener.start()
         now = self.clock()
-        self._standing.lost(name, error.strerror or str(error), now)
-        self._guarded(self.endpoint.link_closed, now)
+        reason = error.strerror or str(error)
+        self._standing.lost(name, reason, now)
+        self._guarded(self.endpoint.link_closed, now, reason)
         self._traffic.restart()
 
     def _close(self) -> None:

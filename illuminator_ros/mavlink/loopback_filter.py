@@ -30,7 +30,7 @@ MAX_FRAMES = 64
 _Key = tuple[Address, int, int, bytes]
 
 
-class Echoes:
+class LoopbackFilter:
     """Remembers what was sent lately, to tell it from what somebody else sends as us."""
 
     def __init__(self) -> None:

@@ -54,7 +54,7 @@ class _Stream:
         self.good = False
 
 
-class Reception:
+class Receiver:
     """
     The way in of a link: framing and signing.
 

@@ -26,7 +26,7 @@ WINDOW = 64
 ENOUGH = 4
 
 
-class RoundTrip:
+class RttEstimator:
     """The last :data:`WINDOW` round-trip times, s."""
 
     def __init__(self) -> None:

@@ -32,7 +32,7 @@ EXPIRY = 10.0
 LOOK_INTERVAL = 1.0
 
 
-class Routes:
+class Router:
     """
     The ways to components, learnt from what comes from them.
 

@@ -26,10 +26,11 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from ..illuminator.controller import Controller
+from ..illuminator.client import IlluminatorClient
 from ..illuminator.error_flags import ErrorFlag, flag_names, KNOWN_FLAGS
 from ..illuminator.light import Light
 from ..mavlink.command import format_seconds
+from ..mavlink.component import Component
 from ..mavlink.link_state import LinkState
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -87,11 +88,11 @@ def why_nothing_is_heard(state: LinkState) -> str:
     return 'nothing comes in'
 
 
-def why_no_light(state: LinkState, controller: Controller) -> str:
+def why_no_light(state: LinkState, client: IlluminatorClient) -> str:
     """Return why the node has no light, for people."""
     if state.failure:
         return state.failure
-    others = ', '.join(map(str, [*controller.lights, *controller.left_alone][:8]))
+    others = ', '.join(map(str, [*client.lights, *client.left_alone][:8]))
     if others:
         return f'{others} heard, none of which is the target'
     return f'none heard yet on {state.name}: {why_nothing_is_heard(state)}'
@@ -107,25 +108,26 @@ def flag_findings(flags: int) -> dict[int, Finding]:
 
 
 def link_findings(
-    state: LinkState, controller: Controller, light: Light | None, *, now: float, started: float,
+    state: LinkState, component: Component, client: IlluminatorClient, light: Light | None, *,
+    now: float, started: float,
 ) -> list[Finding]:
     """Return what is wrong with the link, as seen by the node of one light (None: of none yet)."""
     findings: list[Finding] = []
     if not state.is_open:
         findings.append((ERROR, f'not open: {state.reason}'))
-    if controller.clashes(now):
-        findings.append((ERROR, f'another sender uses our address {controller.identity}'))
+    if component.address_conflict(now):
+        findings.append((ERROR, f'another sender uses our address {component.address}'))
     if light is None:
         severity = WARN if now - started < DISCOVERY_GRACE else ERROR
         # A link that is not open has been found above.
-        why = f': {why_no_light(state, controller)}' if state.is_open else ''
+        why = f': {why_no_light(state, client)}' if state.is_open else ''
         findings.append(
             (severity, f'no light connected for {format_seconds(now - started)}{why}'))
-    if state.signing.unchecked and light and light.source in controller.sender.unanswering:
+    if state.signing.unchecked and light and light.source in component.commands.unanswering:
         findings.append((WARN, 'commands go unanswered, and the others sign their frames while '
                                'signing_mode is off'))
-    if controller.passed_over:
-        findings.append((WARN, f'more than {len(controller.lights)} lights, some passed over'))
+    if client.passed_over:
+        findings.append((WARN, f'more than {len(client.lights)} lights, some passed over'))
     counter = state.traffic.sources.get(light.source) if light else None
     if counter and counter.recent_loss(now) > LOSS_WARNING:
         findings.append((WARN, f'{counter.recent_loss(now):.0f} % of the frames lost'))
@@ -133,14 +135,14 @@ def link_findings(
 
 
 def link_status(
-    node_name: str, url: str, state: LinkState, controller: Controller, light: Light | None,
-    *, now: float, started: float,
+    node_name: str, url: str, state: LinkState, component: Component, client: IlluminatorClient,
+    light: Light | None, *, now: float, started: float,
 ) -> DiagnosticStatus:
     """Return the status of the link, as seen by the node of one light (None: of none yet)."""
-    findings = link_findings(state, controller, light, now=now, started=started)
+    findings = link_findings(state, component, client, light, now=now, started=started)
     counter = state.traffic.sources.get(light.source) if light else None
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
-    trip = controller.sender.round_trip(light.source) if light else None
+    trip = component.commands.round_trip(light.source) if light else None
     seconds = [trip.quantile(0.5), trip.quantile(0.95)] if trip else [None, None]
     return _status(f'{node_name}: link', url, findings, f'open: {state.name}', {
         'url': url,
@@ -148,7 +150,7 @@ def link_status(
         'since_s': now - state.since,
         'openings': state.openings,
         'peers': state.peers,
-        'lights': len(controller.lights),
+        'lights': len(client.lights),
         'frames_received': traffic.frames_received,
         'frames_sent': traffic.frames_sent,
         'frames_dropped': traffic.frames_dropped,
@@ -163,9 +165,9 @@ def link_status(
         'loss_percent': counter.recent_loss(now) if counter else None,
         'round_trip_p50_ms': None if seconds[0] is None else seconds[0] * 1000,
         'round_trip_p95_ms': None if seconds[1] is None else seconds[1] * 1000,
-        'commands_sent': controller.sender.counters.sent,
-        'commands_resent': controller.sender.counters.resent,
-        'commands_unanswered': controller.sender.counters.unanswered,
+        'commands_sent': component.commands.counters.sent,
+        'commands_resent': component.commands.counters.resent,
+        'commands_unanswered': component.commands.counters.unanswered,
         'signatures_good': signing.good,
         'signatures_bad': signing.bad,
         'signatures_replayed': signing.replayed,

@@ -36,8 +36,9 @@ from .inputs import Inputs
 from .mounting import Mounting
 from .outputs import Outputs, STREAM_QOS
 from .parameters import declare_device_parameters, misspelt
-from ..illuminator.controller import Controller
+from ..illuminator.client import IlluminatorClient
 from ..illuminator.light import Light
+from ..mavlink.component import Component
 from ..mavlink.link import Link
 
 # s without a light, after which the log says once what is known of the reason.
@@ -63,7 +64,8 @@ class IlluminatorNode(Node):
         self._publishing = threading.Lock()
 
     def serve(
-        self, link: Link, controller: Controller, *, url: str, mounting: Mounting, period: float,
+        self, link: Link, component: Component, client: IlluminatorClient, *, url: str,
+        mounting: Mounting, period: float,
     ) -> None:
         """
         Create what the node offers.
@@ -73,7 +75,8 @@ class IlluminatorNode(Node):
         :raises ParameterError: if the value given for a parameter of the light is wrong.
         """
         self._link = link
-        self._controller = controller
+        self._component = component
+        self._client = client
         self._url = url
         self._started = link.clock()
         self._overrides = declare_device_parameters(self)
@@ -103,7 +106,7 @@ class IlluminatorNode(Node):
 
     def absence(self) -> str:
         """Return why there is no light, for people."""
-        return f'no light connected: {why_no_light(self._link.state(), self._controller)}'
+        return f'no light connected: {why_no_light(self._link.state(), self._client)}'
 
     def poll(self, tolerance: float) -> None:
         """
@@ -124,7 +127,8 @@ class IlluminatorNode(Node):
     def _worst(self, now: float) -> list[bytes]:
         """Return the levels that would be published now."""
         levels = [level(link_findings(
-            self._link.state(), self._controller, self.light, now=now, started=self._started))]
+            self._link.state(), self._component, self._client, self.light, now=now,
+            started=self._started))]
         if self.light is not None and self.light.identification.settled(now):
             levels.append(level(lamp_findings(self.light, now)))
         return levels
@@ -150,8 +154,8 @@ class IlluminatorNode(Node):
             array = DiagnosticArray()
             array.header.stamp = self.get_clock().now().to_msg()
             array.status = [link_status(
-                self.get_name(), self._url, self._link.state(), self._controller, light,
-                now=now, started=self._started)]
+                self.get_name(), self._url, self._link.state(), self._component, self._client,
+                light, now=now, started=self._started)]
             if light is not None and light.identification.settled(now):
                 # A light that tells its serial number late keeps the id it had.
                 self._hardware_id = self._hardware_id or hardware_id(light)

@@ -34,10 +34,12 @@ from .node import IlluminatorNode
 from .parameter_spec import ParameterError
 from .parameters import declare_link_parameters, LinkParameters
 from .spinner import Spinner
-from ..illuminator.controller import Controller
+from ..illuminator.client import IlluminatorClient
 from ..illuminator.light import Light, Settings
 from ..illuminator.operation import Result
 from ..mavlink.command import format_seconds
+from ..mavlink.command_sender import CommandSender
+from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
 from ..mavlink.messages import Address
@@ -69,17 +71,18 @@ class BridgeProcess:
         self.nodes = [node]
         self._arguments = without_node_name(arguments)
         self.parameters = parameters = declare_link_parameters(node)
-        self.controller = Controller(
-            parameters.identity, Settings(
+        commands = CommandSender(
+            parameters.identity, parameters.command_timeout, parameters.command_retries)
+        self.client = IlluminatorClient(
+            commands, Settings(
                 parameters.heartbeat_timeout, parameters.status_interval,
                 parameters.restore_configuration),
-            command_timeout=parameters.command_timeout,
-            command_retries=parameters.command_retries, on_light=self._found,
-            wanted=self._served,
+            on_light=self._found, wanted=self._served,
             link_failure=lambda: self.link.state().failure)
+        self.component = Component(commands, [self.client])
         signing, store = _signing(parameters)
         self.link = Link(
-            parameters.url, self.controller, label=parameters.connection_url,
+            parameters.url, self.component, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
         self._names = LightNames(
             parameters.names, node.get_name(), served=self._served,
@@ -101,7 +104,7 @@ class BridgeProcess:
         while not self._ended.wait(self._tick):
             for node in list(self.nodes):
                 try:
-                    self._names.look(self.controller.lights, self.link.clock())
+                    self._names.look(self.client.lights, self.link.clock())
                     node.poll(self._tick / 2)
                 except Exception as error:
                     node.get_logger().error(
@@ -153,7 +156,7 @@ class BridgeProcess:
 
     def _lights(self) -> list[Light]:
         """Return the lights by their addresses, in the link's thread."""
-        return sorted(self.controller.lights.values(), key=lambda light: light.source)
+        return sorted(self.client.lights.values(), key=lambda light: light.source)
 
     def _name_of(self, light: Light) -> str:
         """Return what a light is called in answers about several."""
@@ -162,7 +165,7 @@ class BridgeProcess:
 
     def _serve(self, node: IlluminatorNode, mounting: Mounting) -> None:
         node.serve(
-            self.link, self.controller, url=self.parameters.connection_url,
+            self.link, self.component, self.client, url=self.parameters.connection_url,
             mounting=mounting, period=self.parameters.diagnostics_period)
 
     def _run_further(self, light: Light) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ending all requests, so that one last one is sent at once."""
+"""CommandStatus all requests, so that one last one is sent at once."""
 
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 

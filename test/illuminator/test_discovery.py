@@ -16,9 +16,10 @@
 
 import math
 
-from illuminator_ros.illuminator.controller import CLASH_MEMORY, Controller, MAX_LIGHTS
+from illuminator_ros.illuminator.client import MAX_LIGHTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.mavlink.component import CONFLICT_MEMORY
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -30,6 +31,7 @@ from illuminator_ros.mavlink.messages import (
 )
 import pytest
 from support.back_to_back import BRIDGE, Pair
+from support.client import Client
 from support.fake_light import FakeLight, status_message
 
 ILLUMINATOR = heartbeat(MavType.ILLUMINATOR)
@@ -37,8 +39,8 @@ SUBMARINE = 12
 
 
 @pytest.fixture
-def controller() -> Controller:
-    controller = Controller(BRIDGE, Settings())
+def controller() -> Client:
+    controller = Client(BRIDGE, Settings())
     controller.link_opened(0.0)
     return controller
 
@@ -63,7 +65,7 @@ def test_our_heartbeat_comes_once_a_second(controller):
 
 
 def test_nothing_is_sent_before_the_link_is_open():
-    controller = Controller(BRIDGE, Settings())
+    controller = Client(BRIDGE, Settings())
     controller.poll(0.0)
     assert not controller.outgoing
 
@@ -71,7 +73,7 @@ def test_nothing_is_sent_before_the_link_is_open():
 def test_nothing_is_sent_after_the_link_was_closed(controller):
     controller.receive(Address(1, 243), ILLUMINATOR, 0.0)
     controller.outgoing.clear()
-    controller.link_closed(0.1)
+    controller.link_closed(0.1, 'lost')
     for second in range(10):
         controller.poll(float(second))
     assert not controller.outgoing
@@ -105,7 +107,7 @@ def test_the_id_of_an_illuminator_proves_nothing(controller, message):
 
 def test_each_light_is_announced_once_in_the_order_of_appearance():
     found = []
-    controller = Controller(BRIDGE, Settings(), on_light=lambda light: found.append(light.source))
+    controller = Client(BRIDGE, Settings(), on_light=lambda light: found.append(light.source))
     for source in (Address(1, 244), Address(1, 243), Address(1, 244)):
         controller.receive(source, ILLUMINATOR, 0.0)
         controller.receive(source, status_message(), 0.0)
@@ -125,7 +127,7 @@ def test_further_lights_are_passed_over_when_there_are_too_many(controller):
 
 
 def test_a_light_that_is_not_wanted_is_left_alone():
-    controller = Controller(BRIDGE, Settings(), wanted=lambda source: source.system == 2)
+    controller = Client(BRIDGE, Settings(), wanted=lambda source: source.system == 2)
     for system in (1, 2):
         controller.receive(Address(system, 243), ILLUMINATOR, 0.0)
         controller.receive(Address(system, 243), status_message(), 0.0)
@@ -134,11 +136,11 @@ def test_a_light_that_is_not_wanted_is_left_alone():
 
 
 def test_a_heartbeat_from_our_own_address_is_a_clash_for_a_while(controller):
-    assert not controller.clashes(0.0)
+    assert not controller.address_conflict(0.0)
     controller.receive(BRIDGE, heartbeat(SUBMARINE), 5.0)
-    assert controller.clashes(5.0)
-    assert controller.clashes(5.0 + CLASH_MEMORY - 0.1)
-    assert not controller.clashes(5.0 + CLASH_MEMORY)
+    assert controller.address_conflict(5.0)
+    assert controller.address_conflict(5.0 + CONFLICT_MEMORY - 0.1)
+    assert not controller.address_conflict(5.0 + CONFLICT_MEMORY)
 
 
 @pytest.mark.parametrize('message', [ILLUMINATOR, status_message()], ids=['heartbeat', 'status'])

@@ -24,7 +24,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.illuminator.controller import MAX_LIGHTS
+from illuminator_ros.illuminator.client import MAX_LIGHTS
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING
 from illuminator_ros.mavlink.messages import (

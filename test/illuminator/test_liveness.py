@@ -14,11 +14,11 @@
 
 """A light that falls silent, comes back, or comes back another."""
 
-from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
 from illuminator_ros.mavlink.messages import heartbeat, MavCmd, MavType, STATUS_ID
 import pytest
 from support.back_to_back import BRIDGE, Pair, START
+from support.client import Client
 from support.fake_light import FakeLight, LIGHT
 
 
@@ -45,7 +45,7 @@ def test_the_heartbeat_timeout_is_the_one_that_was_set(timeout):
 
 def test_the_moment_of_loss_is_no_moment_of_spinning():
     # For some numbers heard_at + timeout - heard_at is less than the timeout.
-    controller = Controller(BRIDGE, Settings(heartbeat_timeout=7.3))
+    controller = Client(BRIDGE, Settings(heartbeat_timeout=7.3))
     for step in range(1000):
         controller.receive(LIGHT, heartbeat(MavType.ILLUMINATOR), 0.137 * step)
         light = controller.lights[LIGHT]

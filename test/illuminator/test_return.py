@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.illuminator.controller import MAX_ASKED
+from illuminator_ros.illuminator.client import MAX_ASKED
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest

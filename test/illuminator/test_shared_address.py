@@ -140,14 +140,14 @@ def test_one_light_that_somebody_changes_there_and_back_is_followed(fake):
 
 @pytest.mark.parametrize('instance', [0, 2])
 def test_commands_carry_the_instance_of_the_light_and_0_is_all(instance):
-    sent = []
-    light = Light(AUTOPILOT, CommandSender(sent.append, Address(1, 194)), Settings(),
-                  instance=instance)
+    sender = CommandSender(Address(1, 194))
+    light = Light(AUTOPILOT, sender, Settings(), instance=instance)
     light.heard(0.0)
     light.enable(True, 0.0, lambda result, now: None)
     light.agreement.configure(
         {'mode': 'internal_control', 'brightness': 50.0, 'strobe_period': 0.0,
          'strobe_duty_cycle': 0.0}, 0.0, lambda result, now: None)
+    sent = [message for _, message in sender.outgoing]
     switch, configure = (
         next(one for one in sent if one.command == kind)
         for kind in (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))

@@ -18,7 +18,7 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.deadline_queue import Agenda
+from illuminator_ros.mavlink.deadline_queue import DeadlineQueue
 
 TIMES = st.integers(0, 20)
 STEPS = st.lists(st.one_of(
@@ -29,7 +29,7 @@ STEPS = st.lists(st.one_of(
 @given(STEPS)
 @settings(deadline=None)
 def test_agrees_with_a_plain_search(steps: list[tuple]) -> None:
-    agenda: Agenda[int] = Agenda()
+    agenda: DeadlineQueue[int] = DeadlineQueue()
     deadlines: dict[int, float] = {}
     for kind, *arguments in steps:
         if kind == 'set':
@@ -44,7 +44,7 @@ def test_agrees_with_a_plain_search(steps: list[tuple]) -> None:
 
 
 def test_postponing_does_not_pile_up() -> None:
-    agenda: Agenda[str] = Agenda()
+    agenda: DeadlineQueue[str] = DeadlineQueue()
     for second in range(10_000):
         agenda.set('light', second + 3.0)
         agenda.due(float(second))

@@ -21,7 +21,7 @@ import threading
 from types import SimpleNamespace
 
 from illuminator_ros.mavlink import connector as opener
-from illuminator_ros.mavlink.connector import Backoff, Opener
+from illuminator_ros.mavlink.connector import Backoff, Connector
 from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
 from illuminator_ros.mavlink.url import MemoryUrl, Url
@@ -108,7 +108,7 @@ def test_the_time_that_a_try_takes_counts(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(opener, 'open_channel', fail_slowly)
     monkeypatch.setattr(opener, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    one = Opener(MemoryUrl('x'), lambda channel: None, lambda reason: None, backoff=Recorded())
+    one = Connector(MemoryUrl('x'), lambda channel: None, lambda reason: None, backoff=Recorded())
     one.start()
     assert ended.wait(20.0)
     assert spent == pytest.approx([0.0, 0.7, 0.7])

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from illuminator_ros.mavlink.command import Ending
+from illuminator_ros.mavlink.command import CommandStatus
 from illuminator_ros.mavlink.messages import CommandInt, CommandLong, MavResult
 import pytest
 from support.command_rig import (
@@ -31,12 +31,12 @@ from support.command_rig import (
     Rig,
 )
 
-ANSWERED, NO_ANSWER = Ending.ANSWERED, Ending.NO_ANSWER
+ANSWERED, NO_ANSWER = CommandStatus.ANSWERED, CommandStatus.NO_ANSWER
 
 # QGroundControl's table of command tests: what each try is acknowledged with, the retries that
 # are allowed -> ending, result, frames sent. (What QGroundControl calls progress is in
 # test_command_progress.py.)
-QGROUNDCONTROL: dict[str, tuple[list[list[int]], int, Ending, int | None, int]] = {
+QGROUNDCONTROL: dict[str, tuple[list[list[int]], int, CommandStatus, int | None, int]] = {
     'always accepted': ([[ACCEPTED]], 3, ANSWERED, ACCEPTED, 1),
     'always failed': ([[FAILED]], 3, ANSWERED, FAILED, 1),
     'second attempt accepted': ([[], [ACCEPTED]], 3, ANSWERED, ACCEPTED, 2),
@@ -45,7 +45,7 @@ QGROUNDCONTROL: dict[str, tuple[list[list[int]], int, Ending, int | None, int]] 
     'no response, no retry': ([], 0, NO_ANSWER, None, 1),
     'in progress, accepted': ([[IN_PROGRESS, ACCEPTED]], 3, ANSWERED, ACCEPTED, 1),
     'in progress, failed': ([[IN_PROGRESS, FAILED]], 3, ANSWERED, FAILED, 1),
-    'in progress, no ack': ([[IN_PROGRESS]], 3, Ending.PROGRESS_STOPPED, IN_PROGRESS, 1),
+    'in progress, no ack': ([[IN_PROGRESS]], 3, CommandStatus.PROGRESS_STOPPED, IN_PROGRESS, 1),
 }
 
 
@@ -53,7 +53,7 @@ QGROUNDCONTROL: dict[str, tuple[list[list[int]], int, Ending, int | None, int]] 
     ('answers', 'retries', 'ending', 'result', 'frames'), QGROUNDCONTROL.values(),
     ids=QGROUNDCONTROL.keys())
 def test_ends_as_in_qgroundcontrols_table(
-        answers: Sequence[Sequence[int]], retries: int, ending: Ending, result: int | None,
+        answers: Sequence[Sequence[int]], retries: int, ending: CommandStatus, result: int | None,
         frames: int) -> None:
     rig = Rig(*answers, retries=retries)
     run = rig.ended()
@@ -186,7 +186,7 @@ def test_rejection_is_not_the_answer_where_an_earlier_try_got_none() -> None:
     # That may be what keeps the target busy, and succeed.
     rig = Rig([], *[[REJECTED]] * 100)
     run = rig.ended()
-    assert (run.ending, run.result) == (Ending.OUT_OF_TIME, REJECTED)
+    assert (run.ending, run.result) == (CommandStatus.OUT_OF_TIME, REJECTED)
     assert str(run.outcome).startswith(
         'not finished in time, last answer MAV_RESULT_TEMPORARILY_REJECTED (')
 
@@ -224,14 +224,14 @@ def test_limit_ends_what_got_no_answer() -> None:
 def test_limit_ends_what_is_in_progress() -> None:
     rig = Rig([IN_PROGRESS] * 250)
     run = rig.ended(limit=1.5)
-    assert (run.ending, run.result) == (Ending.OUT_OF_TIME, IN_PROGRESS)
+    assert (run.ending, run.result) == (CommandStatus.OUT_OF_TIME, IN_PROGRESS)
     assert run.outcome.elapsed == pytest.approx(1.5)
 
 
 def test_nothing_is_sent_after_the_limit() -> None:
     rig = Rig()
     run = rig.start(limit=0.0)
-    assert (run.ending, rig.frames) == (Ending.OUT_OF_TIME, [])
+    assert (run.ending, rig.frames) == (CommandStatus.OUT_OF_TIME, [])
 
 
 @pytest.mark.parametrize('ended_by', ['acknowledgement', 'poll'])
@@ -243,7 +243,7 @@ def test_command_whose_limit_passed_while_it_waited_is_never_sent(ended_by: str)
         rig.ack(ACCEPTED)
     else:
         rig.sender.poll(rig.now)
-    assert second.ending is Ending.OUT_OF_TIME
+    assert second.ending is CommandStatus.OUT_OF_TIME
     assert second.outcome.tries == 0
     rig.run(LONG)
     assert second.frames == []

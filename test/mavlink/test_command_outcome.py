@@ -28,12 +28,12 @@ from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, OURS, Rig
 @pytest.mark.parametrize('timeout', [0.0, -0.5, math.nan, math.inf])
 def test_timeout_that_is_none_is_refused(timeout: float) -> None:
     with pytest.raises(ValueError, match='timeout'):
-        CommandSender(lambda message: None, OURS, timeout)
+        CommandSender(OURS, timeout)
 
 
 def test_negative_number_of_retries_is_refused() -> None:
     with pytest.raises(ValueError, match='retries -1'):
-        CommandSender(lambda message: None, OURS, 0.5, -1)
+        CommandSender(OURS, 0.5, -1)
 
 
 @pytest.mark.parametrize(('answers', 'said'), [

@@ -21,7 +21,7 @@ import random
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
-from illuminator_ros.mavlink.command import Ending
+from illuminator_ros.mavlink.command import CommandStatus
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.messages import Address
 import pytest
@@ -66,8 +66,8 @@ class AnyCourseOfEvents(RuleBasedStateMachine):
         self.rig.sender.poll(self.rig.now)
 
     @rule(component=st.one_of(st.none(), COMPONENTS),
-          ending=st.sampled_from([Ending.LINK_LOST, Ending.CANCELLED]))
-    def link_is_lost(self, component: Address | None, ending: Ending) -> None:
+          ending=st.sampled_from([CommandStatus.LINK_LOST, CommandStatus.CANCELLED]))
+    def link_is_lost(self, component: Address | None, ending: CommandStatus) -> None:
         self.rig.sender.end_all(self.rig.now, ending, component)
         for run in self.rig.runs:
             assert run.outcomes or component not in (None, run.command.target)
@@ -162,7 +162,7 @@ def test_every_outcome_over_a_bad_line_is_one_and_true(
     runs = {command: rig.start(command) for command in range(1000, 1100)}
     executor.run(LONG)
     for command, run in runs.items():
-        if run.outcome.ending is Ending.ANSWERED:
+        if run.outcome.ending is CommandStatus.ANSWERED:
             assert run.outcome.result == executor.results[command]
-    answered = sum(run.outcome.ending is Ending.ANSWERED for run in runs.values())
+    answered = sum(run.outcome.ending is CommandStatus.ANSWERED for run in runs.values())
     assert answered == 100 if not loss else answered >= {0.1: 90, 0.3: 60, 0.5: 30}[loss]

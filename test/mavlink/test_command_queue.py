@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.command import Command, Ending, Outcome
+from illuminator_ros.mavlink.command import Command, CommandResult, CommandStatus
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.messages import Address
 import pytest
@@ -55,7 +55,7 @@ def test_command_that_gets_no_answer_makes_way_for_the_next() -> None:
     rig = Rig([], [], [], [], [ACCEPTED])
     first, second = rig.start(), rig.start()
     rig.run(LONG)
-    assert first.ending is Ending.NO_ANSWER
+    assert first.ending is CommandStatus.NO_ANSWER
     assert second.outcome.accepted
 
 
@@ -72,7 +72,7 @@ def test_limit_of_a_command_that_waits_is_kept_to_the_moment() -> None:
     rig.start()
     second = rig.start(limit=0.2)
     rig.run(0.4)
-    assert second.ending is Ending.OUT_OF_TIME
+    assert second.ending is CommandStatus.OUT_OF_TIME
     assert second.ended_at - rig.frames[0][0] == pytest.approx(0.2)
 
 
@@ -80,7 +80,7 @@ def test_only_so_many_wait_and_the_next_is_told() -> None:
     rig = Rig()
     runs = [rig.start() for _ in range(MAX_WAITING + 2)]
     assert [len(run.outcomes) for run in runs] == [0] * (MAX_WAITING + 1) + [1]
-    assert runs[-1].ending is Ending.REFUSED_LOCALLY
+    assert runs[-1].ending is CommandStatus.REFUSED_LOCALLY
     assert str(runs[-1].outcome) == (
         'too many commands are waiting for this component (0 tries, 0 ms)')
     rig.run(MAX_WAITING * LONG)
@@ -114,7 +114,7 @@ def test_dead_light_does_not_delay_another() -> None:
     assert all(run.outcome.accepted for run in alive)
     assert dead.outcomes == []
     rig.run(LONG)
-    assert dead.ending is Ending.NO_ANSWER
+    assert dead.ending is CommandStatus.NO_ANSWER
 
 
 def test_fifty_targets_get_an_answer_each_in_any_order() -> None:
@@ -128,8 +128,8 @@ def test_fifty_targets_get_an_answer_each_in_any_order() -> None:
 
 # Cut off
 
-@pytest.mark.parametrize('ending', [Ending.LINK_LOST, Ending.CANCELLED])
-def test_losing_the_link_ends_all_that_is_under_way_or_waiting(ending: Ending) -> None:
+@pytest.mark.parametrize('ending', [CommandStatus.LINK_LOST, CommandStatus.CANCELLED])
+def test_losing_the_link_ends_all_that_is_under_way_or_waiting(ending: CommandStatus) -> None:
     rig = Rig()
     rig.start(405)
     rig.start(405)
@@ -150,7 +150,7 @@ def test_outcome_of_a_lost_link_says_how_far_it_came() -> None:
     run = rig.start()
     rig.ack(IN_PROGRESS, progress=30)
     rig.now += 0.1
-    rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    rig.sender.end_all(rig.now, CommandStatus.LINK_LOST)
     assert str(run.outcome) == ('the link was lost, last answer MAV_RESULT_IN_PROGRESS at 30 % '
                                 '(1 try, 100 ms)')
 
@@ -158,25 +158,25 @@ def test_outcome_of_a_lost_link_says_how_far_it_came() -> None:
 def test_ending_again_changes_nothing() -> None:
     rig = Rig()
     run = rig.start()
-    for ending in (Ending.CANCELLED, Ending.LINK_LOST):
+    for ending in (CommandStatus.CANCELLED, CommandStatus.LINK_LOST):
         rig.sender.end_all(rig.now, ending)
-    assert run.ending is Ending.CANCELLED
+    assert run.ending is CommandStatus.CANCELLED
 
 
 def test_acknowledgement_after_the_link_was_lost_counts_for_nothing() -> None:
     rig = Rig()
     run = rig.start()
-    rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    rig.sender.end_all(rig.now, CommandStatus.LINK_LOST)
     rig.ack(ACCEPTED)
-    assert run.ending is Ending.LINK_LOST
+    assert run.ending is CommandStatus.LINK_LOST
 
 
 def test_commands_of_one_target_are_ended_without_those_of_others() -> None:
     rig = Rig()
     gone, waiting, kept = rig.start(), rig.start(), rig.start(target=OTHER)
-    rig.sender.end_all(rig.now, Ending.CANCELLED, LIGHT)
+    rig.sender.end_all(rig.now, CommandStatus.CANCELLED, LIGHT)
     assert (gone.ending, waiting.ending, kept.outcomes) == (
-        Ending.CANCELLED, Ending.CANCELLED, [])
+        CommandStatus.CANCELLED, CommandStatus.CANCELLED, [])
     rig.ack(ACCEPTED, source=OTHER)
     assert kept.outcome.accepted
 
@@ -184,7 +184,7 @@ def test_commands_of_one_target_are_ended_without_those_of_others() -> None:
 def test_command_can_be_started_after_the_link_was_lost() -> None:
     rig = Rig()
     rig.start()
-    rig.sender.end_all(rig.now, Ending.LINK_LOST)
+    rig.sender.end_all(rig.now, CommandStatus.LINK_LOST)
     again = rig.start()
     rig.ack(ACCEPTED)
     assert again.outcome.accepted
@@ -195,9 +195,9 @@ def test_command_can_be_started_after_the_link_was_lost() -> None:
 @pytest.mark.parametrize('by', ['acknowledgement', 'silence', 'lost link'])
 def test_callback_may_start_the_same_command_again(by: str) -> None:
     rig = Rig()
-    outcomes: list[Outcome] = []
+    outcomes: list[CommandResult] = []
 
-    def again(outcome: Outcome, now: float) -> None:
+    def again(outcome: CommandResult, now: float) -> None:
         outcomes.append(outcome)
         if len(outcomes) < 3:
             rig.sender.start(Command(LIGHT, 405), now, again)
@@ -209,7 +209,7 @@ def test_callback_may_start_the_same_command_again(by: str) -> None:
         elif by == 'silence':
             rig.run(2.0)
         else:
-            rig.sender.end_all(rig.now, Ending.LINK_LOST)
+            rig.sender.end_all(rig.now, CommandStatus.LINK_LOST)
     assert len(outcomes) == 3
     assert rig.idle
 
@@ -217,15 +217,15 @@ def test_callback_may_start_the_same_command_again(by: str) -> None:
 def test_callback_may_end_all_the_others() -> None:
     # QGroundControl once crashed when the vehicle was closed by the callback of a failure.
     rig = Rig(retries=0)
-    ends: list[Ending] = []
+    ends: list[CommandStatus] = []
 
-    def close(outcome: Outcome, now: float) -> None:
+    def close(outcome: CommandResult, now: float) -> None:
         ends.append(outcome.ending)
-        rig.sender.end_all(now, Ending.CANCELLED)
+        rig.sender.end_all(now, CommandStatus.CANCELLED)
 
     for target in (LIGHT, OTHER):
         for _ in range(3):
             rig.sender.start(Command(target, 405), rig.now, close)
     rig.run(LONG)
-    assert sorted(ends, key=str) == [Ending.CANCELLED] * 5 + [Ending.NO_ANSWER]
+    assert sorted(ends, key=str) == [CommandStatus.CANCELLED] * 5 + [CommandStatus.NO_ANSWER]
     assert rig.idle

@@ -15,7 +15,7 @@
 """Our own frames that come back are told from those of somebody else with our address."""
 
 from illuminator_ros.mavlink.frame import Frame
-from illuminator_ros.mavlink.loopback_filter import Echoes, MAX_FRAMES, MEMORY
+from illuminator_ros.mavlink.loopback_filter import LoopbackFilter, MAX_FRAMES, MEMORY
 from illuminator_ros.mavlink.messages import Address
 import pytest
 
@@ -24,9 +24,9 @@ SENT = {'source': OURS, 'sequence': 7, 'message_id': 0, 'payload': b'\x01\x02\0\
 
 
 @pytest.fixture
-def echoes() -> Echoes:
+def echoes() -> LoopbackFilter:
     """Return echoes that know of one frame, sent at 100 s."""
-    echoes = Echoes()
+    echoes = LoopbackFilter()
     echoes.sent(**SENT, now=100.0)
     return echoes
 

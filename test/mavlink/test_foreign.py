@@ -23,7 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.frame import Decoder, DecoderCounters, FLAG_SIGNED, Frame
 from illuminator_ros.mavlink.messages import Address, FOREIGN, HANDLED, LAYOUTS
-from illuminator_ros.mavlink.receiver import Reception, RENEWAL
+from illuminator_ros.mavlink.receiver import Receiver, RENEWAL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import AUTOPILOT, foreign_frame, frame_of, LIGHT, raw_v1, raw_v2, spoilt
@@ -141,9 +141,9 @@ def foreign(frames: list[Frame]) -> Counter[int]:
 class TestReception:
 
     @staticmethod
-    def knowing(mode: SigningMode = SigningMode.OFF) -> tuple[Reception, list[int]]:
+    def knowing(mode: SigningMode = SigningMode.OFF) -> tuple[Receiver, list[int]]:
         """Return the way in of a link that knows the autopilot on peer a; and what it counts."""
-        reception = Reception(Signing(mode, bytes(32)))
+        reception = Receiver(Signing(mode, bytes(32)))
         counted: list[int] = []
         reception.take('a', heartbeat_frame(AUTOPILOT), 0.0, UNIX)
         reception.know('a', AUTOPILOT, counted.append)
@@ -171,7 +171,7 @@ class TestReception:
         assert len(reception.take('a', foreign_frame(1), 0.1, UNIX)) == 1
         assert counted == []
         unsigned = Signing(SigningMode.REQUIRE, bytes(32))
-        strict = Reception(unsigned)
+        strict = Receiver(unsigned)
         strict.take('a', b'', 0.0, UNIX)
         strict.know('a', AUTOPILOT, counted.append)
         assert strict.take('a', foreign_frame(1), 0.1, UNIX) == []

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.mavlink.receiver import MAX_DECODERS, Reception, STALL
+from illuminator_ros.mavlink.receiver import MAX_DECODERS, Receiver, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import LIGHT, raw_v1
@@ -29,9 +29,9 @@ FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\
 
 
 @pytest.fixture
-def reception() -> Reception:
+def reception() -> Receiver:
     """Return the way in of a link without signing."""
-    return Reception(Signing())
+    return Receiver(Signing())
 
 
 def sources(frames: list) -> list[Address]:
@@ -39,13 +39,13 @@ def sources(frames: list) -> list[Address]:
     return [frame.source for frame in frames]
 
 
-def test_pieces_of_one_peer_are_put_together(reception: Reception) -> None:
+def test_pieces_of_one_peer_are_put_together(reception: Receiver) -> None:
     frame = heartbeat_frame()
     assert reception.take('a', frame[:9], 0.0, UNIX) == []
     assert sources(reception.take('a', frame[9:], 0.1, UNIX)) == [LIGHT]
 
 
-def test_pieces_of_different_peers_are_kept_apart(reception: Reception) -> None:
+def test_pieces_of_different_peers_are_kept_apart(reception: Receiver) -> None:
     one, other = heartbeat_frame(Address(1, 1)), heartbeat_frame(Address(2, 2))
     reception.take('a', one[:9], 0.0, UNIX)
     reception.take('b', other[:9], 0.0, UNIX)
@@ -55,7 +55,7 @@ def test_pieces_of_different_peers_are_kept_apart(reception: Reception) -> None:
 
 @pytest.mark.parametrize('noise', FALSE_STARTS, ids=['MAVLink 1', 'MAVLink 2'])
 def test_good_frames_behind_a_false_start_come_without_more_bytes(
-    reception: Reception, noise: bytes,
+    reception: Receiver, noise: bytes,
 ) -> None:
     assert reception.take('a', noise + heartbeat_frame(), 0.0, UNIX) == []
     assert reception.next_deadline() == STALL
@@ -64,12 +64,12 @@ def test_good_frames_behind_a_false_start_come_without_more_bytes(
         ('a', LIGHT)]
 
 
-def test_a_chain_of_false_starts_is_given_up_as_a_whole(reception: Reception) -> None:
+def test_a_chain_of_false_starts_is_given_up_as_a_whole(reception: Receiver) -> None:
     reception.take('a', b''.join(FALSE_STARTS * 5) + heartbeat_frame(), 0.0, UNIX)
     assert len(reception.give_up(STALL, UNIX)) == 1
 
 
-def test_a_frame_that_has_only_begun_since_is_waited_for(reception: Reception) -> None:
+def test_a_frame_that_has_only_begun_since_is_waited_for(reception: Receiver) -> None:
     frame = heartbeat_frame()
     reception.take('a', FALSE_STARTS[0], 0.0, UNIX)
     reception.take('a', frame[:9], 0.4, UNIX)
@@ -77,13 +77,13 @@ def test_a_frame_that_has_only_begun_since_is_waited_for(reception: Reception) -
     assert sources(reception.take('a', frame[9:], STALL + 0.1, UNIX)) == [LIGHT]
 
 
-def test_nothing_is_awaited_once_it_was_given_up(reception: Reception) -> None:
+def test_nothing_is_awaited_once_it_was_given_up(reception: Receiver) -> None:
     reception.take('a', FALSE_STARTS[0], 0.0, UNIX)
     reception.give_up(STALL, UNIX)
     assert reception.next_deadline() == float('inf')
 
 
-def test_a_slow_frame_is_not_given_up(reception: Reception) -> None:
+def test_a_slow_frame_is_not_given_up(reception: Receiver) -> None:
     # 9600 baud: a byte takes 1 ms, and the longest frame 0.27 s.
     frame = raw_v1(110, bytes(range(1, 251)))
     found = []
@@ -94,20 +94,20 @@ def test_a_slow_frame_is_not_given_up(reception: Reception) -> None:
     assert sources(found) == [LIGHT]
 
 
-def test_the_wait_begins_anew_with_another_frame(reception: Reception) -> None:
+def test_the_wait_begins_anew_with_another_frame(reception: Receiver) -> None:
     frame = heartbeat_frame()
     reception.take('a', frame[:9], 0.0, UNIX)
     reception.take('a', frame[9:] + frame[:9], 0.4, UNIX)
     assert reception.next_deadline() == 0.4 + STALL
 
 
-def test_the_wait_goes_on_while_pieces_of_the_same_frame_come(reception: Reception) -> None:
+def test_the_wait_goes_on_while_pieces_of_the_same_frame_come(reception: Receiver) -> None:
     reception.take('a', FALSE_STARTS[0], 0.0, UNIX)
     reception.take('a', heartbeat_frame(), 0.4, UNIX)
     assert reception.next_deadline() == STALL
 
 
-def test_the_peers_that_are_kept_apart_are_bounded(reception: Reception) -> None:
+def test_the_peers_that_are_kept_apart_are_bounded(reception: Receiver) -> None:
     for number in range(10 * MAX_DECODERS):
         reception.take(number, heartbeat_frame()[:9], 0.0, UNIX)
     assert len(reception) == MAX_DECODERS
@@ -115,14 +115,14 @@ def test_the_peers_that_are_kept_apart_are_bounded(reception: Reception) -> None
     assert len(reception.give_up(STALL, UNIX)) == 0
 
 
-def test_a_peer_that_had_to_go_is_heard_again(reception: Reception) -> None:
+def test_a_peer_that_had_to_go_is_heard_again(reception: Receiver) -> None:
     for number in range(10 * MAX_DECODERS):
         reception.take(number, b'', 0.0, UNIX)
     assert sources(reception.take(0, heartbeat_frame(), 0.0, UNIX)) == [LIGHT]
 
 
 def test_garbage_of_many_peers_does_not_cost_a_good_one_its_incomplete_frame(
-    reception: Reception,
+    reception: Receiver,
 ) -> None:
     frame = heartbeat_frame()
     reception.take('a', frame + frame[:9], 0.0, UNIX)
@@ -133,13 +133,13 @@ def test_garbage_of_many_peers_does_not_cost_a_good_one_its_incomplete_frame(
 
 
 def test_what_is_not_to_be_believed_does_not_come_through() -> None:
-    reception = Reception(Signing(SigningMode.REQUIRE, bytes(32)))
+    reception = Receiver(Signing(SigningMode.REQUIRE, bytes(32)))
     assert reception.take('a', heartbeat_frame(), 0.0, UNIX) == []
     reception.take('a', FALSE_STARTS[0] + heartbeat_frame(), 0.0, UNIX)
     assert reception.give_up(STALL, UNIX) == []
 
 
-def test_a_link_that_was_closed_awaits_nothing(reception: Reception) -> None:
+def test_a_link_that_was_closed_awaits_nothing(reception: Receiver) -> None:
     frame = heartbeat_frame()
     reception.take('a', frame[:9], 0.0, UNIX)
     reception.clear()
@@ -147,7 +147,7 @@ def test_a_link_that_was_closed_awaits_nothing(reception: Reception) -> None:
     assert reception.take('a', frame[9:], 0.1, UNIX) == []
 
 
-def test_all_peers_are_counted_together(reception: Reception) -> None:
+def test_all_peers_are_counted_together(reception: Receiver) -> None:
     reception.take('a', heartbeat_frame(), 0.0, UNIX)
     reception.take('b', heartbeat_frame(), 0.0, UNIX)
     assert reception.counters.frames == 2

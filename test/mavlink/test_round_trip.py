@@ -19,14 +19,14 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.messages import Address, MavResult
-from illuminator_ros.mavlink.round_trip import ENOUGH, FLOOR, RoundTrip, WINDOW
+from illuminator_ros.mavlink.round_trip import ENOUGH, FLOOR, RttEstimator, WINDOW
 import pytest
 from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig
 
 
-def of(*seconds: float) -> RoundTrip:
+def of(*seconds: float) -> RttEstimator:
     """Return what is known after these round trips."""
-    round_trip = RoundTrip()
+    round_trip = RttEstimator()
     for sample in seconds:
         round_trip.add(sample)
     return round_trip

@@ -17,7 +17,6 @@
 from types import SimpleNamespace
 from typing import Any
 
-from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.frame import DecoderCounters
 from illuminator_ros.mavlink.link_state import LinkState
@@ -26,6 +25,7 @@ from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import SequenceCounter, Traffic
 from illuminator_ros.ros.diagnostics import link_findings, WARN, why_no_light, why_nothing_is_heard
 import pytest
+from support.client import Client
 
 
 @pytest.mark.parametrize(('traffic', 'signing', 'reason'), [
@@ -51,9 +51,9 @@ def state(reason: str = '') -> LinkState:
                      SigningCounters())
 
 
-def controller(*lights: Address, only_target: bool = False) -> Controller:
+def controller(*lights: Address, only_target: bool = False) -> Client:
     """Return one that has heard these lights."""
-    one = Controller(Address(1, 194), Settings(), wanted=lambda source: not only_target)
+    one = Client(Address(1, 194), Settings(), wanted=lambda source: not only_target)
     for source in lights:
         one.receive(source, heartbeat(MavType.ILLUMINATOR), 0.0)
     return one
@@ -72,7 +72,7 @@ def test_only_some_lights_outside_the_target_are_remembered() -> None:
 
 def test_diagnostics_and_answers_give_the_same_reason() -> None:
     heard = controller(Address(1, 243))
-    found = link_findings(state(), heard, None, now=7.3, started=0.0)
+    found = link_findings(state(), heard, heard.client, None, now=7.3, started=0.0)
     assert found == [(WARN, f'no light connected for 7.30 s: {why_no_light(state(), heard)}')]
 
 

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.command_sender import CommandCounters
 from illuminator_ros.mavlink.frame import DecoderCounters
@@ -26,6 +25,7 @@ from illuminator_ros.mavlink.signing import SigningCounters
 from illuminator_ros.mavlink.statistics import SequenceCounter, Traffic
 from illuminator_ros.ros.diagnostics import link_status
 import pytest
+from support.client import Client
 from support.fake_light import LIGHT
 from support.live_link import BRIDGE
 
@@ -37,7 +37,7 @@ BEFORE = 10.0
 @pytest.fixture(scope='module')
 def values() -> dict[str, str]:
     """Return what is told of a link on which no two things are alike."""
-    controller = Controller(BRIDGE, Settings())
+    controller = Client(BRIDGE, Settings())
     controller.receive(LIGHT, heartbeat(MavType.ILLUMINATOR), NOW)
     controller.sender.counters = CommandCounters(sent=41, resent=42, unanswered=43)
     for hundredths in range(100):
@@ -50,7 +50,8 @@ def values() -> dict[str, str]:
         SigningCounters(good=31, bad=32, replayed=33, unsigned=34, unchecked=35))
 
     def read(now: float) -> dict[str, str]:
-        status = link_status('node', 'url', state, controller, controller.lights[LIGHT],
+        status = link_status('node', 'url', state, controller, controller.client,
+                             controller.lights[LIGHT],
                              now=now, started=STARTED)
         return {value.key: value.value for value in status.values}
 

@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
@@ -38,6 +37,7 @@ from illuminator_ros.mavlink.messages import (
     LAYOUTS,
     MavCmd,
 )
+from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
 from support.records import Answer, Recorder
 
@@ -103,7 +103,7 @@ class Pair:
         self.now = START
         self.recorders: dict[Address, Recorder] = {}
         self._on_light = on_light
-        self.controller = Controller(
+        self.controller = Client(
             BRIDGE, settings or Settings(), command_timeout=command_timeout,
             command_retries=command_retries, on_light=self._record)
         self.other = (lights if isinstance(lights, Endpoint)
@@ -201,8 +201,8 @@ class Pair:
     def close(self) -> None:
         """Lose the line, and what is on it."""
         self._switch(is_open=False)
-        self.controller.link_closed(self.now)
-        self.other.link_closed(self.now)
+        self.controller.link_closed(self.now, 'closed')
+        self.other.link_closed(self.now, 'closed')
         self.turn()
 
     def _switch(self, *, is_open: bool) -> None:

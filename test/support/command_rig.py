@@ -22,7 +22,7 @@ import heapq
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, Ending, Outcome
+from illuminator_ros.mavlink.command import Command, CommandResult, CommandStatus
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, MavResult
 
@@ -44,21 +44,21 @@ class Run:
 
     command: Command
     frames: list[tuple[float, Any]] = field(default_factory=list)
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[CommandResult] = field(default_factory=list)
     ended_at: float = math.nan
 
-    def __call__(self, outcome: Outcome, now: float) -> None:
+    def __call__(self, outcome: CommandResult, now: float) -> None:
         self.outcomes.append(outcome)
         self.ended_at = now
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> CommandResult:
         """Return the outcome; an error unless there is exactly one."""
         (outcome,) = self.outcomes
         return outcome
 
     @property
-    def ending(self) -> Ending:
+    def ending(self) -> CommandStatus:
         """How it ended."""
         return self.outcome.ending
 
@@ -81,7 +81,7 @@ class Rig:
     def __init__(self, *answers: Sequence[int], timeout: float = 0.5, retries: int = 3) -> None:
         self.now = 1000.0
         self.frames: list[tuple[float, Any]] = []
-        self.sender = CommandSender(self._send, OURS, timeout, retries)
+        self.sender = CommandSender(OURS, timeout, retries)
         self.answers: Callable[[Any, int], Sequence[int]] = (
             lambda message, number: answers[number] if number < len(answers) else ())
         self.runs: list[Run] = []
@@ -97,6 +97,7 @@ class Rig:
             target, command, (0.0,) * 6 + (number,) if params is None else params))
         self.runs.append(run)
         self.sender.start(run.command, self.now, run, limit=self.now + limit)
+        self._flush()
         return run
 
     def ended(self, command: int = 405, **arguments: Any) -> Run:
@@ -115,6 +116,7 @@ class Rig:
                 self.sender.acknowledge(source, ack, self.now)
             else:
                 self.sender.poll(self.now)
+            self._flush()
         self.now = end
 
     # What its target does
@@ -124,6 +126,11 @@ class Rig:
         """Acknowledge a command at once."""
         self.sender.acknowledge(
             source, CommandAck(command, result, progress, result_param2, *target), self.now)
+        self._flush()
+
+    def _flush(self) -> None:
+        while self.sender.outgoing:
+            self._send(self.sender.outgoing.popleft()[1])
 
     def _send(self, message: Any) -> None:
         key = Address(message.target_system, message.target_component), message.command

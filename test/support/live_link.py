@@ -22,7 +22,6 @@ import threading
 import time
 from typing import Any
 
-from illuminator_ros.illuminator.controller import Controller
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light, Settings
@@ -33,6 +32,7 @@ from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url, Url
+from support.client import Client
 from support.waiting import eventually, Log, PATIENCE
 
 BRIDGE = Address(1, 194)
@@ -60,7 +60,7 @@ class Talker(Endpoint):
         self.heartbeat.send(now, self.outgoing)
         self.greetings.append(now)
 
-    def link_closed(self, now: float) -> None:
+    def link_closed(self, now: float, reason: str) -> None:
         self.closings.append(now)
 
     def receive(self, source: Address, message: Any, now: float) -> None:
@@ -157,7 +157,7 @@ class Bridge(LiveLink):
 
     def __init__(self, url: str, settings: Settings | None = None, **options: Any) -> None:
         self.lights: Log[tuple[str, Light]] = Log()
-        super().__init__(url, Controller(
+        super().__init__(url, Client(
             BRIDGE, settings or Settings(), command_timeout=PATIENCE / 10, command_retries=9,
             on_light=self._found), **options)
 

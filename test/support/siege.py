@@ -21,7 +21,7 @@ import math
 import random
 from typing import Any
 
-from illuminator_ros.illuminator.controller import Controller, MAX_LIGHTS
+from illuminator_ros.illuminator.client import MAX_LIGHTS
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
@@ -36,6 +36,7 @@ from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from support.attacker import Attacker
+from support.client import Client
 from support.party import KEY, Party
 from support.sceptic import Sceptic
 from support.simulated_link import SimulatedLink
@@ -122,15 +123,15 @@ class BridgeSiege(Siege):
 
     def make_endpoint(self) -> Any:
         self.results: list[list[Result]] = []
-        return Controller(BRIDGE, Settings(status_interval=1.0), on_light=self._found)
+        return Client(BRIDGE, Settings(status_interval=1.0), on_light=self._found)
 
     def _found(self, light: Light) -> None:
         light.observer = Sceptic()
 
     @property
-    def controller(self) -> Controller:
+    def controller(self) -> Client:
         """Return what is attacked."""
-        controller: Controller = self.link.endpoint
+        controller: Client = self.link.endpoint
         return controller
 
     def get_ready(self) -> None:

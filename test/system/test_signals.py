@@ -51,7 +51,7 @@ enter('program', hang)
 """
 
 # Exit status, and what was printed.
-Ending = tuple[int, str]
+CommandStatus = tuple[int, str]
 
 
 def blocked(program: Program) -> set[signal.Signals]:
@@ -98,14 +98,14 @@ class Case:
         return self._programs[-1]
 
 
-def bridge_starting(case: Case, number: int) -> Ending:
+def bridge_starting(case: Case, number: int) -> CommandStatus:
     program = case.bridge()
     eventually(lambda: signals_are_taken(program))
     case.pause(0.5)
     return program.end(number), program.log
 
 
-def bridge_connecting(case: Case, number: int) -> Ending:
+def bridge_connecting(case: Case, number: int) -> CommandStatus:
     program = case.bridge()
     program.wait_for('link open')
     with ServedLight(case.port, link=Link):
@@ -113,7 +113,7 @@ def bridge_connecting(case: Case, number: int) -> Ending:
         return program.end(number), program.log
 
 
-def bridge_idle(case: Case, number: int) -> Ending:
+def bridge_idle(case: Case, number: int) -> CommandStatus:
     program = case.bridge()
     program.wait_for('link open')
     with ServedLight(case.port, link=Link):
@@ -122,7 +122,7 @@ def bridge_idle(case: Case, number: int) -> Ending:
         return program.end(number), program.log
 
 
-def bridge_in_a_command(case: Case, number: int) -> Ending:
+def bridge_in_a_command(case: Case, number: int) -> CommandStatus:
     program = case.bridge()
     program.wait_for('link open')
     with ServedLight(case.port, link=Link) as light:
@@ -134,14 +134,14 @@ def bridge_in_a_command(case: Case, number: int) -> Ending:
         return program.end(number), program.log
 
 
-def simulator_starting(case: Case, number: int) -> Ending:
+def simulator_starting(case: Case, number: int) -> CommandStatus:
     program = case.simulator()
     eventually(lambda: signals_are_taken(program))
     case.pause(0.3)
     return program.end(number), program.log
 
 
-def simulator_running(case: Case, number: int) -> Ending:
+def simulator_running(case: Case, number: int) -> CommandStatus:
     program = case.simulator()
     program.wait_for('link open')
     case.pause(0.3)
@@ -154,14 +154,14 @@ def simulator_running(case: Case, number: int) -> Ending:
     (simulator_starting, 6), (simulator_running, 4),
 ], ids=lambda value: getattr(value, '__name__', ''))
 def test_a_program_ends(
-    ros: Ros, moment: Callable[[Case, int], Ending], count: int,
+    ros: Ros, moment: Callable[[Case, int], CommandStatus], count: int,
     number: signal.Signals,
 ) -> None:
     # It takes the same way as SIGTERM.
     if number == signal.SIGHUP:
         count = 1
 
-    def run(n: int) -> Ending:
+    def run(n: int) -> CommandStatus:
         with Case(ros, f'{moment.__name__} {number.name} {n}') as case:
             return moment(case, number)
 

@@ -67,7 +67,7 @@ def loop() -> Iterator[Loop]:
 
 def clashes(bridge: Bridge) -> bool:
     """Return whether a bridge believes that somebody else uses its address."""
-    return bool(bridge.ask(bridge.endpoint.clashes))
+    return bool(bridge.ask(bridge.endpoint.address_conflict))
 
 
 def test_our_own_frames_that_come_back_are_no_clash(run: Callable[..., Any], loop: Loop) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ending a link: from any thread, at any moment, and with nothing left open."""
+"""CommandStatus a link: from any thread, at any moment, and with nothing left open."""
 
 from __future__ import annotations
 

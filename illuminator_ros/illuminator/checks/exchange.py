@@ -94,7 +94,7 @@ class Exchange(Script):
         self._open = True
         self._beat.send(now, self.outgoing)
 
-    def link_closed(self, now: float) -> None:
+    def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Endpoint.link_closed`."""
         self._open = False
 

@@ -18,24 +18,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import itertools
-import math
 from typing import Any
 
 from .identity import Identity
 from .light import Light, Settings
 from .model import Status
-from ..mavlink.command import Ending
 from ..mavlink.command_sender import CommandSender
-from ..mavlink.component import Endpoint, Heartbeat
-from ..mavlink.deadline_queue import Agenda
+from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (
     Address,
-    CommandAck,
     ComponentInformationBasic,
+    Heartbeat,
     IlluminatorStatus,
     MavType,
 )
-from ..mavlink.messages import Heartbeat as HeartbeatMessage
 
 # Lights that are kept apart; one more is passed over, so that memory is bounded.
 MAX_LIGHTS = 128
@@ -43,87 +39,64 @@ MAX_LIGHTS = 128
 MAX_LEFT_ALONE = 8
 # Lost lights that are looked for at once, so that a slow line is not filled.
 MAX_ASKED = 8
-# s for which a message from our own address counts as a clash.
-CLASH_MEMORY = 10.0
 
 
-class Controller(Endpoint):
+class IlluminatorClient:
     """
     Finds illuminators on a link by what they send, never by their ids.
 
     A component is one if its HEARTBEAT says so (MAV_TYPE_ILLUMINATOR) or if it sends
     ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own.
 
-    :param identity: our own address.
+    :param commands: the command sender of the component that carries this payload.
     :param on_light: called with each light when it is first heard.
     :param wanted: tells whether a light at an address is of interest; others are left alone.
     :param link_failure: returns why the link is not open, for people; '' while it is.
     :ivar lights: those found so far, by address, in the order in which they were found.
     :ivar left_alone: the first lights that are not wanted, by address.
-    :ivar clash_at: when somebody else was last heard from our own address.
     :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
     """
 
     def __init__(
-        self, identity: Address, settings: Settings, *, command_timeout: float = 0.5,
-        command_retries: int = 3, on_light: Callable[[Light], None] = lambda light: None,
+        self, commands: CommandSender, settings: Settings, *,
+        on_light: Callable[[Light], None] = lambda light: None,
         wanted: Callable[[Address], bool] = lambda source: True,
         link_failure: Callable[[], str] = lambda: '',
     ) -> None:
-        super().__init__()
-        self.identity = identity
+        self.commands = commands
         self.settings = settings
         self.lights: dict[Address, Light] = {}
         self.left_alone: dict[Address, None] = {}
-        self.clash_at = -math.inf
         self.passed_over = False
         self._on_light = on_light
         self._wanted = wanted
         self._link_failure = link_failure
-        self._heartbeat = Heartbeat(identity, MavType.ONBOARD_CONTROLLER)
-        self._link_open = False
-        self._agenda: Agenda[Address] = Agenda()
-        self.sender = CommandSender(
-            lambda message: self.outgoing.append((identity, message)), identity,
-            command_timeout, command_retries)
+        self._agenda: DeadlineQueue[Address] = DeadlineQueue()
 
     def link_opened(self, now: float) -> None:
-        """See :meth:`Endpoint.link_opened`."""
-        self._link_open = True
-        self._heartbeat.send(now, self.outgoing)
-        # Who is back answers at once; its own heartbeat may take a second.
+        """See :meth:`Payload.link_opened`."""
+        # A returning light answers immediately; its own heartbeat may take a second.
         lost = (light for light in self.lights.values() if not light.connected)
         for light in itertools.islice(lost, MAX_ASKED):
             light.request_status(now)
 
-    def link_closed(self, now: float) -> None:
-        """See :meth:`Endpoint.link_closed`."""
-        self._link_open = False
-        self.sender.end_all(now, Ending.LINK_LOST)
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
         for light in self.lights.values():
             light.lose('the link was lost')
         self._schedule_all()
 
     def receive(self, source: Address, message: Any, now: float) -> None:
-        """See :meth:`Endpoint.receive`."""
-        if not source.system:
-            # 0 is the address of everybody, and what is sent to it switches every light.
-            return
-        if source == self.identity:
-            # What we have sent ourselves and comes back does not get here: the link drops it.
-            self.clash_at = now
-            return
+        """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
             light = self._light(source)
             if light:
                 light.take_status(Status.from_message(message), now)
-        elif isinstance(message, HeartbeatMessage):
+        elif isinstance(message, Heartbeat):
             is_light = message.type == MavType.ILLUMINATOR
             light = self._light(source) if is_light else self.lights.get(source)
             if light:
                 light.heard(now)
-        elif isinstance(message, CommandAck):
-            self.sender.acknowledge(source, message, now)
         elif isinstance(message, ComponentInformationBasic):
             light = self.lights.get(source)
             if light:
@@ -147,7 +120,7 @@ class Controller(Endpoint):
             if len(self.lights) >= MAX_LIGHTS:
                 self.passed_over = True
                 return None
-            light = self.lights[source] = Light(source, self.sender, self.settings)
+            light = self.lights[source] = Light(source, self.commands, self.settings)
             light.changed = lambda: self._schedule(source)
             light.link_failure = self._link_failure
             self._on_light(light)
@@ -155,23 +128,14 @@ class Controller(Endpoint):
             self.left_alone[source] = None
         return light
 
-    def clashes(self, now: float) -> bool:
-        """Return whether somebody else uses our address."""
-        return now - self.clash_at < CLASH_MEMORY
-
     def poll(self, now: float) -> None:
-        """See :meth:`Endpoint.poll`."""
-        if self._link_open:
-            self._heartbeat.poll(now, self.outgoing)
-        if now >= self.sender.next_deadline():
-            self.sender.poll(now)
-            # What has ended may be of any light.
-            self._schedule_all()
+        """See :meth:`Payload.poll`."""
+        # A command of any light may have ended.
+        self._schedule_all()
         for source in self._agenda.due(now):
             self.lights[source].poll(now)
             self._schedule(source)
 
     def next_deadline(self) -> float:
-        """See :meth:`Endpoint.next_deadline`."""
-        heartbeat = self._heartbeat.due if self._link_open else math.inf
-        return min(heartbeat, self.sender.next_deadline(), self._agenda.next_deadline())
+        """See :meth:`Payload.next_deadline`."""
+        return self._agenda.next_deadline()

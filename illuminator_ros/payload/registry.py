@@ -1,0 +1,53 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Registration: the parts of a payload, each imported only by the program that uses it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+
+@dataclass(frozen=True)
+class PayloadType:
+    """
+    One kind of payload: a light, a winch, a camera ...
+
+    Each part is named as ``module:ATTRIBUTE``, '' for a part that does not exist, so that the
+    simulator runs without ROS and the bridge without the checks.
+
+    :param name: what ``--payload`` and the parameter ``payloads`` call it.
+    :param ros: its node, topics, services and parameters.
+    :param simulated: its simulated device.
+    :param checks: what ``conformance`` requires of a device.
+    """
+
+    name: str
+    ros: str = ''
+    simulated: str = ''
+    checks: str = ''
+
+    def load(self, part: str) -> Any:
+        """
+        Import a part and return it.
+
+        :param part: ``ros``, ``simulated`` or ``checks``.
+        :raises LookupError: if the payload does not have that part.
+        """
+        module, _, attribute = getattr(self, part).partition(':')
+        if not module:
+            raise LookupError(f'payload {self.name} has no part {part}')
+        return getattr(import_module(module), attribute)

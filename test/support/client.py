@@ -1,0 +1,46 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A component that carries the client of lights only."""
+
+from typing import Any
+
+from illuminator_ros.illuminator.client import IlluminatorClient
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import Address
+
+
+class Client(Component):
+    """
+    The drone's side of a link to lights.
+
+    :param options: as for :class:`IlluminatorClient`.
+    """
+
+    def __init__(
+        self, address: Address, settings: Settings, *, command_timeout: float = 0.5,
+        command_retries: int = 3, **options: Any,
+    ) -> None:
+        commands = CommandSender(address, command_timeout, command_retries)
+        self.client = IlluminatorClient(commands, settings, **options)
+        super().__init__(commands, [self.client])
+
+    @property
+    def sender(self) -> CommandSender:
+        return self.commands
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.client, name)
