@@ -22,8 +22,8 @@ from support.fixtures import (  # noqa: F401
     own_ros,
     parameters,
     port,
+    private_home,
     ros,
-    ros_home,
     settings,
     shared_bridge,
 )

@@ -24,14 +24,14 @@ from typing import Any
 import pytest
 from support.light import ServedLight
 from support.ports import free_port
-from support.processes import Program
+from support.processes import environment, Program
 from support.ros import own_domain, Parameters, Ros, running_bridge
 
 
 @pytest.fixture(scope='session', autouse=True)
-def ros_home(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Keep logs and time stamps of the programs under test out of the user's home."""
-    os.environ['ROS_HOME'] = str(tmp_path_factory.mktemp('ros_home'))
+def private_home() -> None:
+    """Keep logs and time stamps of nodes in the test's own process out of the user's home."""
+    os.environ |= {name: environment()[name] for name in ('HOME', 'ROS_HOME', 'ROS_LOG_DIR')}
 
 
 @pytest.fixture(scope='module', autouse=True)

@@ -35,7 +35,7 @@ from illuminator_ros.cli.monitor.model import Light, Outcome
 from illuminator_ros.cli.monitor.run import Monitor
 from rclpy.node import Node
 from support.light import eventually
-from support.processes import end_with_parent, environment, ROOT, slow_environment
+from support.processes import environment, prepare_child, ROOT, slow_environment
 from support.ros import Ros
 from support.slow import CLOCK
 from support.waiting import PATIENCE
@@ -194,7 +194,7 @@ class Terminal:
 
 def _own_terminal() -> None:
     """Have the keys of the terminal send signals to this program, and end it with its parent."""
-    end_with_parent()
+    prepare_child()
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
 

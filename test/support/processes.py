@@ -12,26 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Programs under test: started, read, ended and waited for."""
+"""Programs under test: each is started here, and read, ended and waited for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import contextlib
 import ctypes
+import functools
 import os
 from pathlib import Path
 import select
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
-from typing import Any
 
 from support.waiting import PATIENCE
 
 ROOT = Path(__file__).parents[2]
-# Looked up here: after a fork as little as possible is to happen.
+# Looked up here: after a fork as little as possible must happen.
 PRCTL = ctypes.CDLL(None).prctl
 PR_SET_PDEATHSIG = 1
 
@@ -44,7 +45,7 @@ class Program:
         self._process = subprocess.Popen(
             command, env=environment(env), cwd=cwd or ROOT, bufsize=0,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            preexec_fn=end_with_parent)
+            preexec_fn=prepare_child)
         self._lines: list[str] = []
         self._rest = b''
         self._ended = False
@@ -132,15 +133,29 @@ class Program:
         return self._process.poll() is None
 
 
-def end_with_parent() -> None:
-    """Have the kernel end this program with the thread that starts it, should that be killed."""
+def prepare_child() -> None:
+    """
+    Give a child default signal handling, and let it end with the thread that starts it.
+
+    Children inherit ignored signals: SIGHUP under nohup, SIGINT in the background of a script.
+    """
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGTSTP):
+        signal.signal(number, signal.SIG_DFL)
     PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
+@functools.cache
+def _home() -> tempfile.TemporaryDirectory[str]:
+    """Return the home directory of all programs that this process starts."""
+    return tempfile.TemporaryDirectory(prefix='illuminator_ros_home_')
+
+
 def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the environment of programs under test: this working tree, no network."""
+    """Return the environment of programs under test: this tree, a home of their own, loopback."""
+    home = _home().name
     return {
-        **os.environ, 'PYTHONPATH': os.pathsep.join(
+        **os.environ, 'HOME': home, 'ROS_HOME': f'{home}/.ros', 'ROS_LOG_DIR': f'{home}/log',
+        'PYTHONPATH': os.pathsep.join(
             filter(None, (str(ROOT), os.environ.get('PYTHONPATH')))),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **(more or {})}
 
@@ -164,11 +179,14 @@ def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = No
         env={**slow_environment(), **(env or {})})
 
 
-def run(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Any:
-    """Run a module of ours to its end; return what :func:`subprocess.run` does."""
+def run(
+    module: str, *arguments: str, env: Mapping[str, str] | None = None,
+) -> subprocess.CompletedProcess[str]:
+    """Run a module of ours to its end; return its exit status and output."""
     return subprocess.run(
         [sys.executable, '-m', module, *arguments], env=environment(env), cwd=ROOT, text=True,
-        stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
+        stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE,
+        preexec_fn=prepare_child)
 
 
 @contextlib.contextmanager
