@@ -28,9 +28,13 @@ import socket
 import time
 from typing import Any
 
-from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.model import Status
-from illuminator_ros.illuminator.observer import LightObserver
+from illuminator_ros.illuminator.events import (
+    AnyLightEvent,
+    LightConnected,
+    LightLost,
+    StatusReceived,
+)
+from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.frame import encode_frame
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
@@ -58,7 +62,7 @@ FLAT = 1.2
 LISTENING = 2.0
 
 
-class Watcher(LightObserver):
+class Watcher:
     """Counts what lights report."""
 
     def __init__(self) -> None:
@@ -66,26 +70,23 @@ class Watcher(LightObserver):
         self.lost_count = 0
         self.statuses: Counter[Address] = Counter()
 
-    def connected(self, light: Light) -> None:
-        self.found.setdefault(light.source, time.monotonic())
-
-    def lost(self, light: Light, reason: str) -> None:
-        self.lost_count += 1
-
-    def status(self, light: Light, status: Status) -> None:
-        self.statuses[light.source] += 1
+    def take(self, event: AnyLightEvent) -> None:
+        """Count an event."""
+        if isinstance(event, StatusReceived):
+            self.statuses[event.address] += 1
+        elif isinstance(event, LightConnected):
+            self.found.setdefault(event.address, time.monotonic())
+        elif isinstance(event, LightLost):
+            self.lost_count += 1
 
 
 @contextlib.contextmanager
 def listening(port: int, **options: Any) -> Iterator[tuple[Link, Watcher]]:
     """Run a controller that listens on a port."""
     watcher = Watcher()
-
-    def found(light: Light) -> None:
-        light.observer = watcher
-
-    link = Link(parse_url(f'udpin://127.0.0.1:{port}'),
-                Client(Address(1, 194), Settings(), on_light=found, **options), label='')
+    client = Client(Address(1, 194), Settings(), **options)
+    client.events.subscribe(watcher.take)
+    link = Link(parse_url(f'udpin://127.0.0.1:{port}'), client, label='')
     link.start()
     until = time.monotonic() + PATIENCE
     while not link.state().is_open and time.monotonic() < until:

@@ -20,8 +20,8 @@ from collections.abc import Mapping
 from typing import Any, TYPE_CHECKING
 
 from .comparison import unexplained
+from .events import Cause, ConfigurationChanged
 from .model import checked, Configuration, FIELDS, InvalidValue, Status
-from .observer import Cause
 
 if TYPE_CHECKING:
     from .light import Light
@@ -115,7 +115,8 @@ class Agreed:
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
-            self._light.observer.configured(self._light, configuration, names, cause)
+            self._light.emit(ConfigurationChanged(
+                self._light.address, configuration, names, cause))
 
     def _follow(self, status: Status, agreed: Configuration, reported: Configuration) -> None:
         # Under external sync too: somebody else may have changed what cannot be told apart.

@@ -23,8 +23,8 @@ from typing import Any, TYPE_CHECKING
 from .agreed import Agreed
 from .comparison import unexplained
 from .configure import Configure
+from .events import Cause, ConfigurationRestored, SetpointFailed
 from .model import checked, FIELDS, InvalidValue, NOTHING, Status
-from .observer import Cause
 from .operation import Done, Result
 from .operation_queue import OperationQueue
 
@@ -97,7 +97,7 @@ class Agreement(Agreed):
         :param brightness: %, checked.
         """
         if unreachable := self._light.unreachable(now):
-            self._light.observer.setpoint_failed(self._light, unreachable)
+            self._setpoint_failed(unreachable)
             return
         current = self._queue.current
         if (isinstance(current, Configure) and current.stream and not current.finished
@@ -163,7 +163,7 @@ class Agreement(Agreed):
         """Note that the light is lost: a setpoint of now must not take effect when it is back."""
         if self._setpoint is not None:
             self._setpoint = None
-            self._light.observer.setpoint_failed(self._light, f'the light is lost: {reason}')
+            self._setpoint_failed(f'the light is lost: {reason}')
 
     def take_status(self, status: Status, sent_by: float, now: float) -> None:
         """
@@ -207,6 +207,12 @@ class Agreement(Agreed):
             value, self._setpoint = self._setpoint, None
             self._send_setpoint(value, now)
 
+    def _setpoint_failed(self, message: str) -> None:
+        self._light.emit(SetpointFailed(self._light.address, message))
+
+    def _restored(self, success: bool, message: str) -> None:
+        self._light.emit(ConfigurationRestored(self._light.address, success, message))
+
     @property
     def _replaceable(self) -> Configure | None:
         """Return the setpoint that is accepted but not confirmed: a newer one need not wait."""
@@ -233,30 +239,30 @@ class Agreement(Agreed):
             if result.success:
                 self._want_no_more(['brightness'])
             else:
-                self._light.observer.setpoint_failed(self._light, result.message)
+                self._setpoint_failed(result.message)
 
         try:
             self._submit({'brightness': value}, now, finished, stream=True)
         except InvalidValue as error:
-            self._light.observer.setpoint_failed(self._light, str(error))
+            self._setpoint_failed(str(error))
 
     def _send_wanted(self, now: float) -> None:
         self._wanted_at = now + RESTORE_INTERVAL
-        observer, light = self._light.observer, self._light
+        light = self._light
         try:
             self.with_changes(self._wanted)
         except InvalidValue as error:
             # They still wait for a status; but whoever gave them should know.
             self._told = True
             self.discrepancy = f'{", ".join(self._wanted)} not sent: {error}'
-            observer.restored(light, False, self.discrepancy)
+            self._restored(False, self.discrepancy)
             return
         for name, value in list(self._wanted.items()):
             try:
                 checked(name, value, light.limits)
             except InvalidValue as error:
                 self._want_no_more([name])
-                observer.restored(light, False, str(error))
+                self._restored(False, str(error))
         if self._wanted_due == math.inf:
             return
 
@@ -265,7 +271,7 @@ class Agreement(Agreed):
             if (result.success or result.permanent
                     or self._contradictions >= MAX_CONTRADICTIONS):
                 self._want_no_more(self._wanted)
-                observer.restored(light, result.success, result.message)
+                self._restored(result.success, result.message)
             if not result.success:
                 self.discrepancy = result.message
 

@@ -20,6 +20,7 @@ from collections.abc import Callable
 import itertools
 from typing import Any
 
+from .events import AnyLightEvent, ClientSnapshot, LightFound
 from .identity import Identity
 from .light import Light, Settings
 from .model import Status
@@ -32,6 +33,7 @@ from ..mavlink.messages import (
     IlluminatorStatus,
     MavType,
 )
+from ..payload.events import Listeners
 
 # Lights that are kept apart; one more is passed over, so that memory is bounded.
 MAX_LIGHTS = 128
@@ -49,9 +51,8 @@ class IlluminatorClient:
     ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own.
 
     :param commands: the command sender of the component that carries this payload.
-    :param on_light: called with each light when it is first heard.
     :param wanted: tells whether a light at an address is of interest; others are left alone.
-    :param link_failure: returns why the link is not open, for people; '' while it is.
+    :ivar events: the events of all lights.
     :ivar lights: those found so far, by address, in the order in which they were found.
     :ivar left_alone: the first lights that are not wanted, by address.
     :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
@@ -59,23 +60,33 @@ class IlluminatorClient:
 
     def __init__(
         self, commands: CommandSender, settings: Settings, *,
-        on_light: Callable[[Light], None] = lambda light: None,
         wanted: Callable[[Address], bool] = lambda source: True,
-        link_failure: Callable[[], str] = lambda: '',
     ) -> None:
         self.commands = commands
         self.settings = settings
         self.lights: dict[Address, Light] = {}
         self.left_alone: dict[Address, None] = {}
         self.passed_over = False
-        self._on_light = on_light
+        self.events: Listeners[AnyLightEvent] = Listeners()
         self._wanted = wanted
-        self._link_failure = link_failure
         self._agenda: DeadlineQueue[Address] = DeadlineQueue()
+
+    @property
+    def commanded_or_found(self) -> list[Light]:
+        """Return every light that may be on, by address."""
+        return [self.lights[address] for address in sorted(self.lights)]
+
+    def snapshot(self, now: float) -> ClientSnapshot:
+        """Return what is known of all lights, for any thread; call it in the link's thread."""
+        return ClientSnapshot(
+            {address: light.snapshot(now) for address, light in self.lights.items()},
+            tuple(self.left_alone), self.passed_over)
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
         # A returning light answers immediately; its own heartbeat may take a second.
+        for light in self.lights.values():
+            light.link_opened(now)
         lost = (light for light in self.lights.values() if not light.connected)
         for light in itertools.islice(lost, MAX_ASKED):
             light.request_status(now)
@@ -83,7 +94,7 @@ class IlluminatorClient:
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         for light in self.lights.values():
-            light.lose('the link was lost')
+            light.link_closed(reason)
         self._schedule_all()
 
     def receive(self, source: Address, message: Any, now: float) -> None:
@@ -120,10 +131,10 @@ class IlluminatorClient:
             if len(self.lights) >= MAX_LIGHTS:
                 self.passed_over = True
                 return None
-            light = self.lights[source] = Light(source, self.commands, self.settings)
-            light.changed = lambda: self._schedule(source)
-            light.link_failure = self._link_failure
-            self._on_light(light)
+            light = self.lights[source] = Light(
+                source, self.commands, self.settings, self.events.emit,
+                lambda: self._schedule(source))
+            self.events.emit(LightFound(source))
         elif light is None and len(self.left_alone) < MAX_LEFT_ALONE:
             self.left_alone[source] = None
         return light

@@ -56,7 +56,7 @@ class Configure(Operation):
     def command(self) -> Command:
         """See :meth:`Operation.command`."""
         return Command(
-            self.light.source, MavCmd.DO_ILLUMINATOR_CONFIGURE,
+            self.light.address, MavCmd.DO_ILLUMINATOR_CONFIGURE,
             (*self.wanted.params(), float(self.light.instance)))
 
     def shown_by(self, status: Status) -> bool:

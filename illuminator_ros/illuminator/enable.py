@@ -39,7 +39,7 @@ class Enable(Operation):
 
     def command(self) -> Command:
         """See :meth:`Operation.command`."""
-        return Command(self.light.source, MavCmd.ILLUMINATOR_ON_OFF,
+        return Command(self.light.address, MavCmd.ILLUMINATOR_ON_OFF,
                        (float(self.on), float(self.light.instance)))
 
     def shown_by(self, status: Status) -> bool:

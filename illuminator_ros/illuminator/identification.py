@@ -79,7 +79,7 @@ class Identification:
         self._questions += 1
         self._message_until = math.inf
         self._command = Command(
-            self._light.source, MavCmd.REQUEST_MESSAGE, (float(INFORMATION_ID),))
+            self._light.address, MavCmd.REQUEST_MESSAGE, (float(INFORMATION_ID),))
         self._light.sender.start(self._command, now, self._answered)
 
     def give_way(self, now: float) -> None:

@@ -16,17 +16,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from .agreement import Agreement
 from .enable import Enable
 from .error_flags import ErrorFlag
+from .events import (
+    AnyLightEvent,
+    LightConnected,
+    LightIdentified,
+    LightLost,
+    LightRestarted,
+    LightSnapshot,
+    StatusReceived,
+)
 from .identification import Identification
 from .identity import Identity
 from .model import Limits, Status
-from .observer import LightObserver
 from .operation import Done, Result
 from .operation_queue import OperationQueue
 from .refresh import Refresh
@@ -60,6 +69,8 @@ class Light:
     """
     One component that is an illuminator. No I/O; time is passed in.
 
+    :param emit: takes the events.
+    :param changed: called when a request may have changed :meth:`next_deadline`.
     :ivar connected: whether it is heard.
     :ivar status: the newest status, None before the first.
     :ivar restarts: how often it has restarted since it was found.
@@ -67,27 +78,26 @@ class Light:
         commands can say until mavlink pull request 2490 is settled.
     :ivar sharing: whether it is several lights in truth.
     :ivar measures_temperature: whether it has ever sent a temperature other than 0.
-    :ivar changed: called when a request may have changed :meth:`next_deadline`.
-    :ivar link_failure: returns why the link is not open, for people; '' while it is.
     """
 
     def __init__(
-        self, source: Address, sender: CommandSender, settings: Settings,
-        observer: LightObserver | None = None, *, instance: int = 0,
+        self, address: Address, sender: CommandSender, settings: Settings,
+        emit: Callable[[AnyLightEvent], None], changed: Callable[[], None], *,
+        instance: int = 0,
     ) -> None:
-        self.source = source
+        self.address = address
+        self.emit = emit
+        self.changed = changed
         self.instance = instance
         self.sender = sender
         self.settings = settings
-        self.observer = observer or LightObserver()
         self.connected = False
         self.heard_at = -math.inf
         self.status: Status | None = None
         self.status_at = -math.inf
         self.restarts = 0
         self.measures_temperature = False
-        self.changed: Callable[[], None] = lambda: None
-        self.link_failure: Callable[[], str] = lambda: ''
+        self._link_failure = ''
         self.identification = Identification(self)
         self.agreement = Agreement(self)
         self.sharing = Sharing()
@@ -107,7 +117,7 @@ class Light:
         if not self.connected:
             self.connected = True
             self._set_up(now)
-            self.observer.connected(self)
+            self.emit(LightConnected(self.address))
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
@@ -122,13 +132,14 @@ class Light:
                 self.status.uptime_ms, status.uptime_ms, now - self.status_at, away=was_away)
         if meaning is Uptime.LATE:
             return
+        was_on = self.status.enabled if self.status else None
         self.status = status
         self.status_at = now
         self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
         self.measures_temperature |= bool(status.temperature)
         if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and was_away):
-            self._restarted(now)
+            self._restarted(was_on, now)
         sent_by = (now if self.sharing.recognised
                    else self._sending_times.sent_by(status.uptime_ms, now))
         if self._switching.current:
@@ -136,13 +147,14 @@ class Light:
         self.agreement.take_status(status, sent_by, now)
         self._tell_refreshes(lambda refresh: refresh.status(now))
         # Last, since it takes longest: whoever waits for the status has been answered by then.
-        self.observer.status(self, status)
+        self.emit(StatusReceived(
+            self.address, status, now, self.temperature, self.sharing.recognised))
 
     def take_information(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
         self.heard(now)
         self.identification.received(identity, now)
-        self.observer.identified(self, identity)
+        self.emit(LightIdentified(self.address, identity))
 
     def lose(self, reason: str) -> None:
         """Note that the light is not heard any more."""
@@ -151,13 +163,23 @@ class Light:
             self._was_away = True
             self._status_due = math.inf
             self.sharing.clear()
-            self.observer.lost(self, reason)
+            self.emit(LightLost(self.address, reason))
             self.agreement.lost(reason)
 
-    def _restarted(self, now: float) -> None:
+    def link_opened(self, now: float) -> None:
+        """Note that the light can be reached."""
+        self._link_failure = ''
+
+    def link_closed(self, reason: str) -> None:
+        """Note that the light cannot be reached."""
+        self._link_failure = f'the link is not open: {reason}'
+        self.lose('the link was lost')
+
+    def _restarted(self, was_on: bool | None, now: float) -> None:
         self.restarts += 1
         self._sending_times = SendingTimes()
-        self.observer.restarted(self)
+        self.emit(LightRestarted(
+            self.address, was_on, self.status.enabled if self.status else None))
         self._set_up(now)
         self.agreement.restarted(now)
 
@@ -166,7 +188,7 @@ class Light:
         interval = self.settings.status_interval
         if interval > 0:
             self.sender.start(Command(
-                self.source, MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6)),
+                self.address, MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6)),
                 now, lambda outcome, now: None)
         self._status_due = now + STATUS_TIMEOUT
         self.request_status(now)
@@ -198,14 +220,50 @@ class Light:
         if self.connected:
             return ''
         # Without a link nothing can be heard: that is the reason, and silence its consequence.
-        reason = (self.link_failure()
+        reason = (self._link_failure
                   or f'no heartbeat for {format_seconds(now - self.heard_at)}')
-        return f'light {self.source} is lost: {reason}'
+        return f'light {self.address} is lost: {reason}'
+
+    def snapshot(self, now: float) -> LightSnapshot:
+        """Return what is known, for any thread."""
+        return LightSnapshot(
+            self.address, self.connected, self.heard_at, self.status, self.status_at,
+            self.settings.status_interval, self.restarts, self.temperature,
+            self.agreement.agreed, self.agreement.discrepancy, self.identification.identity,
+            self.identification.settled(now), self.sharing.recognised, self.unreachable(now))
 
     # Requests
 
-    def enable(self, on: bool, now: float, done: Done) -> None:
-        """Switch the light on or off; ``done`` is called once with the result."""
+    def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
+        """
+        Change some fields with one command; ``done`` is called once with the result.
+
+        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
+        """
+        self.agreement.configure(changes, now, done)
+
+    def set_brightness(self, brightness: float, now: float) -> None:
+        """
+        Take a setpoint of a stream: the newest wins, and one command is under way at a time.
+
+        :param brightness: %, checked.
+        """
+        self.agreement.set_brightness(brightness, now)
+
+    def set_desired(self, values: Mapping[str, Any], now: float) -> None:
+        """
+        Have values sent as soon as the light has reported its configuration.
+
+        :param values: by name, checked but for the limits that the light reports.
+        """
+        self.agreement.want(values, now)
+
+    def enable(self, on: bool, now: float, done: Done, *, detail: str = '') -> None:
+        """
+        Switch the light on or off; ``done`` is called once with the result.
+
+        :param detail: how it was asked for, which :class:`LightSwitched` repeats.
+        """
         if unreachable := self.unreachable(now):
             done(Result(False, unreachable), now)
         else:
@@ -216,7 +274,7 @@ class Light:
         """End all requests, so that the next one is sent at once: a node's last to its light."""
         self._switching.cancel(now)
         self.agreement.cancel(now)
-        self.sender.end_all(now, CommandStatus.CANCELLED, self.source)
+        self.sender.end_all(now, CommandStatus.CANCELLED, self.address)
         self.changed()
 
     def refresh(self, now: float, done: Done) -> None:
@@ -231,10 +289,10 @@ class Light:
         self, now: float, done: Callable[[CommandResult, float], None] | None = None,
     ) -> None:
         """Ask for a status; without ``done`` only where no question is under way already."""
-        if done is None and self.sender.pending(self.source, MavCmd.REQUEST_MESSAGE):
+        if done is None and self.sender.pending(self.address, MavCmd.REQUEST_MESSAGE):
             return
         self.sender.start(
-            Command(self.source, MavCmd.REQUEST_MESSAGE, (float(STATUS_ID),)), now,
+            Command(self.address, MavCmd.REQUEST_MESSAGE, (float(STATUS_ID),)), now,
             done or (lambda outcome, now: None))
 
     # Time

@@ -201,7 +201,7 @@ class Operation(ABC):
             found = ', '.join(filter(None, (
                 self.found(self._contradiction),
                 *flag_names(self._contradiction.error_flags),
-                f'several lights answer as {self.light.source}'
+                f'several lights answer as {self.light.address}'
                 if self.light.sharing.recognised else '')))
             self._failure(f'but ILLUMINATOR_STATUS shows {found}', now, contradicted=True)
         elif self.light.sends_status:

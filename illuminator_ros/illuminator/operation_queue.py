@@ -40,7 +40,7 @@ class OperationQueue:
         """Start a change, or put it behind the others."""
         if len(self._operations) >= MAX_WAITING:
             operation.fail(f'{MAX_WAITING} requests are waiting for light '
-                           f'{operation.light.source} already', now)
+                           f'{operation.light.address} already', now)
             return
         self._operations.append(operation)
         if len(self._operations) == 1:

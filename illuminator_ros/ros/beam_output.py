@@ -28,9 +28,7 @@ from rclpy.node import Node
 from .beam import Beam, cone, Look
 from .mounting import Mounting
 from .outputs import STATE_QOS
-from ..illuminator.light import Light
-from ..illuminator.model import Status
-from ..illuminator.observer import LightObserver
+from ..illuminator.events import AnyLightEvent, LightLost, StatusReceived
 
 # Red, green, blue.
 WARM_WHITE = (1.0, 0.95, 0.75)
@@ -47,7 +45,7 @@ FAREWELL = Duration(seconds=0.05)
 MARGIN = 0.001
 
 
-class BeamOutput(LightObserver):
+class BeamOutput:
     """
     Publishes the beam of one light, from the executor of its node.
 
@@ -71,17 +69,15 @@ class BeamOutput(LightObserver):
         self._timer = node.create_timer(
             REFRESH, self._draw, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
 
-    def status(self, light: Light, status: Status) -> None:
-        """See :meth:`LightObserver.status`."""
+    def take(self, event: AnyLightEvent) -> None:
+        """Draw what an event changes."""
         with self._lock:
-            if self._beam.take(status, self._clock()):
+            if isinstance(event, StatusReceived):
+                if self._beam.take(event.status, self._clock()):
+                    self._ring(AT_ONCE)
+            elif isinstance(event, LightLost):
+                self._beam.lose()
                 self._ring(AT_ONCE)
-
-    def lost(self, light: Light, reason: str) -> None:
-        """See :meth:`LightObserver.lost`."""
-        with self._lock:
-            self._beam.lose()
-            self._ring(AT_ONCE)
 
     def end(self) -> None:
         """Take the beam away, after the node's executor has ended."""

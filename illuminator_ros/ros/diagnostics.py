@@ -123,12 +123,12 @@ def link_findings(
         why = f': {why_no_light(state, client)}' if state.is_open else ''
         findings.append(
             (severity, f'no light connected for {format_seconds(now - started)}{why}'))
-    if state.signing.unchecked and light and light.source in component.commands.unanswering:
+    if state.signing.unchecked and light and light.address in component.commands.unanswering:
         findings.append((WARN, 'commands go unanswered, and the others sign their frames while '
                                'signing_mode is off'))
     if client.passed_over:
         findings.append((WARN, f'more than {len(client.lights)} lights, some passed over'))
-    counter = state.traffic.sources.get(light.source) if light else None
+    counter = state.traffic.sources.get(light.address) if light else None
     if counter and counter.recent_loss(now) > LOSS_WARNING:
         findings.append((WARN, f'{counter.recent_loss(now):.0f} % of the frames lost'))
     return findings
@@ -140,9 +140,9 @@ def link_status(
 ) -> DiagnosticStatus:
     """Return the status of the link, as seen by the node of one light (None: of none yet)."""
     findings = link_findings(state, component, client, light, now=now, started=started)
-    counter = state.traffic.sources.get(light.source) if light else None
+    counter = state.traffic.sources.get(light.address) if light else None
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
-    trip = component.commands.round_trip(light.source) if light else None
+    trip = component.commands.round_trip(light.address) if light else None
     seconds = [trip.quantile(0.5), trip.quantile(0.95)] if trip else [None, None]
     return _status(f'{node_name}: link', url, findings, f'open: {state.name}', {
         'url': url,
@@ -190,7 +190,7 @@ def lamp_findings(light: Light, now: float) -> list[Finding]:
         if status.invalid:
             findings.append((WARN, f'not believable: {", ".join(status.invalid)}'))
     if light.sharing.recognised:
-        findings.append((WARN, f'several lights answer as {light.source}: their statuses '
+        findings.append((WARN, f'several lights answer as {light.address}: their statuses '
                                'contradict one another'))
     if light.agreement.discrepancy:
         findings.append((WARN, light.agreement.discrepancy))
@@ -201,7 +201,7 @@ def lamp_status(node_name: str, hardware_id: str, light: Light, now: float) -> D
     """Return the status of a light."""
     status, identity = light.status, light.identification.identity
     values: dict[str, Any] = {
-        'address': str(light.source),
+        'address': str(light.address),
         'connected': light.connected,
         'heard_s_ago': now - light.heard_at,
         'restarts': light.restarts,
@@ -235,4 +235,4 @@ def lamp_status(node_name: str, hardware_id: str, light: Light, now: float) -> D
 def hardware_id(light: Light) -> str:
     """Return the id of a light: its serial number, else its address as ``mavlink:1/243``."""
     identity = light.identification.identity
-    return (identity.serial_number if identity else '') or f'mavlink:{light.source}'
+    return (identity.serial_number if identity else '') or f'mavlink:{light.address}'

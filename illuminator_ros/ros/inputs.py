@@ -93,7 +93,7 @@ class Inputs:
 
     async def _configure(self, changes: dict[str, Any]) -> str:
         result = await self.ask(
-            lambda light, now, done: light.agreement.configure(changes, now, done))
+            lambda light, now, done: light.configure(changes, now, done))
         return '' if result.success else result.message
 
     def _limits(self) -> Any:
@@ -131,4 +131,4 @@ class Inputs:
             self._node.get_logger().warning(
                 f'~/cmd/brightness: {self._absent()}', throttle_duration_sec=5.0)
         elif value is not None:
-            light.agreement.set_brightness(value, now)
+            light.set_brightness(value, now)

@@ -84,7 +84,9 @@ class IlluminatorNode(Node):
             self.get_logger().warning(warning)
         self._beam = BeamOutput(self, mounting, link.clock) if mounting.beam_range else None
         self.outputs = Outputs(
-            self, mounting.frame_id, self._check_lamp, self._beam, self._forgive_loss)
+            self, mounting.frame_id, self._check_lamp,
+            self._beam.take if self._beam else lambda event: None,
+            begun_anew=self._forgive_loss)
         self.inputs = Inputs(self, link, lambda: self.light, self.absence)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._period = period
@@ -94,10 +96,10 @@ class IlluminatorNode(Node):
     def bind(self, light: Light, now: float) -> None:
         """Serve a light from now on, and tell what is known of it; in the link's thread."""
         self.light = light
-        light.observer = self.outputs
-        self.outputs.catch_up(light)
+        for event in light.snapshot(now).events():
+            self.outputs.take(event)
         if self._overrides:
-            light.agreement.want(self._overrides, now)
+            light.set_desired(self._overrides, now)
 
     def end(self) -> None:
         """Take back what others would go on to show, after the executor has ended."""
@@ -142,7 +144,7 @@ class IlluminatorNode(Node):
 
     def _forgive_loss(self) -> None:
         """Take the step back of a restarted light's sequence numbers for no loss of frames."""
-        counter = self.light and self._link.state().traffic.sources.get(self.light.source)
+        counter = self.light and self._link.state().traffic.sources.get(self.light.address)
         if counter:
             counter.forgive()
 

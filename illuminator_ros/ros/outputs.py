@@ -31,10 +31,20 @@ from .conversions import STATUS_TOPICS, status_values, temperature_message
 from .diagnostics import ERROR, WARN
 from .flag_log import FlagLog
 from .parameters import DEVICE_SPECS, period_range
+from ..illuminator.events import (
+    AnyLightEvent,
+    Cause,
+    ConfigurationChanged,
+    ConfigurationRestored,
+    LightConnected,
+    LightIdentified,
+    LightLost,
+    LightRestarted,
+    SetpointFailed,
+    StatusReceived,
+)
 from ..illuminator.identity import Identity
-from ..illuminator.light import Light
-from ..illuminator.model import Configuration, FIELDS, Limits, Mode, shortest, Status
-from ..illuminator.observer import Cause, LightObserver
+from ..illuminator.model import Limits, Mode, shortest
 
 # A late subscriber gets the last value.
 STATE_QOS = QoSProfile(
@@ -43,21 +53,22 @@ STATE_QOS = QoSProfile(
 STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 
 
-class Outputs(LightObserver):
+class Outputs:
     """
     Publishes what one light reports, from the link's thread: there is no hop in between.
 
     :param changed: called after anything that diagnostics might have to tell at once.
-    :param beam: who also is told what to show, if anybody is.
+    :param beam: takes the events, too, to draw the beam.
     :param begun_anew: called when the light has restarted.
     """
 
     def __init__(
         self, node: Node, frame_id: str, changed: Callable[[], None],
-        beam: LightObserver | None = None, begun_anew: Callable[[], None] = lambda: None,
+        beam: Callable[[AnyLightEvent], None] = lambda event: None, *,
+        begun_anew: Callable[[], None] = lambda: None,
     ) -> None:
         self._node = node
-        self._beam = beam or LightObserver()
+        self._beam = beam
         self._frame_id = frame_id
         self._changed = changed
         self._begun_anew = begun_anew
@@ -67,87 +78,83 @@ class Outputs(LightObserver):
         self._connected = node.create_publisher(Bool, '~/connected', STATE_QOS)
         self._connected.publish(Bool(data=False))
         self._identity: Identity | None = None
-        self._enabled: bool | None = None
         self._limits = Limits()
         self._shared = False
         self._flags = FlagLog()
+        self._handlers: dict[type, Callable[[Any], None]] = {
+            LightConnected: self._light_connected, LightLost: self._light_lost,
+            LightRestarted: self._light_restarted, LightIdentified: self._light_identified,
+            StatusReceived: self._status_received,
+            ConfigurationChanged: self._configuration_changed,
+            ConfigurationRestored: self._configuration_restored,
+            SetpointFailed: self._setpoint_failed,
+        }
         self._mirroring = threading.RLock()
         self._mirrored_by: int | None = None
         node.add_on_set_parameters_callback(self._may_set)
 
-    def catch_up(self, light: Light) -> None:
-        """Tell what has happened before somebody listened."""
-        if light.connected:
-            self.connected(light)
-        if light.identification.identity:
-            self.identified(light, light.identification.identity)
-        if light.status:
-            self.status(light, light.status)
-        if light.agreement.agreed:
-            self.configured(
-                light, light.agreement.agreed, list(FIELDS), Cause.FIRST_STATUS)
+    def take(self, event: AnyLightEvent) -> None:
+        """Publish an event."""
+        handler = self._handlers.get(type(event))
+        if handler is not None:
+            handler(event)
+        self._beam(event)
+        if not isinstance(event, LightRestarted | LightIdentified | ConfigurationChanged
+                          | SetpointFailed):
+            self._changed()
 
-    def connected(self, light: Light) -> None:
-        """See :meth:`LightObserver.connected`."""
-        self._node.get_logger().info(f'light {light.source} connected')
+    def _light_connected(self, event: LightConnected) -> None:
+        self._node.get_logger().info(f'light {event.address} connected')
         self._connected.publish(Bool(data=True))
-        self._changed()
 
-    def lost(self, light: Light, reason: str) -> None:
-        """See :meth:`LightObserver.lost`."""
-        self._node.get_logger().warning(f'light {light.source} lost: {reason}')
+    def _light_lost(self, event: LightLost) -> None:
+        self._node.get_logger().warning(f'light {event.address} lost: {event.reason}')
         self._connected.publish(Bool(data=False))
-        self._beam.lost(light, reason)
-        self._changed()
 
-    def restarted(self, light: Light) -> None:
-        """See :meth:`LightObserver.restarted`."""
+    def _light_restarted(self, event: LightRestarted) -> None:
         self._begun_anew()
         logger = self._node.get_logger()
-        logger.info(f'light {light.source} has restarted', throttle_duration_sec=1.0)
-        if self._enabled and light.status and light.status.enabled is False:
-            logger.warning(f'light {light.source} was on before it restarted, and is off now',
+        logger.info(f'light {event.address} has restarted', throttle_duration_sec=1.0)
+        if event.was_on and event.is_on is False:
+            logger.warning(f'light {event.address} was on before it restarted, and is off now',
                            throttle_duration_sec=1.0)
 
-    def identified(self, light: Light, identity: Identity) -> None:
-        """See :meth:`LightObserver.identified`."""
+    def _light_identified(self, event: LightIdentified) -> None:
+        identity = event.identity
         if identity == self._identity:
             return
         before, self._identity = self._identity, identity
         known = ' '.join(filter(None, (identity.vendor, identity.model)))
         serial = f', serial number {identity.serial_number}' if identity.serial_number else ''
-        line = f'light {light.source} is {known or "nameless"}{serial}'
+        line = f'light {event.address} is {known or "nameless"}{serial}'
         logger = self._node.get_logger()
         if before is None:
             logger.info(line)
         else:
             logger.info(line, throttle_duration_sec=1.0)
 
-    def status(self, light: Light, status: Status) -> None:
-        """See :meth:`LightObserver.status`."""
-        self._enabled = status.enabled
+    def _status_received(self, event: StatusReceived) -> None:
+        status = event.status
         for name, value in status_values(status).items():
             self._publishers[name].publish(STATUS_TOPICS[name](data=value))
-        temperature = light.temperature
+        temperature = event.temperature
         if temperature is not None:
             stamp = self._node.get_clock().now().to_msg()
             self._temperature.publish(temperature_message(temperature, stamp, self._frame_id))
-        if light.sharing.recognised and not self._shared:
+        if event.shared_address and not self._shared:
             self._node.get_logger().warning(
-                f'several lights answer as {light.source}: parameters stay as they are',
+                f'several lights answer as {event.address}: parameters stay as they are',
                 throttle_duration_sec=5.0)
-        self._shared = light.sharing.recognised
+        self._shared = event.shared_address
         if status.limits != self._limits:
             self._limits = status.limits
             self._fit()
-        self._tell_flags(light, status)
-        self._beam.status(light, status)
-        self._changed()
+        self._tell_flags(event)
 
-    def _tell_flags(self, light: Light, status: Status) -> None:
+    def _tell_flags(self, event: StatusReceived) -> None:
         logger = self._node.get_logger()
-        for severity, text in self._flags.take(status.error_flags, light.status_at):
-            line = f'light {light.source}: {text}'
+        for severity, text in self._flags.take(event.status.error_flags, event.received_at):
+            line = f'light {event.address}: {text}'
             # One call each: rclpy refuses another severity from the same line.
             if severity == ERROR:
                 logger.error(line)
@@ -156,13 +163,11 @@ class Outputs(LightObserver):
             else:
                 logger.info(line)
 
-    def configured(
-        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
-    ) -> None:
-        """See :meth:`LightObserver.configured`."""
-        if cause is Cause.LIGHT:
+    def _configuration_changed(self, event: ConfigurationChanged) -> None:
+        configuration, names = event.configuration, event.names
+        if event.cause is Cause.LIGHT:
             self._node.get_logger().info(
-                f'light {light.source} was changed: {configuration.describe(names)}')
+                f'light {event.address} was changed: {configuration.describe(names)}')
         if 'strobe_period' in names:
             self._fit(configuration.strobe_period)
         with self._mirroring:
@@ -178,19 +183,16 @@ class Outputs(LightObserver):
         if 'strobe_period' in names:
             self._fit()
 
-    def restored(self, light: Light, success: bool, message: str) -> None:
-        """See :meth:`LightObserver.restored`."""
+    def _configuration_restored(self, event: ConfigurationRestored) -> None:
         logger = self._node.get_logger()
-        if success:
-            logger.info(f'light {light.source} configured: {message}')
+        if event.success:
+            logger.info(f'light {event.address} configured: {event.message}')
         else:
-            logger.error(f'light {light.source} not configured: {message}')
-        self._changed()
+            logger.error(f'light {event.address} not configured: {event.message}')
 
-    def setpoint_failed(self, light: Light, message: str) -> None:
-        """See :meth:`LightObserver.setpoint_failed`."""
+    def _setpoint_failed(self, event: SetpointFailed) -> None:
         self._node.get_logger().warning(
-            f'~/cmd/brightness: {message}', throttle_duration_sec=5.0)
+            f'~/cmd/brightness: {event.message}', throttle_duration_sec=5.0)
 
     def _fit(self, period: float = 0.0) -> None:
         """

@@ -35,6 +35,7 @@ from .parameter_spec import ParameterError
 from .parameters import declare_link_parameters, LinkParameters
 from .spinner import Spinner
 from ..illuminator.client import IlluminatorClient
+from ..illuminator.events import AnyLightEvent, LightFound
 from ..illuminator.light import Light, Settings
 from ..illuminator.operation import Result
 from ..mavlink.command import format_seconds
@@ -77,8 +78,9 @@ class BridgeProcess:
             commands, Settings(
                 parameters.heartbeat_timeout, parameters.status_interval,
                 parameters.restore_configuration),
-            on_light=self._found, wanted=self._served,
-            link_failure=lambda: self.link.state().failure)
+            wanted=self._served)
+        self.client.events.subscribe(self._light_event)
+        self._serving: dict[Address, IlluminatorNode] = {}
         self.component = Component(commands, [self.client])
         signing, store = _signing(parameters)
         self.link = Link(
@@ -135,33 +137,43 @@ class BridgeProcess:
     def _served(self, source: Address) -> bool:
         return not self.parameters.only_target or self._selected(source)
 
+    def _light_event(self, event: AnyLightEvent) -> None:
+        if isinstance(event, LightFound):
+            self._found(self.client.lights[event.address])
+        elif node := self._serving.get(event.address):
+            node.outputs.take(event)
+
+    def _bind(self, node: IlluminatorNode, light: Light, now: float) -> None:
+        self._serving[light.address] = node
+        node.bind(light, now)
+
     def _found(self, light: Light) -> None:
         """Give a light its node, in the link's thread."""
-        if self.node.light is None and self._selected(light.source):
-            self._names.begin(light.source, self.link.clock())
-            self.node.bind(light, self.link.clock())
+        if self.node.light is None and self._selected(light.address):
+            self._names.begin(light.address, self.link.clock())
+            self._bind(self.node, light, self.link.clock())
             return
-        if self._selected(light.source):
+        if self._selected(light.address):
             first = self.node.light
             assert first is not None
             self.node.get_logger().info(
-                f'light {light.source} is there besides {first.source}, which '
+                f'light {light.address} is there besides {first.address}, which '
                 f'{self.node.get_fully_qualified_name()} serves since it was heard first; '
                 'target_system and target_component choose', once=True)
         # Making a node takes long: not here, where all lights would wait for it.
         thread = threading.Thread(
-            target=self._run_further, args=(light,), name=f'light {light.source}', daemon=True)
+            target=self._run_further, args=(light,), name=f'light {light.address}', daemon=True)
         self._threads.append(thread)
         thread.start()
 
     def _lights(self) -> list[Light]:
         """Return the lights by their addresses, in the link's thread."""
-        return sorted(self.client.lights.values(), key=lambda light: light.source)
+        return sorted(self.client.lights.values(), key=lambda light: light.address)
 
     def _name_of(self, light: Light) -> str:
         """Return what a light is called in answers about several."""
         names = [node.get_name() for node in list(self.nodes) if node.light is light]
-        return f'{names[0]} ({light.source})' if names else str(light.source)
+        return f'{names[0]} ({light.address})' if names else str(light.address)
 
     def _serve(self, node: IlluminatorNode, mounting: Mounting) -> None:
         node.serve(
@@ -177,7 +189,7 @@ class BridgeProcess:
             spinner = Spinner(node)
             self.nodes.append(node)
             self._spinners.append(spinner)
-        self.link.call(lambda now: node.bind(light, now))
+        self.link.call(lambda now: self._bind(node, light, now))
         if not self._ended.is_set():
             spinner.run()
 
@@ -185,16 +197,16 @@ class BridgeProcess:
         logger = self.node.get_logger()
         try:
             node = IlluminatorNode(
-                self._names.of(light.source), namespace=self.node.get_namespace(),
+                self._names.of(light.address), namespace=self.node.get_namespace(),
                 context=self.node.context, cli_args=self._arguments,
                 use_global_arguments=False)
             self._serve(node, self._mounting.declare(node))
             for warning in not_its_own(node, self.node):
                 node.get_logger().warning(warning)
         except Exception as error:
-            logger.error(f'light {light.source} gets no node: {error}')
+            logger.error(f'light {light.address} gets no node: {error}')
             return None
-        logger.info(f'light {light.source} is served by {node.get_fully_qualified_name()}')
+        logger.info(f'light {light.address} is served by {node.get_fully_qualified_name()}')
         return node
 
     def _link_event(self, event: LinkEvent) -> None:
@@ -241,9 +253,9 @@ class BridgeProcess:
             result = results.get(light, late)
             logger = node.get_logger()
             if result.success:
-                logger.info(f'light {light.source} is dark: {result.message}')
+                logger.info(f'light {light.address} is dark: {result.message}')
             else:
-                logger.error(f'light {light.source} may still be on: {result.message}')
+                logger.error(f'light {light.address} may still be on: {result.message}')
 
 
 def without_node_name(arguments: list[str]) -> list[str]:

@@ -16,8 +16,8 @@
 
 from dataclasses import astuple
 
+from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.model import Configuration, Mode
-from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair

@@ -18,6 +18,7 @@ import math
 
 from illuminator_ros.illuminator.client import MAX_LIGHTS
 from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.events import LightFound
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.component import CONFLICT_MEMORY
 from illuminator_ros.mavlink.messages import (
@@ -107,7 +108,9 @@ def test_the_id_of_an_illuminator_proves_nothing(controller, message):
 
 def test_each_light_is_announced_once_in_the_order_of_appearance():
     found = []
-    controller = Client(BRIDGE, Settings(), on_light=lambda light: found.append(light.source))
+    controller = Client(BRIDGE, Settings())
+    controller.events.subscribe(
+        lambda event: found.append(event.address) if isinstance(event, LightFound) else None)
     for source in (Address(1, 244), Address(1, 243), Address(1, 244)):
         controller.receive(source, ILLUMINATOR, 0.0)
         controller.receive(source, status_message(), 0.0)

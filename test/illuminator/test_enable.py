@@ -201,9 +201,9 @@ def test_it_fails_at_once_where_the_light_is_lost(fake, faked):
 
 def test_without_a_link_that_is_the_reason_and_not_the_silence(fake, faked):
     faked.close()
-    faked.light.link_failure = lambda: '/dev/light is not open: no such file'
+    faked.controller.link_closed(faked.now, 'no such file')
     answer = faked.ask_enable(True)
-    assert answer.result.message == 'light 1/243 is lost: /dev/light is not open: no such file'
+    assert answer.result.message == 'light 1/243 is lost: the link is not open: no such file'
 
 
 def test_it_fails_when_the_link_is_lost_on_the_way(fake, faked):

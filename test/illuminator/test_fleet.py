@@ -33,7 +33,7 @@ def ask(fleet, on=True):
     """Begin to switch all lights."""
     answer = Answer(fleet.now)
     enable_all(list(fleet.controller.lights.values()), on, fleet.now, answer,
-               name=lambda light: f'lamp {light.source}')
+               name=lambda light: f'lamp {light.address}')
     fleet.turn()
     return answer
 

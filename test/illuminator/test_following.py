@@ -14,8 +14,8 @@
 
 """What is agreed follows a light that somebody else changes, and sends it nothing."""
 
+from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.model import float32, Mode
-from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.messages import MavCmd
 import pytest
 from support.back_to_back import Pair

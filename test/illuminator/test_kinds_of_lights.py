@@ -62,7 +62,7 @@ class TestGuideEmulator:
         return Pair(GuideEmulator()).settle()
 
     def test_it_is_found_and_served(self, pair):
-        assert pair.light.source == Address(255, 0)
+        assert pair.light.address == Address(255, 0)
         assert pair.enable(True).success
         assert pair.configure(brightness=30, strobe_period=1, strobe_duty_cycle=50).success
         assert pair.other.fields['brightness'] == 30.0
@@ -98,7 +98,7 @@ class TestArduSub:
         return Pair(ArduSub()).settle()
 
     def test_it_is_found_by_its_status(self, pair):
-        assert pair.light.source == Address(1, 1)
+        assert pair.light.address == Address(1, 1)
         assert pair.recorder.events == ['connected']
 
     def test_what_it_does_not_measure_is_not_known(self, pair):

@@ -20,8 +20,8 @@ from collections import Counter
 import random
 
 from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address, MavCmd
@@ -96,7 +96,7 @@ class Joystick(User):
 
     def __init__(self, pair: Pair, light: Light, draw: random.Random) -> None:
         super().__init__(pair, light, CONFIGURE, draw)
-        self._recorder = pair.recorders[light.source]
+        self._recorder = pair.recorders[light.address]
         self._value = 0
         self._left = 0
         self._interval = 0.0

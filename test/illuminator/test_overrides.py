@@ -15,9 +15,9 @@
 """Overrides: sent at the first connection, and again with the agreed ones after a restart."""
 
 from illuminator_ros.illuminator.agreement import RESTORE_INTERVAL
+from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
-from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair, START

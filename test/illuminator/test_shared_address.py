@@ -14,8 +14,8 @@
 
 """What becomes of requests and parameters where several lights answer from one address."""
 
+from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.observer import Cause
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
@@ -141,10 +141,11 @@ def test_one_light_that_somebody_changes_there_and_back_is_followed(fake):
 @pytest.mark.parametrize('instance', [0, 2])
 def test_commands_carry_the_instance_of_the_light_and_0_is_all(instance):
     sender = CommandSender(Address(1, 194))
-    light = Light(AUTOPILOT, sender, Settings(), instance=instance)
+    light = Light(
+        AUTOPILOT, sender, Settings(), lambda event: None, lambda: None, instance=instance)
     light.heard(0.0)
     light.enable(True, 0.0, lambda result, now: None)
-    light.agreement.configure(
+    light.configure(
         {'mode': 'internal_control', 'brightness': 50.0, 'strobe_period': 0.0,
          'strobe_duty_cycle': 0.0}, 0.0, lambda result, now: None)
     sent = [message for _, message in sender.outgoing]

@@ -18,7 +18,6 @@ from collections.abc import Iterator
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.illuminator.agreement import Agreement
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.ros.node import IlluminatorNode
 from illuminator_ros.ros.outputs import Outputs
@@ -73,7 +72,7 @@ def test_a_service_says_that_it_failed(
 
 
 @pytest.mark.parametrize(('owner', 'method'), [
-    (Agreement, 'configure'), (ParameterServices, '_check')])
+    (Light, 'configure'), (ParameterServices, '_check')])
 @pytest.mark.parametrize('atomically', [False, True])
 def test_a_set_says_that_it_failed(
     own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch, owner: type,
@@ -101,7 +100,7 @@ def test_other_parameter_services_answer(
 
 
 @pytest.mark.parametrize(('owner', 'method'), [
-    (Outputs, 'status'), (Outputs, 'configured'), (IlluminatorNode, 'publish_diagnostics'),
+    (Outputs, 'take'), (IlluminatorNode, 'publish_diagnostics'),
     (IlluminatorNode, 'poll'),
 ])
 def test_what_goes_wrong_in_publishing_is_over_when_it_is_over(
@@ -126,7 +125,7 @@ def test_what_goes_wrong_in_publishing_is_over_when_it_is_over(
 
 @pytest.mark.parametrize(('topic', 'type_', 'value', 'owner', 'method'), [
     ('enable', Bool, True, Light, 'enable'),
-    ('brightness', Float32, 20.0, Agreement, 'set_brightness'),
+    ('brightness', Float32, 20.0, Light, 'set_brightness'),
 ])
 def test_a_command_topic_goes_on(
     own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch, topic: str,

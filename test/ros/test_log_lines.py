@@ -62,7 +62,7 @@ def process(domain: int, parameters: dict[str, Any]) -> Iterator[BridgeProcess]:
 
 def hear(process: BridgeProcess, *sources: Address) -> None:
     for source in sources:
-        process.controller.receive(source, heartbeat(MavType.ILLUMINATOR), NOW)
+        process.component.receive(source, heartbeat(MavType.ILLUMINATOR), NOW)
 
 
 def test_a_light_that_stays_away_is_missed_once(
@@ -91,9 +91,9 @@ def test_error_flags_are_logged_until_they_are_cleared(
     process: BridgeProcess, capfd: pytest.CaptureFixture[str], flags: int, severity: str,
     text: str,
 ) -> None:
-    process.controller.receive(LIGHT, status_message(100_000, error_status=flags), NOW)
-    process.controller.receive(LIGHT, status_message(100_010, error_status=flags), NOW + 0.01)
-    process.controller.receive(LIGHT, status_message(110_000), NOW + 10.0)
+    process.component.receive(LIGHT, status_message(100_000, error_status=flags), NOW)
+    process.component.receive(LIGHT, status_message(100_010, error_status=flags), NOW + 0.01)
+    process.component.receive(LIGHT, status_message(110_000), NOW + 10.0)
 
     first, last = [line for line in ''.join(capfd.readouterr()).splitlines()
                    if '1/243: ' in line]
@@ -127,10 +127,10 @@ def test_where_the_target_chooses_nothing_is_told(
 
 def test_requests_to_a_lost_light_tell_why_the_link_is_not_open(process: BridgeProcess) -> None:
     hear(process, LIGHT)
-    light = process.controller.lights[LIGHT]
-    light.lose('the link was lost')
+    light = process.client.lights[LIGHT]
+    process.component.link_closed(NOW, 'no such file')
     assert light.unreachable(NOW) == (
-        'light 1/243 is lost: memory://rest is not open: not opened yet')
+        'light 1/243 is lost: the link is not open: no such file')
 
 
 @pytest.mark.parametrize(('message', 'text'), [
@@ -145,7 +145,7 @@ def test_a_flood_of_frames_is_no_flood_of_lines(
     hear(process, LIGHT)
 
     for step in range(FLOOD):
-        process.controller.receive(LIGHT, message(step), NOW + 0.1 * step)
+        process.component.receive(LIGHT, message(step), NOW + 0.1 * step)
 
     # One a second at most, and this takes less than one.
     assert 1 <= ''.join(capfd.readouterr()).count(text) < 20
@@ -157,6 +157,6 @@ def test_each_new_identity_is_told(
     hear(process, LIGHT)
 
     for step in range(2):
-        process.controller.receive(LIGHT, another_identity(step), NOW)
+        process.component.receive(LIGHT, another_identity(step), NOW)
 
     assert ''.join(capfd.readouterr()).count('light 1/243 is maker') == 2

@@ -23,6 +23,7 @@ from typing import Any
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.illuminator.events import AnyLightEvent, LightFound
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.component import Endpoint
@@ -105,7 +106,8 @@ class Pair:
         self._on_light = on_light
         self.controller = Client(
             BRIDGE, settings or Settings(), command_timeout=command_timeout,
-            command_retries=command_retries, on_light=self._record)
+            command_retries=command_retries)
+        self.controller.events.subscribe(self._take)
         self.other = (lights if isinstance(lights, Endpoint)
                       else Devices(list(lights), START - uptime))
         there = there or Faults()
@@ -114,9 +116,12 @@ class Pair:
         self._turns = 0
         self.open()
 
-    def _record(self, light: Light) -> None:
-        self.recorders[light.source] = light.observer = Recorder(lambda: self.now)
-        self._on_light(light)
+    def _take(self, event: AnyLightEvent) -> None:
+        if isinstance(event, LightFound):
+            self.recorders[event.address] = Recorder(lambda: self.now)
+            self._on_light(self.controller.lights[event.address])
+        else:
+            self.recorders[event.address](event)
 
     # Who is there
 
@@ -128,7 +133,7 @@ class Pair:
     @property
     def recorder(self) -> Recorder:
         """Return what the observer of that light was told."""
-        return self.recorders[self.light.source]
+        return self.recorders[self.light.address]
 
     @property
     def device(self) -> Device:
@@ -222,7 +227,7 @@ class Pair:
     def ask_configure(self, light: Light | None = None, **changes: Any) -> Answer:
         """Begin to configure a light."""
         answer = Answer(self.now)
-        (light or self.light).agreement.configure(changes, self.now, answer)
+        (light or self.light).configure(changes, self.now, answer)
         self.turn()
         return answer
 

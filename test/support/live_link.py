@@ -24,8 +24,8 @@ from typing import Any
 
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.illuminator.events import AnyLightEvent, LightConnected, LightLost
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.observer import LightObserver
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.component import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link
@@ -135,18 +135,6 @@ class Lights(LiveLink):
         super().__init__(url, Devices([DeviceProperties()], clock()), clock=clock)
 
 
-class _Watcher(LightObserver):
-
-    def __init__(self, log: Log[tuple[str, Light]]) -> None:
-        self._log = log
-
-    def connected(self, light: Light) -> None:
-        self._log.append(('connected', light))
-
-    def lost(self, light: Light, reason: str) -> None:
-        self._log.append(('lost', light))
-
-
 class Bridge(LiveLink):
     """
     The drone's side on a link, without ROS.
@@ -157,12 +145,15 @@ class Bridge(LiveLink):
 
     def __init__(self, url: str, settings: Settings | None = None, **options: Any) -> None:
         self.lights: Log[tuple[str, Light]] = Log()
-        super().__init__(url, Client(
-            BRIDGE, settings or Settings(), command_timeout=PATIENCE / 10, command_retries=9,
-            on_light=self._found), **options)
+        self._client = Client(
+            BRIDGE, settings or Settings(), command_timeout=PATIENCE / 10, command_retries=9)
+        self._client.events.subscribe(self._take)
+        super().__init__(url, self._client, **options)
 
-    def _found(self, light: Light) -> None:
-        light.observer = _Watcher(self.lights)
+    def _take(self, event: AnyLightEvent) -> None:
+        if isinstance(event, LightConnected | LightLost):
+            kind = 'connected' if isinstance(event, LightConnected) else 'lost'
+            self.lights.append((kind, self._client.lights[event.address]))
 
     def wait_connected(self, count: int = 1) -> Light:
         """Return the light that was connected the count-th time."""

@@ -21,17 +21,27 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+from illuminator_ros.illuminator.events import (
+    AnyLightEvent,
+    Cause,
+    ConfigurationChanged,
+    ConfigurationRestored,
+    LightConnected,
+    LightIdentified,
+    LightLost,
+    LightRestarted,
+    SetpointFailed,
+    StatusReceived,
+)
 from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.model import Configuration, Status
-from illuminator_ros.illuminator.observer import Cause, LightObserver
+from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.operation import Result
 
 
 @dataclass
-class Recorder(LightObserver):
+class Recorder:
     """
-    Keeps what a light's observer is told.
+    Keeps the events of a light.
 
     :ivar changed_at: when each of the changes was told, s; ``failed_at`` of the setpoints.
     """
@@ -46,33 +56,27 @@ class Recorder(LightObserver):
     failed_setpoints: list[str] = field(default_factory=list)
     failed_at: list[float] = field(default_factory=list)
 
-    def connected(self, light: Light) -> None:
-        self.events.append('connected')
-
-    def lost(self, light: Light, reason: str) -> None:
-        self.events.append(f'lost: {reason}')
-
-    def restarted(self, light: Light) -> None:
-        self.events.append('restarted')
-
-    def identified(self, light: Light, identity: Identity) -> None:
-        self.identities.append(identity)
-
-    def status(self, light: Light, status: Status) -> None:
-        self.statuses.append(status)
-
-    def configured(
-        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
-    ) -> None:
-        self.changed_at.append(self.clock())
-        self.changes.append((cause, {name: getattr(configuration, name) for name in names}))
-
-    def restored(self, light: Light, success: bool, message: str) -> None:
-        self.restorations.append((success, message))
-
-    def setpoint_failed(self, light: Light, message: str) -> None:
-        self.failed_at.append(self.clock())
-        self.failed_setpoints.append(message)
+    def __call__(self, event: AnyLightEvent) -> None:
+        match event:
+            case LightConnected():
+                self.events.append('connected')
+            case LightLost():
+                self.events.append(f'lost: {event.reason}')
+            case LightRestarted():
+                self.events.append('restarted')
+            case LightIdentified():
+                self.identities.append(event.identity)
+            case StatusReceived():
+                self.statuses.append(event.status)
+            case ConfigurationChanged():
+                self.changed_at.append(self.clock())
+                self.changes.append((event.cause, {
+                    name: getattr(event.configuration, name) for name in event.names}))
+            case ConfigurationRestored():
+                self.restorations.append((event.success, event.message))
+            case SetpointFailed():
+                self.failed_at.append(self.clock())
+                self.failed_setpoints.append(event.message)
 
 
 @dataclass

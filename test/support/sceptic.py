@@ -12,39 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An observer that believes nothing which cannot be."""
+"""A listener that accepts no value that cannot be."""
 
 from __future__ import annotations
 
 import math
 
-from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.model import Configuration, Status
-from illuminator_ros.illuminator.observer import Cause, LightObserver
+from illuminator_ros.illuminator.events import (
+    AnyLightEvent,
+    ConfigurationChanged,
+    LightIdentified,
+    StatusReceived,
+)
 
 
-class Sceptic(LightObserver):
-    """Does not take a value that nobody should believe."""
-
-    def status(self, light: Light, status: Status) -> None:
-        for value, low, high in (
-                (status.brightness, 0.0, 100.0), (status.strobe_period, 0.0, 3600.0),
-                (status.strobe_duty_cycle, 0.0, 100.0), (status.temperature, -273.2, 1000.0)):
-            assert value is None or low <= value <= high, status
-        assert status.enabled in (None, False, True), status
-        if status.limits.known:
-            assert 0 <= status.limits.min_strobe_period <= status.limits.max_strobe_period <= 3600
-        temperature = light.temperature
-        assert temperature is None or math.isfinite(temperature), status
-
-    def configured(
-        self, light: Light, configuration: Configuration, names: list[str], cause: Cause,
-    ) -> None:
-        assert 0 <= configuration.brightness <= 100, configuration
-        assert 0 <= configuration.strobe_period <= 3600, configuration
-        assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
-
-    def identified(self, light: Light, identity: Identity) -> None:
-        for text in (identity.vendor, identity.model, identity.serial_number):
-            assert text.isprintable() and len(text) <= 32, identity
+def check_event(event: AnyLightEvent) -> None:
+    """Check that an event has no value that must not be believed."""
+    match event:
+        case StatusReceived(status=status, temperature=temperature):
+            for value, low, high in (
+                    (status.brightness, 0.0, 100.0), (status.strobe_period, 0.0, 3600.0),
+                    (status.strobe_duty_cycle, 0.0, 100.0), (status.temperature, -273.2, 1000.0)):
+                assert value is None or low <= value <= high, status
+            assert status.enabled in (None, False, True), status
+            if status.limits.known:
+                assert (0 <= status.limits.min_strobe_period
+                        <= status.limits.max_strobe_period <= 3600)
+            assert temperature is None or math.isfinite(temperature), status
+        case ConfigurationChanged(configuration=configuration):
+            assert 0 <= configuration.brightness <= 100, configuration
+            assert 0 <= configuration.strobe_period <= 3600, configuration
+            assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
+        case LightIdentified(identity=identity):
+            for text in (identity.vendor, identity.model, identity.serial_number):
+                assert text.isprintable() and len(text) <= 32, identity

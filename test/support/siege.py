@@ -25,7 +25,7 @@ from illuminator_ros.illuminator.client import MAX_LIGHTS
 from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.devices import Devices
-from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.operation import Done, Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
@@ -38,7 +38,7 @@ from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from support.attacker import Attacker
 from support.client import Client
 from support.party import KEY, Party
-from support.sceptic import Sceptic
+from support.sceptic import check_event
 from support.simulated_link import SimulatedLink
 
 BRIDGE = Address(1, 194)
@@ -123,10 +123,9 @@ class BridgeSiege(Siege):
 
     def make_endpoint(self) -> Any:
         self.results: list[list[Result]] = []
-        return Client(BRIDGE, Settings(status_interval=1.0), on_light=self._found)
-
-    def _found(self, light: Light) -> None:
-        light.observer = Sceptic()
+        client = Client(BRIDGE, Settings(status_interval=1.0))
+        client.events.subscribe(check_event)
+        return client
 
     @property
     def controller(self) -> Client:
@@ -176,9 +175,9 @@ class BridgeSiege(Siege):
             self.results.append(results)
         self.link.ask((
             lambda now: light.enable(brightness > 50, now, done),
-            lambda now: light.agreement.configure({'brightness': brightness}, now, done),
+            lambda now: light.configure({'brightness': brightness}, now, done),
             lambda now: light.refresh(now, done),
-            lambda now: light.agreement.set_brightness(brightness, now))[asked])
+            lambda now: light.set_brightness(brightness, now))[asked])
 
     def check_bounds(self) -> None:
         super().check_bounds()
@@ -217,7 +216,7 @@ class BridgeSiege(Siege):
             def ask(now: float, on: bool = on, brightness: float = brightness,
                     done: Done = done) -> None:
                 light.enable(on, now, done)
-                light.agreement.configure({'brightness': brightness}, now, done)
+                light.configure({'brightness': brightness}, now, done)
 
             self.link.ask(ask)
             self._genuine(2.0)

@@ -127,14 +127,14 @@ class Judge:
         wrong = check(self, request)
         if success is not results[0].success:
             wrong = f'success is {results[0].success}'
-        return kind, wrong and f'{wrong}: {request.light.source} {request.answer}'
+        return kind, wrong and f'{wrong}: {request.light.address} {request.answer}'
 
     def _tries(self, request: Request) -> list[tuple[float, Any]]:
         """Return when the command was sent, and the messages; as often as the answer says."""
         answer, tries = request.answer, []
         for at, sent in self._pair.near.sent:
             if not (isinstance(sent, CommandLong) and sent.command == request.kind
-                    and (sent.target_system, sent.target_component) == request.light.source):
+                    and (sent.target_system, sent.target_component) == request.light.address):
                 continue
             # What is sent at the very end is the next command.
             if at > answer.ended_at or tries and at == answer.ended_at:
@@ -152,11 +152,11 @@ class Judge:
             wish = {**wish, 'mode': Mode(int(sent.param1)), 'brightness': sent.param2,
                     'strobe_period': sent.param3, 'strobe_duty_cycle': sent.param4}
         assert all(wish[name] == value for name, value in request.wish.items()), request
-        return wish, self._witnesses[request.light.source].states(since, request.answer.ended_at)
+        return wish, self._witnesses[request.light.address].states(since, request.answer.ended_at)
 
     def _received(self, request: Request, kind: type, since: float) -> list[tuple[float, Any]]:
         return [(at, message) for at, source, message in self._pair.near.received
-                if source == request.light.source and isinstance(message, kind)
+                if source == request.light.address and isinstance(message, kind)
                 and since < at <= request.answer.ended_at]
 
     def _acks(self, request: Request) -> list[tuple[float, Any]]:
@@ -165,7 +165,7 @@ class Judge:
                 if ack.command == request.kind and ack.result == MavResult.ACCEPTED]
 
     def _taken(self, request: Request) -> str:
-        states = self._witnesses[request.light.source].states(
+        states = self._witnesses[request.light.address].states(
             request.answer.asked_at, request.answer.ended_at)
         return '' if any(state.matches(request.wish) for state in states) else 'never done'
 
@@ -189,7 +189,7 @@ class Judge:
         if not acks:
             return 'not accepted'
         sent_at, newest = self._tries(request)[0][0], 0
-        boot = START - self._witnesses[request.light.source].device.uptime_ms(START) / 1000
+        boot = START - self._witnesses[request.light.address].device.uptime_ms(START) / 1000
         for at, status in self._received(request, IlluminatorStatus, 0.0):
             if status.uptime_ms >= newest:
                 newest = status.uptime_ms

@@ -1,0 +1,222 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The events of lights, and snapshots of lights for other threads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from .identity import Identity
+from .model import Configuration, FIELDS, Limits, Status
+from ..mavlink.messages import Address
+
+
+class Cause(Enum):
+    """Why the confirmed configuration has changed."""
+
+    FIRST_STATUS = 'first status'
+    REQUEST = 'request'
+    LIGHT = 'light'
+    ROUNDING = 'rounding'
+
+
+class Origin(Enum):
+    """Who switched a light."""
+
+    REQUEST = 'request'
+    OTHER_SENDER = 'another sender'
+
+
+@dataclass(frozen=True)
+class LightEvent:
+    """
+    An event of the light at an address.
+
+    :param address: where the light is.
+    """
+
+    address: Address
+
+
+@dataclass(frozen=True)
+class LightFound(LightEvent):
+    """A light was heard for the first time."""
+
+
+@dataclass(frozen=True)
+class LightForgotten(LightEvent):
+    """A light that stayed silent was dropped, so that another one can take its place."""
+
+
+@dataclass(frozen=True)
+class LightConnected(LightEvent):
+    """A light is heard, for the first time or again."""
+
+
+@dataclass(frozen=True)
+class LightLost(LightEvent):
+    """A light is not heard any more."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class LightRestarted(LightEvent):
+    """
+    A light has restarted.
+
+    :param was_on: whether it was on before, None if not known.
+    :param is_on: whether it is on now, None if not known.
+    """
+
+    was_on: bool | None
+    is_on: bool | None
+
+
+@dataclass(frozen=True)
+class LightIdentified(LightEvent):
+    """A light has sent COMPONENT_INFORMATION_BASIC."""
+
+    identity: Identity
+
+
+@dataclass(slots=True)
+class StatusReceived:
+    """
+    A light has sent ILLUMINATOR_STATUS. Not frozen only because that costs time for each status.
+
+    :param received_at: s on the link's clock.
+    :param temperature: degC; None where the light does not measure it, or its sensor fails.
+    :param shared_address: whether several lights send from this address.
+    """
+
+    address: Address
+    status: Status
+    received_at: float
+    temperature: float | None = None
+    shared_address: bool = False
+
+
+@dataclass(frozen=True)
+class ConfigurationChanged(LightEvent):
+    """
+    The confirmed configuration of a light has changed.
+
+    :param names: the fields that differ from before.
+    :param left_out: how many changes by other senders were not worth a log line since the last
+        that was, None if this one is not worth a line either: there are too many.
+    """
+
+    configuration: Configuration
+    names: list[str]
+    cause: Cause
+    left_out: int | None = 0
+
+
+@dataclass(frozen=True)
+class ConfigurationRestored(LightEvent):
+    """Overrides, or the configuration that a restart has undone, were sent: how that ended."""
+
+    success: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class SetpointFailed(LightEvent):
+    """A setpoint of a stream did not reach the light."""
+
+    message: str
+
+
+@dataclass(frozen=True)
+class LightSwitched(LightEvent):
+    """
+    A light was switched on or off.
+
+    :param detail: how it was asked for, such as ``service``; '' for another sender.
+    :param left_out: as for :class:`ConfigurationChanged`.
+    """
+
+    on: bool
+    origin: Origin
+    detail: str = ''
+    left_out: int | None = 0
+
+
+AnyLightEvent = LightEvent | StatusReceived
+
+
+@dataclass(frozen=True, slots=True)
+class LightSnapshot:
+    """
+    A light at one moment, for any thread. Times are s on the link's clock.
+
+    :param status_interval: s between statuses that the light was asked for, 0 for its own rate.
+    :param configuration: as confirmed, None before the first status.
+    :param discrepancy: how the light differs from what it has accepted, '' if it does not.
+    :param identity_is_settled: whether the identity is known, or will not be known soon.
+    :param unreachable: why requests cannot reach the light, '' if they can.
+    """
+
+    address: Address
+    connected: bool
+    heard_at: float
+    status: Status | None
+    status_at: float
+    status_interval: float
+    restarts: int
+    temperature: float | None
+    configuration: Configuration | None
+    discrepancy: str
+    identity: Identity | None
+    identity_is_settled: bool
+    shared_address: bool
+    unreachable: str
+
+    @property
+    def limits(self) -> Limits:
+        """Return the strobe periods that the light reports to be possible."""
+        return self.status.limits if self.status else Limits()
+
+    def events(self) -> list[AnyLightEvent]:
+        """Return the events that lead to this state, for a listener that comes late."""
+        events: list[AnyLightEvent] = [LightConnected(self.address)] if self.connected else []
+        if self.identity:
+            events.append(LightIdentified(self.address, self.identity))
+        if self.status:
+            events.append(StatusReceived(
+                self.address, self.status, self.status_at, self.temperature,
+                self.shared_address))
+        if self.configuration:
+            events.append(ConfigurationChanged(
+                self.address, self.configuration, list(FIELDS), Cause.FIRST_STATUS))
+        return events
+
+
+@dataclass(frozen=True, slots=True)
+class ClientSnapshot:
+    """
+    All lights at one moment, for any thread.
+
+    :param lights: by address, in the order in which they were found.
+    :param ignored: the first lights that are not wanted.
+    :param limit_reached: whether there are more lights than the client takes.
+    """
+
+    lights: Mapping[Address, LightSnapshot]
+    ignored: tuple[Address, ...]
+    limit_reached: bool
