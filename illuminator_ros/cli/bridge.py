@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import sys
 
-from .program import enter, one_line
+from .program import one_line, run_program
 from .termination import Termination
 
 
@@ -70,7 +70,8 @@ def main(args: list[str] | None = None) -> int:
     :param args: the command line without the program's name.
     """
     arguments = sys.argv[1:] if args is None else args
-    return enter('bridge', lambda termination: _run(arguments, termination))
+    return run_program(
+        'bridge', lambda termination: _run(arguments, termination), queued=[2])
 
 
 def _run(arguments: list[str], termination: Termination) -> int:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What all executables begin with: signals are taken, and what is not installed is named."""
+"""Running a program: signals, output, and missing packages."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ import sys
 
 from .termination import Termination
 
-# What to do about a package that is not there.
+# How to install a missing package.
 _REMEDIES = {
     'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
     'pymavlink': 'pip install pymavlink',
@@ -34,25 +34,25 @@ _REMEDIES = {
 }
 
 
-def enter(
-    name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (),
+def run_program(
+    name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (), *,
+    queued: Iterable[int] = (),
 ) -> int:
     """
     Run a program and return its exit status.
 
-    :param name: of the program.
-    :param run: is to import what it needs itself, so that a signal meanwhile ends the process
-        as one later does.
+    :param run: must import what it needs itself, so that a signal meanwhile ends the process.
     :param more: signals that end it too, see :class:`Termination`.
+    :param queued: descriptors that are written to through an :class:`~.output.OutputQueue`.
     """
-    termination = Termination(more)
+    termination = Termination(more, queued)
     status = explained(name, lambda: run(termination))
     termination.finish()
     return status
 
 
 def explained(name: str, run: Callable[[], int]) -> int:
-    """Run a program and return its exit status; name what it needs where that is missing."""
+    """Run a program and return its exit status; name the package that is missing."""
     try:
         return run()
     except ModuleNotFoundError as error:
@@ -64,11 +64,11 @@ def explained(name: str, run: Callable[[], int]) -> int:
 
 
 def discard_output() -> None:
-    """Have what is still to be written to standard output, at the end too, lead nowhere."""
+    """Discard what is still to be written to stdout, at the exit too."""
     with open(os.devnull, 'wb') as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def one_line(message: object) -> str:
-    """Return a message of rcl in one line, without the places in its sources that it ends with."""
+    """Return a message of rcl in one line, without the places in its sources at its end."""
     return re.sub(r', at /[^ ,]+:\d+', '', ' '.join(str(message).split()))

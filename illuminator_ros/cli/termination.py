@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""CommandStatus a process in order, and in time, on SIGINT, SIGTERM and SIGHUP."""
+"""Ending a process in order, and in time, on SIGINT, SIGTERM and SIGHUP."""
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Callable, Iterable
 import contextlib
 import os
@@ -25,9 +26,14 @@ import threading
 import time
 from typing import NoReturn
 
+from .output import OutputQueue
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, whatever hangs.
 LIMIT = 0.95
+# s in which queued output must be written: at an exit in order, and at one that is overdue.
+OUTPUT_LIMIT = 0.1
+OVERDUE_OUTPUT_LIMIT = 0.02
 
 
 class Termination:
@@ -40,17 +46,22 @@ class Termination:
     them.
 
     :param more: signals beside SIGINT, SIGTERM and SIGHUP. Under nohup SIGHUP is left ignored.
+    :param queued: descriptors that are written to through an :class:`OutputQueue`.
     """
 
-    def __init__(self, more: Iterable[signal.Signals] = ()) -> None:
-        # Blocked, it would be waited for although it is ignored.
+    def __init__(
+        self, more: Iterable[signal.Signals] = (), queued: Iterable[int] = (),
+    ) -> None:
+        # sigwait() would return it, blocked, although it is ignored.
         ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
         self._signals = {*SIGNALS, *more} - ignored
         signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
+        self._output = OutputQueue(*queued)
         self._lock = threading.Lock()
         self._end: Callable[[], None] | None = None
         self._last: Callable[[], None] | None = None
         self._signalled = False
+        atexit.register(self._write_output, OUTPUT_LIMIT)
         threading.Thread(target=self._wait, name='termination', daemon=True).start()
 
     def calls(self, end: Callable[[], None], last: Callable[[], None] | None = None) -> None:
@@ -59,7 +70,7 @@ class Termination:
 
         It is called in another thread, and the process ends soon after it even if it hangs.
 
-        :param last: called before that if it hangs; is to be quick.
+        :param last: called before that if it hangs; must be quick.
         """
         with self._lock:
             self._end, self._last = end, last
@@ -69,32 +80,54 @@ class Termination:
 
     def finish(self) -> None:
         """
-        Exit if a signal has asked for it; all is ended that has to be.
+        Exit if a signal has asked for it; everything that must be ended has ended.
 
-        What the interpreter and the middleware do at an exit takes 0.1 s or, on a busy machine,
-        much longer, and nothing runs any more that could cut it short.
+        The interpreter and the middleware take 0.1 s for an exit or, on a busy machine, much
+        longer, and no thread runs any more that could cut it short.
         """
         if self._signalled:
-            _exit()
+            self._exit(OUTPUT_LIMIT)
 
     def _wait(self) -> None:
         signal.sigwait(self._signals)
+        deadline = time.monotonic() + LIMIT
         with self._lock:
             self._signalled = True
             end = self._end
         # Before that nothing has been begun that would have to be ended.
         if end is not None:
-            # Not here: whatever it may wait for, the time runs.
-            threading.Thread(target=end, name='end', daemon=True).start()
-            time.sleep(LIMIT)
+            # In another thread, so that the deadline applies whatever it waits for.
+            _run_in_thread(end)
+            time.sleep(max(deadline - time.monotonic(), 0.0))
             if self._last is not None:
                 with contextlib.suppress(Exception):
                     self._last()
-        _exit()
+        self._exit(OVERDUE_OUTPUT_LIMIT)
+
+    def _exit(self, output_limit: float) -> NoReturn:
+        self._write_output(output_limit)
+        os._exit(0)
+
+    def _write_output(self, limit: float) -> None:
+        # In another thread: one that is blocked in a write holds the lock of the stream.
+        flushing = _run_in_thread(_flush)
+        if flushing is not None:
+            flushing.join(limit)
+        self._output.finish(limit)
 
 
-def _exit() -> NoReturn:
+def _run_in_thread(function: Callable[[], None]) -> threading.Thread | None:
+    """Call a function in a new thread or, where none can be started, here."""
+    thread = threading.Thread(target=function, name='end', daemon=True)
+    try:
+        thread.start()
+    except RuntimeError:
+        function()
+        return None
+    return thread
+
+
+def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(Exception):
             stream.flush()
-    os._exit(0)

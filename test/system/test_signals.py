@@ -42,12 +42,12 @@ LEASE = 20.0
 
 HANGING = """
 import threading
-from illuminator_ros.cli.program import enter
+from illuminator_ros.cli.program import run_program
 def hang(termination):
     termination.calls(threading.Event().wait, last=lambda: print('at last', flush=True))
     print('hanging', flush=True)
     threading.Event().wait()
-enter('program', hang)
+run_program('program', hang)
 """
 
 # Exit status, and what was printed.

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import signal
 
-from ..program import enter
+from ..program import run_program
 from ..termination import Termination
 
 
@@ -39,4 +39,4 @@ def main(args: list[str] | None = None) -> int:
         return run(args, termination)
 
     # Ctrl-\ too: it would leave the terminal without echo.
-    return enter('monitor', start, more=[signal.SIGQUIT])
+    return run_program('monitor', start, more=[signal.SIGQUIT])

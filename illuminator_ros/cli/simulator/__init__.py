@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from ..program import enter
+from ..program import run_program
 from ..termination import Termination
 
 
@@ -30,4 +30,4 @@ def main(args: list[str] | None = None) -> int:
         from .run import run
         return run(args, termination)
 
-    return enter('simulator', start)
+    return run_program('simulator', start)

@@ -1,0 +1,179 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Writing to stdout and stderr through a queue: a reader that stops reading blocks no thread."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import select
+import socket
+import stat
+import threading
+
+# Bytes that wait for a reader, and those that the pipe holds while the thread has no turn.
+QUEUE_SIZE = 1 << 20
+# Bytes of a write; a blocking pipe that polls as writable takes as many (POSIX, PIPE_BUF).
+WRITE_SIZE = 4096
+
+
+class OutputQueue:
+    """
+    Stands between descriptors of this process and their readers.
+
+    Each descriptor leads to a pipe that never blocks, also for C code that holds the
+    interpreter's lock. A thread writes what comes from there as fast as it is read. Lines that do
+    not fit into the queue are dropped; their number is written once there is room again.
+
+    :param descriptors: such as 1 and 2; those that are closed are left alone.
+    """
+
+    def __init__(self, *descriptors: int) -> None:
+        self._streams = []
+        for descriptor in descriptors:
+            with contextlib.suppress(OSError):
+                self._streams.append(_Stream(descriptor))
+        self._thread = threading.Thread(target=self._run, name='output', daemon=True)
+        try:
+            self._thread.start()
+        except RuntimeError:
+            # Without a thread the descriptors stay as they were.
+            return
+        for stream in self._streams:
+            stream.redirect()
+
+    def finish(self, timeout: float) -> None:
+        """Write what is queued, for at most ``timeout`` s; later output is dropped."""
+        for stream in self._streams:
+            with contextlib.suppress(OSError):
+                stream.cut_off()
+        if self._thread.ident is not None:
+            self._thread.join(timeout)
+
+    def _run(self) -> None:
+        streams = list(self._streams)
+        while streams:
+            poller = select.poll()
+            for stream in streams:
+                if not stream.at_end:
+                    poller.register(stream.source, select.POLLIN)
+                if stream.queue:
+                    poller.register(stream.target, select.POLLOUT)
+            poller.poll()
+            for stream in streams:
+                stream.transfer()
+            streams = [stream for stream in streams if stream.queue or not stream.at_end]
+
+
+class _Stream:
+    """
+    One descriptor.
+
+    :ivar source: what is read from it was written to the descriptor.
+    :ivar target: leads to the reader.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+        self.target = _open_again(descriptor)
+        self.source, self._input = os.pipe()
+        # As much as an unprivileged process may have.
+        with contextlib.suppress(OSError):
+            fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, QUEUE_SIZE)
+        os.set_blocking(self.source, False)
+        os.set_blocking(self._input, False)
+        self._socket = (socket.socket(fileno=self.target)
+                        if stat.S_ISSOCK(os.fstat(self.target).st_mode) else None)
+        self.queue = bytearray()
+        self.at_end = False
+        self._lost = 0
+        self._dropping = False
+
+    def redirect(self) -> None:
+        """Have the descriptor lead here."""
+        os.dup2(self._input, self.descriptor)
+        os.close(self._input)
+
+    def cut_off(self) -> None:
+        """Have the descriptor lead nowhere, so that the source comes to its end."""
+        with open(os.devnull, 'wb') as nowhere:
+            os.dup2(nowhere.fileno(), self.descriptor)
+
+    def transfer(self) -> None:
+        """Read and write as much as is possible without waiting."""
+        try:
+            data = b'' if self.at_end else os.read(self.source, 1 << 16)
+            self.at_end = not data
+        except BlockingIOError:
+            data = b''
+        for line in data.splitlines(keepends=True):
+            self._add(line)
+        try:
+            if self.queue and _is_writable(self.target):
+                chunk = self.queue[:WRITE_SIZE]
+                size = (self._socket.send(chunk, socket.MSG_DONTWAIT) if self._socket
+                        else os.write(self.target, chunk))
+                del self.queue[:size]
+        except BlockingIOError:
+            pass
+        except OSError:
+            # The reader is gone: writing to the descriptor fails from now on, as without us.
+            self.queue.clear()
+            if not self.at_end:
+                os.close(self.source)
+            self.at_end = True
+
+    def _add(self, line: bytes) -> None:
+        if self._dropping and len(self.queue) < QUEUE_SIZE // 2:
+            self._dropping = False
+            note = f'[{self._lost} lines were dropped while nothing read them]\n'.encode()
+            self.queue += note if self.queue.endswith(b'\n') else b'\n' + note
+            self._lost = 0
+        self._dropping |= len(self.queue) + len(line) > QUEUE_SIZE
+        if not self._dropping:
+            self.queue += line
+        elif line.endswith(b'\n'):
+            self._lost += 1
+
+
+def _open_again(descriptor: int) -> int:
+    """
+    Return a descriptor for the same file that does not block, if that is possible.
+
+    The flag of a duplicate would be shared with other processes, such as the shell.
+    """
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
+        with contextlib.suppress(OSError):
+            again = os.open(f'/proc/self/fd/{descriptor}', os.O_WRONLY | os.O_NONBLOCK
+                            | os.O_NOCTTY | os.O_CLOEXEC)
+            return _above_standard(again)
+    return _above_standard(os.dup(descriptor))
+
+
+def _above_standard(descriptor: int) -> int:
+    """Move a descriptor above 2: one of the first three may have been closed."""
+    if descriptor > 2:
+        return descriptor
+    moved = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3)
+    os.close(descriptor)
+    return moved
+
+
+def _is_writable(descriptor: int) -> bool:
+    poller = select.poll()
+    poller.register(descriptor, select.POLLOUT)
+    return bool(poller.poll(0))
