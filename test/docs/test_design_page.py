@@ -1,0 +1,75 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The design page: modules, places and bounds, as the code has them."""
+
+from importlib import import_module
+from pathlib import Path
+import re
+
+from support.tables import table
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / 'illuminator_ros'
+PAGE = (ROOT / 'doc' / 'design.md').read_text()
+
+
+def listed_modules() -> list[str]:
+    """Return the paths in the layout, the first block of code, in its order."""
+    folders: list[tuple[int, str]] = []
+    modules = []
+    for line in PAGE.split('```')[1].splitlines()[2:]:
+        indent = len(line) - len(line.lstrip())
+        folders = [folder for folder in folders if folder[0] < indent]
+        for name in re.findall(r'[\w/]+(?:\.py|/)(?=,|\s|$)', line.strip().partition('  ')[0]):
+            if name.endswith('/'):
+                folders.append((indent, name))
+            else:
+                modules.append(''.join(folder for _, folder in folders) + name)
+    return modules
+
+
+def test_the_layout_names_each_module_once() -> None:
+    modules = [str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob('*.py')
+               if path.name != '__init__.py']
+
+    assert sorted(listed_modules()) == sorted(modules)
+
+
+def test_the_places_to_add_something_exist() -> None:
+    code = '\n'.join(path.read_text() for path in PACKAGE.rglob('*.py'))
+    files = [*PACKAGE.rglob('*'), *(ROOT / 'test').rglob('*.py'), *ROOT.glob('*/*')]
+    names = {name for cells in table(PAGE, 'addition') for cell in cells
+             for name in re.findall('`([^`]+)`', cell)}
+
+    def exists(name: str) -> bool:
+        if re.search(r'/|\.py$', name):
+            return any(str(path).endswith(f'/{name.rstrip("/")}') for path in files)
+        return re.search(rf'\b{name.rpartition(".")[2]}\b', code) is not None
+
+    assert len(names) > 30
+    assert [name for name in sorted(names) if not exists(name)] == []
+
+
+def test_the_bounds_of_stores_are_those_of_the_code() -> None:
+    for _, bound in table(PAGE, 'store'):
+        numbers = [int(number) for number in re.findall(r'\d+', bound.partition('(')[0])]
+        unit = 1024 if 'KiB' in bound else 1
+        values = []
+        for name in re.findall(r'`([\w.]+)`', bound):
+            module, _, constant = name.rpartition('.')
+            values.append(getattr(import_module(f'illuminator_ros.{module}'), constant))
+
+        assert values, bound
+        assert values == [number * unit for number in numbers], bound

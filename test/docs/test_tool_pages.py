@@ -1,0 +1,76 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pages of simulator and conformance, and what these programs have; no ROS is needed."""
+
+from pathlib import Path
+import re
+
+from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
+from illuminator_ros.cli.simulator.lights import scene
+from illuminator_ros.cli.simulator.settings import SETTINGS
+from illuminator_ros.illuminator.behaviour import PROFILES
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.faults import FAULTS
+import pytest
+from support.tables import table
+
+DOC = Path(__file__).parents[2] / 'doc'
+CONFORMANCE = (DOC / 'conformance.md').read_text()
+SIMULATOR = (DOC / 'simulator.md').read_text()
+
+CONSENT = {(False, False): '', (True, False): 'changes', (True, True): 'dazzles'}
+
+
+def test_the_requirements_are_listed_in_order_with_their_sections() -> None:
+    assert table(CONFORMANCE, 'requirement') == [
+        [f'`{one.name}`', one.title,
+         f'[{one.specification.title}]({one.specification.url}), {one.section}',
+         CONSENT[one.changes, one.dazzles]] for one in REQUIREMENTS]
+
+
+def test_the_requirements_are_counted() -> None:
+    assert f'{len(REQUIREMENTS)} requirements' in CONFORMANCE
+
+
+def test_the_sample_report_has_known_requirements() -> None:
+    sample = CONFORMANCE.partition('$ ')[2].partition('```')[0]
+    found = re.findall(r'^(?:PASS|FAIL|SKIPPED) +([\w-]+) +(.+?)(?: \(.*)?$', sample, re.MULTILINE)
+    titles = {one.name: one.title for one in REQUIREMENTS}
+
+    assert found
+    assert [(name, title) for name, title in found if not title.startswith(
+        titles[name].partition(' (')[0])] == []
+
+
+@pytest.mark.parametrize(('heading', 'rows'), [
+    ('fault', [[f'`{name}={fault.metavar}`' if fault.metavar else f'`{name}`',
+                fault.description, fault.default_text] for name, fault in FAULTS.items()]),
+    ('profile', [[f'`{name}`', profile.description] for name, profile in PROFILES.items()]),
+    ('setting', [[f'`{name}`', setting.metavar, setting.help]
+                 for name, setting in SETTINGS.items()]),
+    ('command', [*([f'`{one.usage}`', one.help] for one in COMMANDS.values()),
+                 *([f'`{name}`', text] for name, text in OTHERS.items())]),
+])
+def test_a_table_of_the_simulator_has_every_row(heading: str, rows: list[list[str]]) -> None:
+    assert table(SIMULATOR, heading) == rows
+
+
+def test_the_sample_file_of_the_simulator_is_valid() -> None:
+    yaml = pytest.importorskip('yaml')
+    text = SIMULATOR.partition('```yaml\n')[2].partition('```')[0]
+
+    lights = scene(yaml.safe_load(text), 'the sample').lights
+
+    assert [name for _, name, _ in lights] == ['bow', 'stern']
