@@ -23,7 +23,7 @@ import re
 import xml.etree.ElementTree as ET
 
 from illuminator_ros.cli.simulator.options import parser
-from illuminator_ros.illuminator.behaviour import PROFILES
+from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 import yaml

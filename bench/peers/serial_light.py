@@ -35,8 +35,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 from bench.traffic import frames  # noqa: E402
-from illuminator_ros.illuminator.device_properties import DeviceProperties  # noqa: E402
-from illuminator_ros.illuminator.devices import Devices  # noqa: E402
+from illuminator_ros.illuminator.simulated import simulated_lights  # noqa: E402
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties  # noqa: E402
 from illuminator_ros.mavlink.frame import Decoder  # noqa: E402
 from illuminator_ros.mavlink.messages import decode_payload, HANDLED  # noqa: E402
 from support.frames import frame_of  # noqa: E402
@@ -90,7 +90,7 @@ class Autopilot:
 def serve(far: int, baud: int, share: float) -> None:
     """Run light and autopilot."""
     there, back = Wire(baud), Wire(baud)
-    light = Devices([DeviceProperties()], time.monotonic())
+    light = simulated_lights([IlluminatorProperties()], time.monotonic())
     decoder, autopilot, sequence = Decoder(), Autopilot(baud, share), 0
     try:
         while True:

@@ -109,19 +109,21 @@ class ThermalModel:
         longest = self.properties.time_constant / 50
         steps = max(math.ceil(seconds / longest), 1)
         for _ in range(steps):
-            self._step(seconds / steps, power)
+            if self._step(seconds / steps, power):
+                break
 
-    def _step(self, seconds: float, power: float) -> None:
-        properties = self.properties
+    def _step(self, seconds: float, power: float) -> bool:
+        """Return whether the temperature and the flags have reached their final values."""
+        properties, flags = self.properties, self.flags
         final = self.ambient + properties.rise * power * self.output
         decay = math.exp(-seconds / properties.time_constant)
         self.temperature = final + (self.temperature - final) * decay
-        if self._sensor_failed:
-            return
-        self._switch(ErrorFlag.THERMAL_THROTTLING, properties.throttle_at,
-                     properties.throttle_until)
-        self._switch(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN, properties.shutdown_at,
-                     properties.shutdown_until)
+        if not self._sensor_failed:
+            self._switch(ErrorFlag.THERMAL_THROTTLING, properties.throttle_at,
+                         properties.throttle_until)
+            self._switch(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN, properties.shutdown_at,
+                         properties.shutdown_until)
+        return self.flags == flags and abs(self.temperature - final) < 1e-9
 
     def _switch(self, flag: ErrorFlag, on_at: float, off_below: float) -> None:
         if self.temperature >= on_at:

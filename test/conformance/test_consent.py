@@ -17,20 +17,20 @@
 from dataclasses import replace
 
 from illuminator_ros.cli.simulator.settings import properties
-from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.checks.requirement import Verdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
 from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.payload.simulated import CommandReply
 import pytest
 from support.conformance_run import Run
 
 LIGHTS = {
-    'switch': DeviceProperties(),
+    'switch': IlluminatorProperties(),
     'brightness is the switch': replace(
-        properties({'profile': 'ardusub'}, PROFILES['ardusub'].source), modes=(1, 2)),
+        properties({'profile': 'ardusub'}, PROFILES['ardusub'].address), modes=(1, 2)),
 }
 BRIGHT = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
 # What may switch a light on that takes what it must not.
@@ -42,13 +42,13 @@ DAZZLING = {one.name for one in REQUIREMENTS if one.dazzles}
 def watched(run):
     """Have a run note how bright its light shines, and whether it strobes, at any time."""
     seen = []
-    device, apply = run.light, run.light._apply
+    apply = run.light.apply
 
     def noted(change, now):
         apply(change, now)
-        if device.enabled:
-            seen.append(device.configuration)
-    device._apply = noted
+        if run.lamp.enabled:
+            seen.append(run.lamp.configuration)
+    run.light.apply = noted
     return seen
 
 
@@ -89,8 +89,10 @@ class TestALightThatTakesNoConfiguration:
     def run(self, light, configuration, **options):
         """Return what such a light was like while it was on, and the run."""
         run = Run(light, **options)
-        run.light.configuration = configuration
-        run.light._configure = lambda params: (MavResult.FAILED, None, [])
+        run.lamp.configuration = configuration
+        execute = run.light.device.execute
+        run.light.device.execute = lambda command, now: (
+            CommandReply(MavResult.FAILED) if command.command == 406 else execute(command, now))
         seen = watched(run)
         return run.finish(), seen
 
@@ -108,20 +110,21 @@ class TestALightThatTakesNoConfiguration:
             assert 'cannot be changed: not agreed to; see --yes' in run.result(name).detail
 
     def test_the_reason_has_its_brightness(self):
-        run, _ = self.run(DeviceProperties(), BRIGHT, consent=False, only=('on',))
+        run, _ = self.run(IlluminatorProperties(), BRIGHT, consent=False, only=('on',))
         assert run.result('on').detail.startswith('switched on, it would shine at 100 %')
 
     def test_it_is_all_the_same_told_that_it_takes_none(self):
-        run, _ = self.run(DeviceProperties(), BRIGHT, consent=False)
+        run, _ = self.run(IlluminatorProperties(), BRIGHT, consent=False)
         assert {'mode-internal', 'brightness', 'brightness-values'} <= run.failed
 
     def test_it_is_switched_on_where_it_is_dim(self):
-        run, seen = self.run(DeviceProperties(), replace(BRIGHT, brightness=15.0), consent=False)
+        run, seen = self.run(
+            IlluminatorProperties(), replace(BRIGHT, brightness=15.0), consent=False)
         assert {one.brightness for one in seen} == {15.0}
         assert run.result('on').verdict is Verdict.PASS
 
     def test_it_is_switched_on_with_consent(self):
-        run, seen = self.run(DeviceProperties(), BRIGHT, consent=True)
+        run, seen = self.run(IlluminatorProperties(), BRIGHT, consent=True)
         assert seen
         assert run.result('on').verdict is Verdict.PASS
 

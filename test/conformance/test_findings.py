@@ -17,13 +17,15 @@
 from dataclasses import replace
 import math
 
-from illuminator_ros.illuminator.behaviour import Behaviour
 from illuminator_ros.illuminator.checks.requirement import Verdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.model import Limits, Mode
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+)
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.conformance_run import Run
@@ -75,12 +77,12 @@ BY_CHANCE = {
 }
 # What no fault but the properties of a light bring about.
 BUILT_IN = {
-    'address': DeviceProperties(source=Address(255, 0)),
-    'status-stream': DeviceProperties(status_interval=0.0),
-    'status-mode': DeviceProperties(mode_bitmask=0),
-    'strobe-limits': DeviceProperties(limits=Limits(5.0, 1.0)),
-    'information-text': DeviceProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
-    'mode-internal': DeviceProperties(modes=()),
+    'address': IlluminatorProperties(address=Address(255, 0)),
+    'status-stream': IlluminatorProperties(status_interval=0.0),
+    'status-mode': IlluminatorProperties(mode_bitmask=0),
+    'strobe-limits': IlluminatorProperties(limits=Limits(5.0, 1.0)),
+    'information-text': IlluminatorProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
+    'mode-internal': IlluminatorProperties(modes=()),
 }
 
 
@@ -92,7 +94,7 @@ def test_a_fault_is_found_by_the_check_that_is_for_it_and_by_no_other(fault):
 @pytest.mark.parametrize('fault', BY_CHANCE)
 @pytest.mark.parametrize('seed', range(3))
 def test_what_befalls_messages_by_chance_is_found_and_named(fault, seed):
-    run = Run(DeviceProperties(seed=seed), faults=(fault,)).finish()
+    run = Run(IlluminatorProperties(seed=seed), faults=(fault,)).finish()
     assert BY_CHANCE[fault] in run.failed
 
 
@@ -103,7 +105,7 @@ def test_what_a_light_is_made_like_is_found(name):
 
 def test_a_value_that_cannot_be_is_found():
     run = Run()
-    run.light.configuration = replace(run.light.configuration, brightness=math.nan)
+    run.lamp.configuration = replace(run.lamp.configuration, brightness=math.nan)
     assert run.finish().failed == {'status-content'}
 
 
@@ -160,26 +162,26 @@ def test_a_change_that_is_accepted_but_not_shown_is_found_where_it_was_asked_for
 
 def test_a_light_that_cannot_be_brought_back_from_external_sync_does_not_take_internal_control():
     run = Run(only=('mode-internal', 'mode-external'))
-    device, apply = run.light, run.light._apply
+    apply = run.light.apply
 
     def stuck(change, now):
-        mode = device.configuration.mode
+        mode = run.lamp.configuration.mode
         apply(change, now)
         if mode is Mode.EXTERNAL_SYNC:
-            device.configuration = replace(device.configuration, mode=mode)
-    device._apply = stuck
+            run.lamp.configuration = replace(run.lamp.configuration, mode=mode)
+    run.light.apply = stuck
     assert run.finish().failed == {'mode-internal'}
     assert 'then the status differs in mode' in run.result('mode-internal').detail
 
 
 def test_a_light_that_knows_internal_control_only_takes_it():
-    run = Run(DeviceProperties(modes=(Mode.INTERNAL_CONTROL,)), only=('mode-internal',))
+    run = Run(IlluminatorProperties(modes=(Mode.INTERNAL_CONTROL,)), only=('mode-internal',))
     assert run.finish().result('mode-internal').verdict is Verdict.PASS
 
 
 def test_a_light_that_stays_on_is_not_switched_off():
     run = Run(faults=('lie',), only=('on', 'off'))
-    run.light.press(run.link.now, enabled=True)
+    run.press(enabled=True)
     run.finish()
     assert run.failed == {'off'}
     assert 'could not be switched off before' in run.result('on').detail
@@ -197,7 +199,7 @@ def test_one_requirement_alone_is_met_by_a_light_that_meets_it(name):
 
 
 def test_what_a_light_accepts_counts_as_done_where_it_reports_no_status():
-    run = Run(DeviceProperties(status_interval=0.0), faults=('lie',), only=('on',))
+    run = Run(IlluminatorProperties(status_interval=0.0), faults=('lie',), only=('on',))
     asked = run.bench.command
 
     async def last_status_before(command, *params, **options):
@@ -209,7 +211,7 @@ def test_what_a_light_accepts_counts_as_done_where_it_reports_no_status():
 
 
 def test_thermal_flags_that_go_with_the_temperature_are_in_order():
-    run = Run(DeviceProperties(time_scale=60.0), heat=20.0).finish()
+    run = Run(IlluminatorProperties(time_scale=60.0), heat=20.0).finish()
     assert run.result('thermal-flags').verdict.value == 'PASS'
     assert 'thermal throttling from' in run.result('thermal-flags').detail
 
@@ -224,7 +226,7 @@ def test_the_reason_and_what_was_said_stand_in_the_finding():
 
 
 def test_a_light_without_faults_behaves_as_the_protocol_says():
-    assert DeviceProperties().behaviour == Behaviour()
+    assert IlluminatorProperties().behaviour == IlluminatorBehaviour()
 
 
 def test_a_change_that_is_in_progress_for_ever_does_not_hold_up_the_run():

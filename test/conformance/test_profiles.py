@@ -15,9 +15,9 @@
 """The profiles against the suite: what is known of the lights in the field, and nothing else."""
 
 from illuminator_ros.cli.simulator.settings import properties
-from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.checks.requirement import Verdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.simulated_properties import PROFILES
 import pytest
 from support.conformance_run import Run
 
@@ -34,7 +34,7 @@ DEVIATIONS = {
 
 def finished(profile, **settings):
     settings['profile'] = profile
-    return Run(properties(settings, PROFILES[profile].source)).finish()
+    return Run(properties(settings, PROFILES[profile].address)).finish()
 
 
 @pytest.mark.parametrize('profile', DEVIATIONS)

@@ -26,8 +26,8 @@ from illuminator_ros.illuminator.checks.report import (
     Table,
 )
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.identity import Identity
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.conformance_run import Run
@@ -35,7 +35,7 @@ from support.conformance_run import Run
 
 @pytest.fixture(scope='module')
 def run():
-    return Run(DeviceProperties(identity=Identity('\x07bell', 'm', '1', '1', 'x&<y>')),
+    return Run(IlluminatorProperties(identity=Identity('\x07bell', 'm', '1', '1', 'x&<y>')),
                faults=('nan', 'any-target')).finish()
 
 

@@ -15,13 +15,13 @@
 """The light is afterwards as it was before, whatever happens."""
 
 from dataclasses import replace
-import math
 
 from illuminator_ros.illuminator.checks.requirement import Verdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import STATUS_ID
 import pytest
 from support.conformance_run import Run
 
@@ -34,13 +34,13 @@ SHOULD_NOT_MATTER = sorted(set(FAULTS) - {
 def prepared(*faults, **options):
     """Return a run against a light that somebody uses."""
     run = Run(faults=faults, **options)
-    run.light.press(run.link.now, enabled=True)
-    run.light.configuration = BEFORE
+    run.press(enabled=True)
+    run.lamp.configuration = BEFORE
     return run
 
 
 def state(run):
-    return run.light.enabled, run.light.configuration
+    return run.lamp.enabled, run.lamp.configuration
 
 
 def test_switch_and_configuration_are_brought_back():
@@ -52,25 +52,25 @@ def test_switch_and_configuration_are_brought_back():
 @pytest.mark.parametrize('fault', SHOULD_NOT_MATTER)
 def test_switch_and_configuration_are_brought_back_from_a_light_that_misbehaves(fault):
     run = prepared(fault).finish()
-    assert run.light.enabled is True
-    assert run.light.configuration.differences(BEFORE) == []
+    assert run.lamp.enabled is True
+    assert run.lamp.configuration.differences(BEFORE) == []
 
 
 @pytest.mark.parametrize('interval', [0.2, 1.0, 3.0])
 def test_a_default_rate_is_brought_back(interval):
-    run = Run(DeviceProperties(status_interval=interval)).finish()
-    assert run.light.interval == interval
+    run = Run(IlluminatorProperties(status_interval=interval)).finish()
+    assert run.light.interval(STATUS_ID) == interval
 
 
 def test_a_rate_that_somebody_has_set_is_brought_back():
     run = Run()
-    run.light.interval = 0.4
-    assert run.finish().light.interval == pytest.approx(0.4)
+    run.set_interval(0.4)
+    assert run.finish().light.interval(STATUS_ID) == pytest.approx(0.4)
 
 
 def test_a_stream_that_somebody_has_stopped_stays_so():
-    run = Run(DeviceProperties(status_interval=0.0)).finish()
-    assert run.light.interval == 0.0
+    run = Run(IlluminatorProperties(status_interval=0.0)).finish()
+    assert run.light.interval(STATUS_ID) == 0.0
 
 
 @pytest.mark.parametrize('after', [0.5 + 0.7 * step for step in range(52)])
@@ -142,10 +142,9 @@ def test_a_light_that_is_silent_for_a_while_is_brought_back_when_it_is_heard_aga
 
 def test_a_light_that_says_nothing_of_its_state_is_not_changed():
     run = prepared()
-    run.light.interval = 0.0
-    run.light._status_due = math.inf
+    run.set_interval(-1)
     run.fault('no-request')
-    run.light.behave(replace(run.light.behaviour, pushes=False), run.link.now)
+    run.light.behave(replace(run.light.behaviour, status_on_change=False), run.link.now)
     run.finish()
     assert state(run) == (True, BEFORE)
     assert run.result('on').verdict is Verdict.SKIPPED

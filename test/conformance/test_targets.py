@@ -14,42 +14,45 @@
 
 """Which light is checked, and that others on the line do not matter."""
 
-from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.faults import with_fault
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+)
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.conformance_run import Run
 
 FIRST, SECOND = Address(1, 243), Address(1, 244)
-BAD = with_fault(with_fault(Behaviour(), 'nan'), 'lie')
+BAD = FAULTS.add(FAULTS.add(IlluminatorBehaviour(), 'nan'), 'lie')
 
 
 def test_the_first_light_that_is_heard_is_checked():
-    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND)).finish()
+    run = Run(IlluminatorProperties(address=FIRST), IlluminatorProperties(address=SECOND)).finish()
     assert run.bench.found == FIRST
     assert run.failed == set()
 
 
 def test_the_light_that_is_named_is_checked():
-    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND, behaviour=BAD),
-              target=SECOND).finish()
+    run = Run(IlluminatorProperties(address=FIRST),
+              IlluminatorProperties(address=SECOND, behaviour=BAD), target=SECOND).finish()
     assert run.bench.found == SECOND
     assert {'not-a-number', 'status-agrees'} <= run.failed
 
 
 def test_another_light_that_misbehaves_is_no_finding():
-    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND, behaviour=BAD))
+    run = Run(IlluminatorProperties(address=FIRST),
+              IlluminatorProperties(address=SECOND, behaviour=BAD))
     assert run.finish().failed == set()
 
 
 def test_another_light_is_not_changed():
-    run = Run(DeviceProperties(source=FIRST), DeviceProperties(source=SECOND))
-    other = run.lights.devices[1]
-    other.press(run.link.now, enabled=True)
+    run = Run(IlluminatorProperties(address=FIRST), IlluminatorProperties(address=SECOND))
+    other = run.lights.components[1]
+    other.device.lamp.switch(True, brightness_is_switch=False)
     run.finish()
-    assert other.enabled is True
-    assert other.configuration.brightness == 100.0
+    assert other.device.lamp.enabled is True
+    assert other.device.lamp.configuration.brightness == 100.0
 
 
 def test_a_light_without_a_heartbeat_of_its_own_is_found_by_its_status():
@@ -58,7 +61,7 @@ def test_a_light_without_a_heartbeat_of_its_own_is_found_by_its_status():
 
 
 def test_without_a_light_there_is_one_finding_and_nothing_is_said_to_be_met():
-    run = Run(DeviceProperties(source=FIRST), target=SECOND).finish()
+    run = Run(IlluminatorProperties(address=FIRST), target=SECOND).finish()
     assert run.failed == {'heartbeat'}
     assert not run.suite.passed
     assert run.result('on').detail == '1/244 was not heard'
@@ -69,20 +72,20 @@ def test_without_a_light_there_is_one_finding_and_nothing_is_said_to_be_met():
     (None, 'no light was heard within 10 s: neither HEARTBEAT with MAV_TYPE_ILLUMINATOR nor '
            'ILLUMINATOR_STATUS; 1/243 and 1/244 were')])
 def test_who_was_heard_instead_of_the_light_is_said(target, said):
-    other_components = with_fault(with_fault(Behaviour(), 'type=18'), 'no-request')
-    run = Run(*[DeviceProperties(source=one, behaviour=other_components, status_interval=0.0)
+    other_components = FAULTS.add(FAULTS.add(IlluminatorBehaviour(), 'type=18'), 'no-request')
+    run = Run(*[IlluminatorProperties(address=one, behaviour=other_components, status_interval=0.0)
                 for one in (FIRST, SECOND)], target=target).finish()
     assert run.result('heartbeat').detail == run.suite.missing == said
 
 
 def test_of_a_crowd_that_was_heard_instead_of_the_light_some_are_named():
-    lights = [DeviceProperties(source=Address(1, n)) for n in range(1, 12)]
+    lights = [IlluminatorProperties(address=Address(1, n)) for n in range(1, 12)]
     run = Run(*lights, target=Address(9, 9))
     assert run.finish().suite.missing.endswith('1/7, 1/8 and 3 more were')
 
 
 def test_that_nobody_was_heard_is_said():
-    run = Run(DeviceProperties(behaviour=with_fault(Behaviour(), 'silence'))).finish()
+    run = Run(faults=('silence',)).finish()
     assert run.suite.missing.endswith('nor ILLUMINATOR_STATUS; nobody else was')
 
 

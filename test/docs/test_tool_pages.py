@@ -18,11 +18,11 @@ from pathlib import Path
 import re
 
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
-from illuminator_ros.cli.simulator.lights import scene
+from illuminator_ros.cli.simulator.lights import scenario
 from illuminator_ros.cli.simulator.settings import SETTINGS
-from illuminator_ros.illuminator.behaviour import PROFILES
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated_properties import PROFILES
 import pytest
 from support.tables import table
 
@@ -71,6 +71,6 @@ def test_the_sample_file_of_the_simulator_is_valid() -> None:
     yaml = pytest.importorskip('yaml')
     text = SIMULATOR.partition('```yaml\n')[2].partition('```')[0]
 
-    lights = scene(yaml.safe_load(text), 'the sample').lights
+    lights = scenario(yaml.safe_load(text), 'the sample').lights
 
     assert [name for _, name, _ in lights] == ['bow', 'stern']

@@ -14,9 +14,9 @@
 
 """The light's side: what it sends by itself and on request."""
 
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.identity import Identity
+from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -32,6 +32,7 @@ from illuminator_ros.mavlink.messages import (
     MavType,
     STATUS_ID,
 )
+from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
 
 GROUND = Address(255, 190)
@@ -43,7 +44,7 @@ class Bench:
 
     def __init__(self, **properties):
         self.now = 0.0
-        self.device = Device(DeviceProperties(**properties), self.now)
+        self.device = SimulatedComponent(describe(IlluminatorProperties(**properties)), self.now)
 
     def run(self, seconds):
         """Return what is sent in this time (s)."""
@@ -104,15 +105,15 @@ def test_what_was_missed_while_it_was_held_up_is_not_made_up_for(bench):
 
 
 def test_a_stream_keeps_its_pace_however_late_it_is_looked_at():
-    device = Device(DeviceProperties(status_interval=0.1), 0.0)
+    device = SimulatedComponent(describe(IlluminatorProperties(status_interval=0.1)), 0.0)
     for turn in range(101):
         device.poll(turn * 0.1 + 0.03)
     assert len([m for _, m in device.outgoing if isinstance(m, IlluminatorStatus)]) == 101
 
 
 def test_the_uptime_counts_from_the_start_and_wraps(bench):
-    assert bench.device.uptime_ms(1.234) == 1234
-    assert bench.device.uptime_ms(2 ** 32 / 1000 + 1.5) == 1500
+    assert bench.device.device.lamp.uptime_ms(1.234) == 1234
+    assert bench.device.device.lamp.uptime_ms(2 ** 32 / 1000 + 1.5) == 1500
 
 
 def test_a_status_is_sent_on_request_after_its_acknowledgement(bench):
@@ -187,7 +188,7 @@ def test_what_is_addressed_to_the_light_or_to_all_is_answered(bench, target):
 @pytest.mark.parametrize('target', [(1, 244), (2, 243), (2, 0), (255, 190)])
 def test_what_is_addressed_to_another_is_neither_answered_nor_done(bench, target):
     assert bench.command(MavCmd.ILLUMINATOR_ON_OFF, 1, target=target) == []
-    assert bench.device.enabled is False
+    assert bench.device.device.lamp.enabled is False
 
 
 def test_an_acknowledgement_names_its_command_and_its_target(bench):
@@ -206,10 +207,10 @@ def test_a_restart_brings_back_the_default_settings_but_not_the_cold():
     bench = Bench()
     bench.command(MavCmd.ILLUMINATOR_ON_OFF, 1)
     bench.command(MavCmd.DO_ILLUMINATOR_CONFIGURE, 2, 50, 1, 10)
-    bench.device.thermal.temperature = 60.0
+    bench.device.device.lamp.thermal.temperature = 60.0
     bench.now = 100.0
     bench.device.restart(bench.now)
     assert isinstance(bench.run(0.0)[0], Heartbeat)
-    status = bench.device.status(bench.now)
+    status = bench.device.device.status(bench.now)
     assert (status.uptime_ms, status.enable, status.mode, status.brightness) == (0, 0, 1, 100.0)
     assert status.temp_c == 60.0

@@ -14,8 +14,8 @@
 
 """The light's side: the two commands that change it, and what they do not let in."""
 
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -29,6 +29,7 @@ from illuminator_ros.mavlink.messages import (
     MavResult,
     STATUS_ID,
 )
+from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
 
 GROUND = Address(255, 190)
@@ -38,7 +39,7 @@ ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
 
 
 def fresh(now=0.0, **properties):
-    return Device(DeviceProperties(**properties), now)
+    return SimulatedComponent(describe(IlluminatorProperties(**properties)), now)
 
 
 def send(device, command, *params, form=CommandLong, now=0.0):
@@ -54,7 +55,7 @@ def send(device, command, *params, form=CommandLong, now=0.0):
 
 def shown(device, now=0.0):
     """Return mode, brightness, strobe period and duty cycle as the status shows them."""
-    status = device.status(now)
+    status = device.device.status(now)
     return (status.mode, status.brightness, status.strobe_period, status.strobe_duty_cycle)
 
 
@@ -71,7 +72,7 @@ def test_on_off_with_anything_else_is_denied_and_changes_nothing(value):
     device = fresh()
     send(device, ON_OFF, 1)
     assert send(device, ON_OFF, value) == (DENIED, [])
-    assert device.enabled is True
+    assert device.device.lamp.enabled is True
 
 
 @pytest.mark.parametrize('params', [
@@ -112,7 +113,7 @@ def test_switching_does_not_change_the_configuration_nor_the_other_way_round():
     send(device, ON_OFF, 1)
     assert shown(device) == (2, 50, 1, 25)
     send(device, CONFIGURE, 1, 60, 0, 0)
-    assert device.enabled is True
+    assert device.device.lamp.enabled is True
 
 
 # What the developer guide's emulator is tested for, one row for each of the 18 tests: what is
@@ -165,7 +166,7 @@ def test_it_passes_what_the_developer_guide_tests(before, command, result, then)
             device.poll(now)
         assert [m.id for _, m in device.outgoing].count(then['streamed']) == 3
     if 'enable' in then:
-        assert device.status(0.0).enable == then['enable']
+        assert device.device.status(0.0).enable == then['enable']
     if 'shown' in then:
         assert shown(device) == then['shown']
 
@@ -185,14 +186,14 @@ def lit(seconds, **changes):
 
 def test_a_light_that_is_on_gets_warm_and_one_that_is_off_does_not():
     device = lit(3.0)
-    assert device.status(3.0).temp_c > 45.0
+    assert device.device.status(3.0).temp_c > 45.0
     off = fresh(thermal=HOT)
-    assert off.status(100.0).temp_c == pytest.approx(40.0)
+    assert off.device.status(100.0).temp_c == pytest.approx(40.0)
 
 
 def test_a_hot_light_says_so_and_shows_the_brightness_that_it_still_gives():
     device = lit(8.0)
-    status = device.status(8.0)
+    status = device.device.status(8.0)
     assert isinstance(status, IlluminatorStatus)
     assert (status.error_status, status.brightness, status.enable) == (1, 50.0, 1)
 
@@ -200,7 +201,7 @@ def test_a_hot_light_says_so_and_shows_the_brightness_that_it_still_gives():
 def test_a_light_that_has_cooled_down_is_as_bright_as_it_was_told_to_be():
     device = lit(8.0)
     send(device, ON_OFF, 0, now=8.0)
-    status = device.status(60.0)
+    status = device.device.status(60.0)
     assert (status.error_status, status.brightness) == (0, 100.0)
 
 
@@ -208,14 +209,14 @@ def test_a_light_that_has_cooled_down_is_as_bright_as_it_was_told_to_be():
     (100, 1, 10, 8.0),
     (50, 1, 50, 20.0),
     (40, 0, 10, 32.0),      # no strobe
-    (40, 1, 0, 32.0),       # strobe unused
+    (40, 1, 0, 0.0),        # a strobe that is never lit
 ])
 def test_a_strobe_heats_by_its_duty_cycle(brightness, period, duty, rise):
     device = fresh(thermal=HOT)
     send(device, ON_OFF, 1)
     send(device, CONFIGURE, 1, brightness, period, duty)
-    assert device.status(100.0).temp_c == pytest.approx(40.0 + rise, abs=0.1)
+    assert device.device.status(100.0).temp_c == pytest.approx(40.0 + rise, abs=0.1)
 
 
 def test_time_can_be_scaled():
-    assert lit(1.0, time_scale=8.0).status(1.0).error_status == 1
+    assert lit(1.0, time_scale=8.0).device.status(1.0).error_status == 1

@@ -14,21 +14,22 @@
 
 """Several simulated lights on one link."""
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.illuminator.simulated import simulated_lights
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong
 
+LIGHTS = [IlluminatorProperties(address=Address(1, one)) for one in (243, 244)]
 GROUND = Address(255, 190)
 
 
 def test_lights_on_one_link_answer_for_themselves_only():
-    lights = Devices([DeviceProperties(source=Address(1, one)) for one in (243, 244)], 0.0)
+    lights = simulated_lights(LIGHTS, 0.0)
     lights.receive(GROUND, CommandLong(1, 244, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
-    assert [device.enabled for device in lights.devices] == [False, True]
+    assert [light.device.lamp.enabled for light in lights.components] == [False, True]
     assert {source for source, _ in lights.outgoing} == {Address(1, 244)}
 
 
 def test_all_lights_on_a_link_answer_a_broadcast():
-    lights = Devices([DeviceProperties(source=Address(1, one)) for one in (243, 244)], 0.0)
+    lights = simulated_lights(LIGHTS, 0.0)
     lights.receive(GROUND, CommandLong(0, 0, 405, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
-    assert [device.enabled for device in lights.devices] == [True, True]
+    assert [light.device.lamp.enabled for light in lights.components] == [True, True]

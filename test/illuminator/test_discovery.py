@@ -17,9 +17,9 @@
 import math
 
 from illuminator_ros.illuminator.client import MAX_LIGHTS
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.events import LightFound
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import CONFLICT_MEMORY
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -154,7 +154,7 @@ def test_nobody_at_our_own_address_is_a_light(controller, message):
 
 def test_several_lights_are_known_apart():
     sources = [Address(1, 243), Address(1, 244), Address(2, 243)]
-    pair = Pair([DeviceProperties(source=source) for source in sources]).settle()
+    pair = Pair([IlluminatorProperties(address=source) for source in sources]).settle()
     light = pair.controller.lights[sources[1]]
     answer = pair.ask_enable(True, light)
     assert pair.wait_for(answer).success

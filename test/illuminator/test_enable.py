@@ -16,9 +16,9 @@
 
 import re
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.enable import PROGRESS_LIMIT
 from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -48,7 +48,7 @@ def test_it_succeeds_when_the_light_accepts_and_shows_it(pair):
     assert result.success
     assert result.message.startswith('on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED (')
     assert tries_and_seconds(result.message) == (1, pytest.approx(answer.seconds, abs=1e-3))
-    assert pair.device.enabled
+    assert pair.lamp.enabled
 
 
 def test_a_status_that_does_not_come_by_itself_is_asked_for(fake, faked):
@@ -240,7 +240,7 @@ def test_a_light_that_restarts_meanwhile_does_not_confirm(fake, faked):
 
 
 def test_one_dead_light_does_not_delay_another():
-    pair = Pair([DeviceProperties(source=Address(1, one)) for one in (243, 244)]).settle()
+    pair = Pair([IlluminatorProperties(address=Address(1, one)) for one in (243, 244)]).settle()
     dead, alive = (pair.controller.lights[Address(1, one)] for one in (243, 244))
     pair.device.receive = lambda source, message, now: None
     late = pair.ask_enable(True, dead)

@@ -16,17 +16,11 @@
 
 import math
 
-from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.faults import (
-    active,
-    as_typed,
-    describe,
-    FaultError,
-    FAULTS,
-    with_fault,
-    without_fault,
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -38,6 +32,8 @@ from illuminator_ros.mavlink.messages import (
     MavResult,
     STATUS_ID,
 )
+from illuminator_ros.payload.faults import FaultError
+from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
 
 GROUND = Address(255, 190)
@@ -48,10 +44,11 @@ class Faulty:
     """A light with faults, whose messages are kept with their times."""
 
     def __init__(self, *faults, **properties):
-        behaviour = Behaviour()
+        behaviour = IlluminatorBehaviour()
         for fault in faults:
-            behaviour = with_fault(behaviour, fault)
-        self.device = Device(DeviceProperties(behaviour=behaviour, **properties), 0.0)
+            behaviour = FAULTS.add(behaviour, fault)
+        self.device = SimulatedComponent(
+            describe(IlluminatorProperties(behaviour=behaviour, **properties)), 0.0)
         self.now = 0.0
         self.sent = []
 
@@ -84,7 +81,7 @@ def test_a_silent_light_neither_sends_nor_does_anything():
     light = Faulty('silence')
     light.run(5.0).command()
     assert light.sent == []
-    assert light.device.enabled is False
+    assert light.device.device.lamp.enabled is False
 
 
 def test_silence_may_have_an_end():
@@ -105,7 +102,7 @@ def test_what_was_under_way_is_forgotten_with_a_restart(fault):
     light.device.restart(0.5)
     light.now = 0.5
     light.run(5.0)
-    assert light.device.enabled is False
+    assert light.device.device.lamp.enabled is False
     assert MavResult.ACCEPTED not in light.results()
 
 
@@ -127,15 +124,15 @@ def test_a_failed_thermistor_is_reported_and_measures_nothing():
 
 def test_a_light_without_thermistor_does_not_notice_the_heat():
     light = Faulty('thermistor')
-    light.device.heat_to(120.0, 0.0)
+    light.device.device.lamp.heat_to(120.0, 0.0)
     light.run(2.0)
     assert light.of(IlluminatorStatus)[-1][1].error_status == 4
 
 
 def test_a_thermistor_that_works_again_measures_again():
     light = Faulty('thermistor')
-    light.device.behave(Behaviour(), 0.0)
-    status = light.device.status(0.0)
+    light.device.behave(IlluminatorBehaviour(), 0.0)
+    status = light.device.device.status(0.0)
     assert (status.error_status, status.temp_c) == (0, 25.0)
 
 
@@ -147,18 +144,18 @@ def test_changes_are_refused_with_the_result_and_requests_are_not(fault, result)
     light.command()
     light.command(MavCmd.REQUEST_MESSAGE, STATUS_ID)
     assert light.results() == [result, MavResult.ACCEPTED]
-    assert light.device.enabled is False
+    assert light.device.device.lamp.enabled is False
 
 
 def test_progress_is_reported_until_the_change_is_made():
     light = Faulty('progress=2')
     light.command()
     light.run(1.9)
-    assert light.device.enabled is False
+    assert light.device.device.lamp.enabled is False
     light.run(0.2)
     acks = [(at, ack.result, ack.progress) for at, ack in light.of(CommandAck)]
     assert acks == [(0.0, 5, 0), (0.5, 5, 25), (1.0, 5, 50), (1.5, 5, 75), (2.0, 0, 0)]
-    assert light.device.enabled is True
+    assert light.device.device.lamp.enabled is True
 
 
 def test_a_second_command_meanwhile_is_rejected_temporarily():
@@ -174,24 +171,24 @@ def test_some_changes_are_rejected_temporarily_and_the_next_is_made():
     for _ in range(3):
         light.command()
     assert light.results() == [1, 1, 0]
-    assert light.device.enabled is True
+    assert light.device.device.lamp.enabled is True
 
 
 def test_a_slow_light_answers_and_acts_late():
     light = Faulty('slow=1.5')
     light.command()
     light.run(1.4)
-    assert (light.results(), light.device.enabled) == ([], False)
+    assert (light.results(), light.device.device.lamp.enabled) == ([], False)
     light.run(0.2)
     assert [at for at, _ in light.of(CommandAck)] == [1.5]
-    assert light.device.enabled is True
+    assert light.device.device.lamp.enabled is True
 
 
 def test_a_light_that_lies_accepts_and_does_nothing():
     light = Faulty('lie')
     light.command()
     assert light.results() == [MavResult.ACCEPTED]
-    assert light.device.status(0.0).enable == 0
+    assert light.device.device.status(0.0).enable == 0
 
 
 @pytest.mark.parametrize(('share', 'low', 'high'), [(0.2, 140, 180), (1, 0, 0)])
@@ -229,57 +226,59 @@ def test_the_same_seed_brings_the_same_run(fault):
 
 def test_a_fault_can_begin_and_end_while_the_light_runs():
     light = Faulty().run(2.0)
-    light.device.behave(with_fault(light.device.behaviour, 'drop=1'), light.now)
+    light.device.behave(FAULTS.add(light.device.behaviour, 'drop=1'), light.now)
     light.run(3.0)
     assert len(light.of(Heartbeat)) == 3
-    light.device.behave(without_fault(light.device.behaviour, Behaviour(), 'drop'), light.now)
+    light.device.behave(FAULTS.remove(light.device.behaviour, IlluminatorBehaviour(), 'drop'),
+                        light.now)
     light.run(2.0)
     assert len(light.of(Heartbeat)) == 5
 
 
 def test_faults_that_are_active_are_known():
-    behaviour = with_fault(with_fault(Behaviour(), 'lie'), 'drop=0.1')
-    assert active(behaviour, Behaviour()) == ['drop', 'lie']
+    behaviour = FAULTS.add(FAULTS.add(IlluminatorBehaviour(), 'lie'), 'drop=0.1')
+    assert FAULTS.active(behaviour, IlluminatorBehaviour()) == ['drop', 'lie']
 
 
 @pytest.mark.parametrize('text', [
     'silence', 'silence=5.0', 'drop=0.2', 'refuse=failed', 'busy=1000000', 'flags=128', 'nan'])
 def test_faults_are_described_as_they_are_typed(text):
-    assert as_typed(with_fault(Behaviour(), text), Behaviour()) == [text]
+    normal = IlluminatorBehaviour()
+    assert FAULTS.as_typed(FAULTS.add(normal, text), normal) == [text]
 
 
 @pytest.mark.parametrize('name', FAULTS)
 def test_every_fault_changes_the_behaviour_and_ends_again(name):
-    faulty = with_fault(Behaviour(), name)
-    assert faulty != Behaviour()
-    assert without_fault(faulty, Behaviour(), name) == Behaviour()
+    faulty = FAULTS.add(IlluminatorBehaviour(), name)
+    assert faulty != IlluminatorBehaviour()
+    assert FAULTS.remove(faulty, IlluminatorBehaviour(), name) == IlluminatorBehaviour()
 
 
 @pytest.mark.parametrize(('text', 'said'), [
     ('nope', "no fault 'nope'; there are silence, reboot"),
     ('', "no fault ''"),
     ('lie=1', 'lie takes no value'),
-    ('drop=2', "'2' is no SHARE: not within 0 to 1"),
-    ('drop=0', 'no SHARE'),
-    ('drop=nan', 'no SHARE'),
-    ('drop=', 'no SHARE'),
-    ('slow=-1', 'no S: not within 0 to 3600 s'),
-    ('slow=inf', 'no S'),
-    ('busy=0', 'no N'),
-    ('refuse=maybe', 'no RESULT'),
-    ('flags=0', 'no FLAGS'),
-    ('type=256', 'no N'),
+    ('drop=2', "'2' is not a SHARE: not within 0 to 1"),
+    ('drop=0', 'not a SHARE'),
+    ('drop=nan', 'not a SHARE'),
+    ('drop=', 'not a SHARE'),
+    ('slow=-1', 'not a S: not within 0 to 3600 s'),
+    ('slow=inf', 'not a S'),
+    ('busy=0', 'not a N'),
+    ('refuse=maybe', 'not a RESULT'),
+    ('flags=0', 'not a FLAGS'),
+    ('type=256', 'not a N'),
 ])
 def test_what_is_no_fault_is_said(text, said):
     with pytest.raises(FaultError) as caught:
-        with_fault(Behaviour(), text)
+        FAULTS.add(IlluminatorBehaviour(), text)
     assert said in str(caught.value)
 
 
 def test_the_description_has_every_fault_with_its_default():
-    lines = describe().splitlines()
+    lines = FAULTS.describe().splitlines()
     assert len(lines) == len(FAULTS)
-    assert '  drop[=SHARE]         a share of its messages is lost (default: 0.3)' in lines
+    assert '  drop[=SHARE]         loses a share of its messages (default: 0.3)' in lines
     assert any('refuse' in line and '(default: denied)' in line for line in lines)
     assert any('silence' in line and '(default: for ever)' in line for line in lines)
     assert FAULTS['silence'].default == math.inf

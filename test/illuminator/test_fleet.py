@@ -14,13 +14,13 @@
 
 """One request to all lights: one answer, which names what became of each."""
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.fleet import enable_all
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.back_to_back import Answer, Pair
 
-LIGHTS = [DeviceProperties(Address(1, component)) for component in (243, 244, 245)]
+LIGHTS = [IlluminatorProperties(Address(1, component)) for component in (243, 244, 245)]
 
 
 @pytest.fixture
@@ -40,13 +40,13 @@ def ask(fleet, on=True):
 
 def silence(fleet, index):
     """Have a light hear no commands any more, though it still reports."""
-    fleet.other.devices[index].addressed = lambda message: False
+    fleet.other.components[index].addressed = lambda message: False
 
 
 def test_all_lights_are_switched_and_each_is_named(fleet):
     result = fleet.wait_for(ask(fleet))
     assert result.success
-    assert [device.enabled for device in fleet.other.devices] == [True] * 3
+    assert [light.device.lamp.enabled for light in fleet.other.components] == [True] * 3
     summary, *outcomes = result.message.split('; ')
     assert summary == '3 of 3 on'
     assert [outcome.partition(': ')[0] for outcome in outcomes] == [
@@ -58,7 +58,7 @@ def test_all_lights_are_switched_off(fleet):
     fleet.wait_for(ask(fleet))
     result = fleet.wait_for(ask(fleet, on=False))
     assert result.message.startswith('3 of 3 off; lamp 1/243: off, confirmed')
-    assert not any(device.enabled for device in fleet.other.devices)
+    assert not any(light.device.lamp.enabled for light in fleet.other.components)
 
 
 def test_one_light_that_fails_makes_it_no_success_and_the_others_are_switched(fleet):
@@ -67,7 +67,7 @@ def test_one_light_that_fails_makes_it_no_success_and_the_others_are_switched(fl
     assert not result.success
     assert result.message.startswith('2 of 3 on; lamp 1/243: on, confirmed')
     assert 'lamp 1/244: no acknowledgement (4 tries' in result.message
-    assert [device.enabled for device in fleet.other.devices] == [True, False, True]
+    assert [light.device.lamp.enabled for light in fleet.other.components] == [True, False, True]
 
 
 def test_the_commands_go_out_together_and_the_answer_comes_with_the_slowest(fleet):

@@ -109,7 +109,7 @@ def test_thermal_dimming_is_no_change_neither_on_its_way_down_nor_up(
 
 def test_the_simulated_light_getting_hot_is_no_change(pair):
     pair.enable(True)
-    pair.device.thermal.temperature = 90.0
+    pair.lamp.thermal.temperature = 90.0
     pair.run(5.0)
     assert pair.light.status.brightness == 50.0
     assert len(pair.recorder.changes) == 1

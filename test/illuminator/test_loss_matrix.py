@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections import Counter
 import random
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
@@ -40,7 +40,7 @@ QUIET = 3.0
 # s; two setpoints one after the other, each of which may take its 0.85 s.
 LONGEST_SET = 1.75
 # Lights that stay as bright as they are told: what heat does is another test's subject.
-LIGHTS = [DeviceProperties(source=Address(1, one), thermal=ThermalProperties(rise=0.0))
+LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperties(rise=0.0))
           for one in (243, 244, 245, 246)]
 
 # What the line does: by name, towards the lights and back.
@@ -170,11 +170,11 @@ def test_every_command_has_one_outcome_and_it_is_true(line, share, request):
     assert share or all(kind == 'confirmed' for kind, _ in judgements)
     pair.mend()
     pair.run(QUIET)
-    for device in pair.other.devices:
-        light = pair.controller.lights[device.source]
-        assert light.agreement.agreed == device.configuration
-        assert light.status.enabled == device.enabled
-        assert 'restarted' not in pair.recorders[device.source].events
+    for simulated in pair.other.components:
+        light = pair.controller.lights[simulated.address]
+        assert light.agreement.agreed == simulated.device.lamp.configuration
+        assert light.status.enabled == simulated.device.lamp.enabled
+        assert 'restarted' not in pair.recorders[simulated.address].events
 
 
 def test_the_same_seed_does_the_same():

@@ -15,9 +15,9 @@
 """Lights as they are seen in the field."""
 
 from illuminator_ros.cli.simulator.settings import properties
-from illuminator_ros.illuminator.behaviour import PROFILES
-from illuminator_ros.illuminator.device import Device
 from illuminator_ros.illuminator.model import Status
+from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -31,6 +31,7 @@ from illuminator_ros.mavlink.messages import (
     MavResult,
     STATUS_ID,
 )
+from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
 
 GROUND = Address(255, 190)
@@ -43,7 +44,8 @@ class Lamp:
 
     def __init__(self, profile, **settings):
         settings['profile'] = profile
-        self.device = Device(properties(settings, PROFILES[profile].source), 0.0)
+        self.device = SimulatedComponent(
+            describe(properties(settings, PROFILES[profile].address)), 0.0)
         self.now = 0.0
 
     def run(self, seconds):
@@ -63,14 +65,14 @@ class Lamp:
     def command(self, command, *params, target=None):
         values = [*params, *[0.0] * 7][:7]
         self.device.receive(
-            GROUND, CommandLong(*(target or self.device.source), command, 0, *values), self.now)
+            GROUND, CommandLong(*(target or self.device.address), command, 0, *values), self.now)
         return self.sent()
 
     def result(self, command, *params, **keywords):
         return MavResult(self.command(command, *params, **keywords)[0].result)
 
     def status(self):
-        return self.device.status(self.now)
+        return self.device.device.status(self.now)
 
 
 def beats(messages):
@@ -82,7 +84,7 @@ class TestReference:
     def test_it_sends_from_255_0_with_a_state_that_is_not_initialized(self):
         lamp = Lamp('reference')
         (beat,) = beats(lamp.run(0.5))
-        assert lamp.device.source == Address(255, 0)
+        assert lamp.device.address == Address(255, 0)
         assert (beat.type, beat.autopilot, beat.system_status) == (44, 8, 0)
 
     def test_it_acknowledges_to_nobody_in_particular_before_it_applies(self):
@@ -140,7 +142,7 @@ class TestArduSub:
     def test_it_is_the_autopilot(self):
         lamp = Lamp('ardusub')
         (beat,) = beats(lamp.run(0.5))
-        assert lamp.device.source == Address(1, 1)
+        assert lamp.device.address == Address(1, 1)
         assert (beat.type, beat.autopilot) == (12, 3)
 
     def test_what_it_does_not_measure_is_0_and_its_bitmask_is_shifted(self):

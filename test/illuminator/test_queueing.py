@@ -14,9 +14,9 @@
 
 """Requests to one light: in order, one at a time of each kind, each answered exactly once."""
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
@@ -115,7 +115,7 @@ def test_a_closed_link_leaves_nothing_that_is_sent_later(fake, faked):
 
 def test_many_lights_are_served_at_the_same_time():
     sources = [Address(1, component) for component in range(100, 130)]
-    pair = Pair([DeviceProperties(source=source) for source in sources],
+    pair = Pair([IlluminatorProperties(address=source) for source in sources],
                 there=Faults(latency=0.05)).settle()
     answers = [pair.ask_enable(True, light) for light in pair.controller.lights.values()]
     pair.run(0.25)
@@ -127,9 +127,9 @@ class TestCallbacksThatAskForMore:
 
     def toggle(self, pair, times, log):
         def done(result: Result, now: float) -> None:
-            log.append((result.success, pair.device.enabled))
+            log.append((result.success, pair.lamp.enabled))
             if len(log) < times:
-                pair.light.enable(not pair.device.enabled, now, done)
+                pair.light.enable(not pair.lamp.enabled, now, done)
         pair.light.enable(True, pair.now, done)
 
     def test_switching_again_from_the_answer(self, pair):
@@ -149,7 +149,7 @@ class TestCallbacksThatAskForMore:
         pair.light.agreement.configure({'brightness': 5}, pair.now, done)
         pair.run(2.0)
         assert log == [True] * 6
-        assert pair.device.configuration.brightness == 50.0
+        assert pair.lamp.configuration.brightness == 50.0
 
     def test_refreshing_again_from_the_answer(self, pair):
         log = []

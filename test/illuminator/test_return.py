@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from illuminator_ros.illuminator.client import MAX_ASKED
-from illuminator_ros.illuminator.device_properties import DeviceProperties
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.back_to_back import Pair
@@ -42,7 +42,7 @@ def test_a_light_is_back_before_its_next_heartbeat() -> None:
 
 
 def test_no_more_lights_are_looked_for_at_once_than_a_slow_line_bears() -> None:
-    pair = Pair([DeviceProperties(source=Address(1, 1 + i))
+    pair = Pair([IlluminatorProperties(address=Address(1, 1 + i))
                  for i in range(3 * MAX_ASKED)]).settle()
     pair.close()
     pair.open()

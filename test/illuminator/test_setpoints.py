@@ -66,7 +66,7 @@ def test_one_command_is_in_flight_whatever_the_rate(rate, latency):
     publish(pair, *ramp(200), rate=rate)
     pair.run(1.0)
     assert in_flight(pair) == 1
-    assert pair.device.configuration.brightness == ramp(200)[-1]
+    assert pair.lamp.configuration.brightness == ramp(200)[-1]
     assert pair.recorder.failed_setpoints == []
 
 

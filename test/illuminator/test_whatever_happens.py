@@ -17,9 +17,9 @@
 from dataclasses import replace
 import random
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address
 import pytest
@@ -33,7 +33,7 @@ SECONDS = 90.0
 RECOVERY = 12.0
 # s; the tries of a command, its confirmation, and those that were before it in the queue.
 LONGEST = 32.0
-LIGHTS = [DeviceProperties(source=Address(1, one), thermal=ThermalProperties(rise=0.0))
+LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperties(rise=0.0))
           for one in (243, 244)]
 
 
@@ -48,7 +48,7 @@ class Chaos:
                             restore_configuration=self.draw.random() < 0.7)
         self.pair = Pair(LIGHTS, there=faults, settings=settings, seed=seed,
                          uptime=self.draw.choice((0.0, 1000.0)))
-        self.devices = self.pair.other.devices
+        self.lights = self.pair.other.components
         self.sets: list[Answer] = []
         self.others: list[Answer] = []
         self.is_open = True
@@ -97,14 +97,14 @@ class Chaos:
             self.is_open = True
 
     def restart(self) -> None:
-        self.draw.choice(self.devices).restart(self.pair.now)
+        self.draw.choice(self.lights).restart(self.pair.now)
 
     def strange(self) -> None:
         """Let a stranger change a light."""
-        device = self.draw.choice(self.devices)
-        device.enabled = self.draw.random() < 0.5
-        device.configuration = replace(
-            device.configuration, mode=self.draw.choice(list(Mode)[1:]),
+        lamp = self.draw.choice(self.lights).device.lamp
+        lamp.enabled = self.draw.random() < 0.5
+        lamp.configuration = replace(
+            lamp.configuration, mode=self.draw.choice(list(Mode)[1:]),
             brightness=float(self.draw.randrange(101)))
 
     def hush(self) -> None:
@@ -130,10 +130,10 @@ def test_whatever_happens(seed):
     assert {len(answer.results) for answer in chaos.sets + chaos.others} == {1}
     assert max(answer.seconds for answer in chaos.sets) <= 0.9
     assert max(answer.seconds for answer in chaos.others) <= LONGEST
-    for device in chaos.devices:
-        light = pair.controller.lights[device.source]
+    for simulated in chaos.lights:
+        light = pair.controller.lights[simulated.address]
         assert light.connected
-        assert light.agreement.agreed == device.configuration
-        assert light.status.enabled == device.enabled
+        assert light.agreement.agreed == simulated.device.lamp.configuration
+        assert light.status.enabled == simulated.device.lamp.enabled
         assert light.next_deadline() > pair.now
     assert pair.controller.sender.next_deadline() == float('inf')

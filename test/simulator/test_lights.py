@@ -14,30 +14,31 @@
 
 """Which lights the command line and a file describe."""
 
-from illuminator_ros.cli.simulator.lights import lights, load, Scene, scene
+from illuminator_ros.cli.simulator.lights import lights, load, Scenario, scenario
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.cli.simulator.settings import SettingError, SETTINGS
-from illuminator_ros.illuminator.faults import active
+from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Limits, Mode
 from illuminator_ros.mavlink.messages import Address
 import pytest
 
 
 def described(*arguments, file=None):
-    return lights(parser().parse_args(list(arguments)), scene(file, 'f.yaml') if file else Scene())
+    return lights(parser().parse_args(list(arguments)),
+                  scenario(file, 'f.yaml') if file else Scenario())
 
 
 def sources(found):
-    return [str(one.source) for one in found]
+    return [str(one.address) for one in found]
 
 
 def faults(light):
-    return active(light.behaviour, light.normal)
+    return FAULTS.active(light.behaviour, light.normal)
 
 
 def test_without_arguments_there_is_one_ordinary_light():
     (light,) = described()
-    assert light.source == Address(1, 243)
+    assert light.address == Address(1, 243)
     assert light.limits == Limits(0.05, 10.0)
     assert light.identity.serial_number == 'SIM-1-243'
     assert light.mode_bitmask == 3
@@ -52,7 +53,7 @@ def test_lights_are_counted_up():
 
 def test_lights_can_be_listed_with_names():
     found = described('--light', '1/243=bow', '--light', '2/10')
-    assert [(str(one.source), one.name) for one in found] == [('1/243', 'bow'), ('2/10', '')]
+    assert [(str(one.address), one.name) for one in found] == [('1/243', 'bow'), ('2/10', '')]
 
 
 @pytest.mark.parametrize('option', ['--count', '--system-id', '--component-id'])
@@ -113,12 +114,12 @@ FILE = {
 
 def test_a_file_says_the_same_for_each_light():
     bow, other = described(file=FILE)
-    assert (str(bow.source), bow.name, bow.identity.serial_number) == ('1/243', 'bow', '815')
+    assert (str(bow.address), bow.name, bow.identity.serial_number) == ('1/243', 'bow', '815')
     assert bow.behaviour.extension is not None
     assert (bow.thermal.ambient, bow.thermal.rise, bow.thermal.time_constant) == (60, 70, 60)
     assert faults(bow) == ['lie']
     assert (other.modes, other.status_interval) == ((Mode.INTERNAL_CONTROL,), 0.2)
-    assert faults(other) == ['thermistor', 'drop', 'lie']
+    assert faults(other) == ['drop', 'lie', 'thermistor']
 
 
 def test_the_command_line_counts_more_than_the_file():

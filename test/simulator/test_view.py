@@ -19,18 +19,29 @@ import os
 import re
 import shutil
 
-from illuminator_ros.cli.simulator.view import glance, LiveView, PlainView
-from illuminator_ros.illuminator.behaviour import Behaviour
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.faults import with_fault
+from illuminator_ros.cli.simulator.view import LiveView, look, PlainView
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+)
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
+
+
+def simulated(**properties):
+    return SimulatedComponent(describe(IlluminatorProperties(**properties)), 0.0)
 
 
 @pytest.fixture
 def device():
-    return Device(DeviceProperties(source=Address(1, 243), name='bow'), 0.0)
+    return simulated(address=Address(1, 243), name='bow')
+
+
+def press(component, now, **changes):
+    component.apply(component.device.press(now, **changes), now)
 
 
 class Terminal(io.StringIO):
@@ -68,20 +79,20 @@ def terminal(monkeypatch):
 
 
 def test_a_line_has_all_that_a_light_does(device):
-    device.press(0.0, enabled=True, brightness=60.0, strobe_period=0.5, strobe_duty_cycle=25.0,
+    press(device, 0.0, enabled=True, brightness=60.0, strobe_period=0.5, strobe_duty_cycle=25.0,
                  mode='external_sync')
-    device.heat_to(85.0, 0.0)
-    device.behave(with_fault(device.behaviour, 'drop'), 0.0)
-    line = str(glance(device, 0.1))
+    device.device.lamp.heat_to(85.0, 0.0)
+    device.behave(FAULTS.add(device.behaviour, 'drop'), 0.0)
+    line = str(look(device, 0.1))
     assert re.split(r'  +', line) == [
         '1/243 bow', 'ON', '30 %', 'strobe 0.5 s, 25 %', '85.0 degC', 'external_sync',
         'thermal throttling', '[drop]']
 
 
 def test_the_line_shows_what_is_and_not_what_a_light_says(device):
-    device.behave(with_fault(Behaviour(), 'thermistor'), 0.0)
-    device.heat_to(70.0, 0.0)
-    assert '70.0 degC' in str(glance(device, 0.0))
+    device.behave(FAULTS.add(IlluminatorBehaviour(), 'thermistor'), 0.0)
+    device.device.lamp.heat_to(70.0, 0.0)
+    assert '70.0 degC' in str(look(device, 0.0))
 
 
 class TestPlainView:
@@ -90,10 +101,10 @@ class TestPlainView:
         stream = io.StringIO()
         view = PlainView(stream)
         for now in range(5):
-            view.show([glance(device, float(now))])
-        device.press(5.0, enabled=True)
+            view.show([look(device, float(now))])
+        press(device, 5.0, enabled=True)
         for now in range(5, 8):
-            view.show([glance(device, float(now))])
+            view.show([look(device, float(now))])
         off, on = stream.getvalue().splitlines()
         assert ('off' in off, 'ON' in on) == (True, True)
 
@@ -101,8 +112,8 @@ class TestPlainView:
         stream = io.StringIO()
         view = PlainView(stream)
         for temperature in range(30, 51):
-            device.heat_to(float(temperature), 0.0)
-            view.show([glance(device, 0.0)])
+            device.device.lamp.heat_to(float(temperature), 0.0)
+            view.show([look(device, 0.0)])
         assert len(stream.getvalue().splitlines()) == 5
 
     def test_nothing_is_not_written(self):
@@ -112,7 +123,7 @@ class TestPlainView:
 
     def test_it_is_plain(self, device):
         stream = io.StringIO()
-        PlainView(stream).show([glance(device, 0.0)])
+        PlainView(stream).show([look(device, 0.0)])
         assert '\x1b' not in stream.getvalue()
 
 
@@ -121,24 +132,24 @@ class TestLiveView:
     def test_a_light_has_one_line_that_is_always_up_to_date(self, device, terminal):
         view = LiveView(terminal)
         for temperature in (30.0, 31.0, 32.0):
-            device.heat_to(temperature, 0.0)
-            view.show([glance(device, 0.0)])
+            device.device.lamp.heat_to(temperature, 0.0)
+            view.show([look(device, 0.0)])
         line, prompt = terminal.screen()
         assert '32.0 degC' in line
         assert prompt == '> '
 
     def test_a_light_that_dims_itself_is_seen_to_in_80_columns(self, device, terminal):
-        device.press(0.0, enabled=True)
-        device.heat_to(85.0, 0.0)
-        LiveView(terminal).show([glance(device, 0.0)])
+        press(device, 0.0, enabled=True)
+        device.device.lamp.heat_to(85.0, 0.0)
+        LiveView(terminal).show([look(device, 0.0)])
         assert terminal.screen()[0].endswith('  thermal throttling')
 
     def test_what_is_being_typed_stays(self, device, terminal):
         view = LiveView(terminal)
-        view.show([glance(device, 0.0)])
+        view.show([look(device, 0.0)])
         terminal.write('brightn')
-        device.heat_to(50.0, 0.0)
-        view.show([glance(device, 0.0)])
+        device.device.lamp.heat_to(50.0, 0.0)
+        view.show([look(device, 0.0)])
         terminal.write('ess')
         line, prompt = terminal.screen()
         assert '50.0 degC' in line
@@ -147,7 +158,7 @@ class TestLiveView:
     def test_an_answer_stands_under_what_it_answers_and_the_lights_under_that(
             self, device, terminal):
         view = LiveView(terminal)
-        view.show([glance(device, 0.0)])
+        view.show([look(device, 0.0)])
         terminal.write('faults\r\n')
         view.say('1/243: no fault', typed='faults')
         typed, answer, line, prompt = terminal.screen()
@@ -156,7 +167,7 @@ class TestLiveView:
 
     def test_an_event_leaves_no_old_lines_behind(self, device, terminal):
         view = LiveView(terminal)
-        view.show([glance(device, 0.0)])
+        view.show([look(device, 0.0)])
         view.say('link open: somewhere')
         event, line, _ = terminal.screen()
         assert event == 'link open: somewhere'
@@ -164,20 +175,20 @@ class TestLiveView:
 
     def test_nothing_is_written_where_nothing_has_changed(self, device, terminal):
         view = LiveView(terminal)
-        view.show([glance(device, 0.0)])
+        view.show([look(device, 0.0)])
         before = terminal.getvalue()
-        view.show([glance(device, 0.0)])
+        view.show([look(device, 0.0)])
         assert terminal.getvalue() == before
 
     def test_more_lights_than_lines_are_counted(self, terminal):
-        lights = [Device(DeviceProperties(source=Address(1, n)), 0.0) for n in range(1, 21)]
-        LiveView(terminal).show([glance(one, 0.0) for one in lights])
+        lights = [simulated(address=Address(1, n)) for n in range(1, 21)]
+        LiveView(terminal).show([look(one, 0.0) for one in lights])
         screen = terminal.screen()
         assert len(screen) == 7
         assert screen[5] == '... and 15 lights more'
 
     def test_lines_are_no_longer_than_the_terminal_is_wide(self, device, terminal):
-        device.behave(with_fault(with_fault(device.behaviour, 'cold-throttling'),
+        device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'cold-throttling'),
                                  'no-terminator'), 0.0)
-        LiveView(terminal).show([glance(device, 0.0)])
+        LiveView(terminal).show([look(device, 0.0)])
         assert max(map(len, terminal.screen())) == 79

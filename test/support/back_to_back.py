@@ -20,12 +20,12 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.events import AnyLightEvent, LightFound
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
 from illuminator_ros.mavlink.messages import (
@@ -38,12 +38,13 @@ from illuminator_ros.mavlink.messages import (
     LAYOUTS,
     MavCmd,
 )
+from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
 from support.records import Answer, Recorder
 
 BRIDGE = Address(1, 194)
-ONE_LIGHT = (DeviceProperties(),)
+ONE_LIGHT = (IlluminatorProperties(),)
 # s on the clock of a pair at its beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
 # Turns at one moment: more of them mean that a link's thread would spin.
@@ -95,7 +96,7 @@ class Pair:
     """
 
     def __init__(
-        self, lights: Sequence[DeviceProperties] | Endpoint = ONE_LIGHT, *,
+        self, lights: Sequence[IlluminatorProperties] | Endpoint = ONE_LIGHT, *,
         settings: Settings | None = None, there: Faults | None = None,
         back: Faults | None = None, seed: int | str = 0, uptime: float = 100.0,
         command_timeout: float = 0.5, command_retries: int = 3,
@@ -109,7 +110,7 @@ class Pair:
             command_retries=command_retries)
         self.controller.events.subscribe(self._take)
         self.other = (lights if isinstance(lights, Endpoint)
-                      else Devices(list(lights), START - uptime))
+                      else simulated_lights(list(lights), START - uptime))
         there = there or Faults()
         self.near = _End(self.controller, FaultyWire(there, f'{seed} there'))
         self.far = _End(self.other, FaultyWire(back or there, f'{seed} back'))
@@ -136,10 +137,15 @@ class Pair:
         return self.recorders[self.light.address]
 
     @property
-    def device(self) -> Device:
+    def device(self) -> SimulatedComponent[SimulatedIlluminator]:
         """Return the first simulated light."""
-        assert isinstance(self.other, Devices)
-        return self.other.devices[0]
+        assert isinstance(self.other, SimulatedComponents)
+        return self.other.components[0]
+
+    @property
+    def lamp(self) -> SimulatedLamp:
+        """Return the state of the first simulated light."""
+        return self.device.device.lamp
 
     # Time
 

@@ -17,14 +17,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from illuminator_ros.illuminator.checks.bench import Bench
 from illuminator_ros.illuminator.checks.requirement import Verdict
 from illuminator_ros.illuminator.checks.suite import Suite
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.devices import Devices
-from illuminator_ros.illuminator.faults import with_fault
-from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated import simulated_lights
+from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd, STATUS_ID
 from support.virtual_link import START, VirtualLink
 
 TESTER = Address(255, 190)
@@ -35,22 +37,38 @@ UPTIME = 100.0
 class Run:
     """A suite, a light, and the line between them."""
 
-    def __init__(self, *lights: DeviceProperties, faults: tuple[str, ...] = (), **options):
+    def __init__(self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (), **options):
         only = options.pop('only', ())
-        first, *others = lights or [DeviceProperties()]
+        first, *others = lights or [IlluminatorProperties()]
         for fault in faults:
-            first = replace(first, behaviour=with_fault(first.behaviour, fault))
-        self.lights = Devices([first, *others], START - UPTIME)
-        self.light = self.lights.devices[0]
+            first = replace(first, behaviour=FAULTS.add(first.behaviour, fault))
+        self.lights = simulated_lights([first, *others], START - UPTIME)
+        self.light = self.lights.components[0]
         self.bench = Bench(TESTER, checksum_errors=lambda: (
             self.link.decoders[0].counters.crc_errors), **options)
         self.suite = Suite(self.bench, only=only)
         self.link = VirtualLink(self.bench, self.lights)
 
+    @property
+    def lamp(self) -> SimulatedLamp:
+        """Return the state of the light."""
+        return self.light.device.lamp
+
+    def press(self, **changes: Any) -> None:
+        """Switch or configure the light by hand."""
+        now = self.link.now
+        self.light.apply(self.light.device.press(now, **changes), now)
+
+    def set_interval(self, seconds: float) -> None:
+        """Set the interval of the light's status, as another sender; -1 stops the stream."""
+        self.light.receive(Address(255, 1), CommandLong(
+            *self.light.address, MavCmd.SET_MESSAGE_INTERVAL, 0, STATUS_ID,
+            seconds if seconds < 0 else 1e6 * seconds, 0, 0, 0, 0, 0), self.link.now)
+
     def fault(self, *names: str) -> None:
         """Switch faults on."""
         for name in names:
-            self.light.behave(with_fault(self.light.behaviour, name), self.link.now)
+            self.light.behave(FAULTS.add(self.light.behaviour, name), self.link.now)
 
     def finish(self) -> Run:
         """Let the suite run to its end."""

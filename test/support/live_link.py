@@ -22,11 +22,11 @@ import threading
 import time
 from typing import Any
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.events import AnyLightEvent, LightConnected, LightLost
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.illuminator.simulated import simulated_lights
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent
@@ -132,7 +132,7 @@ class Lights(LiveLink):
     """A simulated light on a link, which has just been switched on."""
 
     def __init__(self, url: str, *, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__(url, Devices([DeviceProperties()], clock()), clock=clock)
+        super().__init__(url, simulated_lights([IlluminatorProperties()], clock()), clock=clock)
 
 
 class Bridge(LiveLink):

@@ -24,8 +24,8 @@ from pathlib import Path
 import select
 import threading
 
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.devices import Devices
+from illuminator_ros.illuminator.simulated import simulated_lights
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import decode_payload, HANDLED
 from support.frames import frame_of
@@ -88,7 +88,7 @@ class _Light:
     def __init__(self, line: int, clock: Callable[[], float]) -> None:
         self._line = line
         self._clock = clock
-        self._endpoint = Devices([DeviceProperties()], clock())
+        self._endpoint = simulated_lights([IlluminatorProperties()], clock())
         self._decoder = Decoder()
         self._stopping, self._stop = os.pipe()
         self._thread = threading.Thread(target=self._run)

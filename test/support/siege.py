@@ -22,12 +22,11 @@ import random
 from typing import Any
 
 from illuminator_ros.illuminator.client import MAX_LIGHTS
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.device_properties import DeviceProperties
-from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.operation import Done, Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
+from illuminator_ros.illuminator.simulated import describe, simulated_lights
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
@@ -35,6 +34,7 @@ from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+from illuminator_ros.payload.simulated import SimulatedComponent
 from support.attacker import Attacker
 from support.client import Client
 from support.party import KEY, Party
@@ -134,7 +134,8 @@ class BridgeSiege(Siege):
         return controller
 
     def get_ready(self) -> None:
-        self._light = Device(DeviceProperties(source=GENUINE), self.link.now)
+        self._light = SimulatedComponent(
+            describe(IlluminatorProperties(address=GENUINE)), self.link.now)
         self._party = Party(GENUINE, self.mode)
         self._genuine(3.0)
         self._check_command()
@@ -221,15 +222,16 @@ class BridgeSiege(Siege):
             self.link.ask(ask)
             self._genuine(2.0)
             assert [result.success for result in results] == [True, True], results
-            assert (self._light.enabled, self._light.configuration.brightness) == (
-                on, brightness)
+            lamp = self._light.device.lamp
+            assert (lamp.enabled, lamp.configuration.brightness) == (on, brightness)
 
 
 class LightSiege(Siege):
     """Simulated lights, with a genuine drone that they are to obey all the time."""
 
     def make_endpoint(self) -> Any:
-        return Devices([DeviceProperties(source=Address(1, 243 + i)) for i in range(3)], 1000.0)
+        return simulated_lights(
+            [IlluminatorProperties(address=Address(1, 243 + i)) for i in range(3)], 1000.0)
 
     def get_ready(self) -> None:
         self._party = Party(BRIDGE, self.mode)
@@ -251,10 +253,9 @@ class LightSiege(Siege):
 
     def check_bounds(self) -> None:
         super().check_bounds()
-        device: Device = self.link.endpoint.devices[0]
-        for device in self.link.endpoint.devices:
-            assert math.isfinite(device.thermal.temperature)
-            configuration = device.configuration
+        for light in self.link.endpoint.components:
+            assert math.isfinite(light.device.lamp.thermal.temperature)
+            configuration = light.device.lamp.configuration
             assert 0 <= configuration.brightness <= 100, configuration
             assert 0 <= configuration.strobe_period <= 10, configuration
             assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
@@ -266,7 +267,7 @@ class LightSiege(Siege):
             self._acks.clear()
             self._command(405, on)
             assert [ack.result for ack in self._acks] == [MavResult.ACCEPTED]
-            assert self.link.endpoint.devices[0].enabled is bool(on)
+            assert self.link.endpoint.components[0].device.lamp.enabled is bool(on)
 
 
 def _longest(queues: Iterable[Any]) -> int:

@@ -21,10 +21,9 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
-from illuminator_ros.illuminator.device import Device
-from illuminator_ros.illuminator.devices import Devices
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.model import Mode
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -34,6 +33,7 @@ from illuminator_ros.mavlink.messages import (
     MavCmd,
     MavResult,
 )
+from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.back_to_back import Pair, START
 from support.records import Answer
 
@@ -61,15 +61,15 @@ class State:
 class Witness:
     """Keeps the states that one simulated light has been in."""
 
-    def __init__(self, device: Device, now: float) -> None:
-        self.device = device
-        self._receive = device.receive
-        device.receive = self._watched  # type: ignore[method-assign]
+    def __init__(self, light: SimulatedComponent[SimulatedIlluminator], now: float) -> None:
+        self.lamp = light.device.lamp
+        self._receive = light.receive
+        light.receive = self._watched  # type: ignore[method-assign]
         self._states = [State(now, now, self._fields())]
 
     def _fields(self) -> Fields:
-        configuration = self.device.configuration
-        return {'enabled': self.device.enabled, 'mode': configuration.mode,
+        configuration = self.lamp.configuration
+        return {'enabled': self.lamp.enabled, 'mode': configuration.mode,
                 'brightness': configuration.brightness,
                 'strobe_period': configuration.strobe_period,
                 'strobe_duty_cycle': configuration.strobe_duty_cycle}
@@ -110,10 +110,10 @@ class Judge:
     """Compares answers with what went over the line and what the lights did."""
 
     def __init__(self, pair: Pair) -> None:
-        assert isinstance(pair.other, Devices)
+        assert isinstance(pair.other, SimulatedComponents)
         self._pair = pair
-        self._witnesses = {device.source: Witness(device, pair.now)
-                           for device in pair.other.devices}
+        self._witnesses = {light.address: Witness(light, pair.now)
+                           for light in pair.other.components}
 
     def judge(self, request: Request) -> tuple[str, str]:
         """Return how a request has ended, and what is not true in that, '' if all is."""
@@ -189,7 +189,7 @@ class Judge:
         if not acks:
             return 'not accepted'
         sent_at, newest = self._tries(request)[0][0], 0
-        boot = START - self._witnesses[request.light.address].device.uptime_ms(START) / 1000
+        boot = START - self._witnesses[request.light.address].lamp.uptime_ms(START) / 1000
         for at, status in self._received(request, IlluminatorStatus, 0.0):
             if status.uptime_ms >= newest:
                 newest = status.uptime_ms

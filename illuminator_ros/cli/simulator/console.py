@@ -12,29 +12,32 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What can be done to simulated lights while they run. No I/O; time is passed in."""
+"""The console of the simulator: commands to simulated lights while they run. No I/O."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from .view import glance
-from ...illuminator.device import Device
-from ...illuminator.faults import as_typed, FaultError, FAULTS, with_fault, without_fault
-from ...illuminator.faults import describe as describe_faults
+from .view import look
+from ...illuminator.faults import FAULTS
 from ...illuminator.model import InvalidValue
+from ...illuminator.simulated import SimulatedIlluminator
+from ...payload.faults import FaultError
+from ...payload.simulated import SimulatedComponent
+
+Light = SimulatedComponent[SimulatedIlluminator]
 
 
 class _Wrong(ValueError):
-    """A line that means nothing; the message says why."""
+    """A line that cannot be executed; the message says why."""
 
 
 @dataclass(frozen=True)
 class _Command:
     usage: str
     help: str  # noqa: A003
-    do: Callable[[Device, list[str], float], str]
+    do: Callable[[Light, list[str], float], str]
     counts: tuple[int, ...]
 
 
@@ -45,76 +48,79 @@ def _number(text: str) -> float:
         raise _Wrong(f'{text!r} is not a number') from None
 
 
-def _fault(device: Device, words: list[str], now: float) -> str:
-    # A restart is an event: once, unless it is told how often.
+def _fault(light: Light, words: list[str], now: float) -> str:
+    # Without an interval, a restart is an event.
     if words == ['reboot']:
-        device.restart(now)
+        light.restart(now)
     else:
-        device.behave(with_fault(device.behaviour, words[0]), now)
+        light.behave(FAULTS.add(light.behaviour, words[0]), now)
     return ''
 
 
-def _clear(device: Device, words: list[str], now: float) -> str:
-    normal = device.properties.normal
-    behaviour = without_fault(device.behaviour, normal, words[0]) if words else normal
-    device.behave(behaviour, now)
+def _clear(light: Light, words: list[str], now: float) -> str:
+    normal = light.device.normal
+    behaviour = FAULTS.remove(light.behaviour, normal, words[0]) if words else normal
+    light.behave(behaviour, now)
     return ''
 
 
-def _reboot(device: Device, words: list[str], now: float) -> str:
-    device.restart(now)
+def _reboot(light: Light, words: list[str], now: float) -> str:
+    light.restart(now)
     return ''
 
 
-def _ambient(device: Device, words: list[str], now: float) -> str:
-    value = _number(words[0])
+def _celsius(text: str) -> float:
+    value = _number(text)
     if not -273.15 <= value <= 1000:
-        raise _Wrong(f'{words[0]} degC is not possible')
-    device.thermal.ambient = value
+        raise _Wrong(f'{text} degC is not possible')
+    return value
+
+
+def _ambient(light: Light, words: list[str], now: float) -> str:
+    light.device.lamp.set_ambient(_celsius(words[0]), now)
     return ''
 
 
-def _temperature(device: Device, words: list[str], now: float) -> str:
-    value = _number(words[0])
-    if not -273.15 <= value <= 1000:
-        raise _Wrong(f'{words[0]} degC is not possible')
-    device.heat_to(value, now)
+def _temperature(light: Light, words: list[str], now: float) -> str:
+    light.device.lamp.heat_to(_celsius(words[0]), now)
     return ''
 
 
-def _on(device: Device, words: list[str], now: float) -> str:
-    device.press(now, enabled=True)
+def _on(light: Light, words: list[str], now: float) -> str:
+    light.apply(light.device.press(now, enabled=True), now)
     return ''
 
 
-def _off(device: Device, words: list[str], now: float) -> str:
-    device.press(now, enabled=False)
+def _off(light: Light, words: list[str], now: float) -> str:
+    light.apply(light.device.press(now, enabled=False), now)
     return ''
 
 
-def _brightness(device: Device, words: list[str], now: float) -> str:
-    device.press(now, brightness=_number(words[0]))
+def _brightness(light: Light, words: list[str], now: float) -> str:
+    light.apply(light.device.press(now, brightness=_number(words[0])), now)
     return ''
 
 
-def _mode(device: Device, words: list[str], now: float) -> str:
-    device.press(now, mode=words[0])
+def _mode(light: Light, words: list[str], now: float) -> str:
+    light.apply(light.device.press(now, mode=words[0]), now)
     return ''
 
 
-def _strobe(device: Device, words: list[str], now: float) -> str:
-    duty = _number(words[1]) if len(words) > 1 else device.configuration.strobe_duty_cycle
-    device.press(now, strobe_period=_number(words[0]), strobe_duty_cycle=duty)
+def _strobe(light: Light, words: list[str], now: float) -> str:
+    duty = (_number(words[1]) if len(words) > 1
+            else light.device.lamp.configuration.strobe_duty_cycle)
+    light.apply(light.device.press(
+        now, strobe_period=_number(words[0]), strobe_duty_cycle=duty), now)
     return ''
 
 
-def _status(device: Device, words: list[str], now: float) -> str:
-    return str(glance(device, now))
+def _status(light: Light, words: list[str], now: float) -> str:
+    return str(look(light, now))
 
 
-def _faults(device: Device, words: list[str], now: float) -> str:
-    texts = as_typed(device.behaviour, device.properties.normal)
-    return f'{device.source}: {", ".join(texts) or "no fault"}'
+def _faults(light: Light, words: list[str], now: float) -> str:
+    texts = FAULTS.as_typed(light.behaviour, light.device.normal)
+    return f'{light.address}: {", ".join(texts) or "no fault"}'
 
 
 COMMANDS = {
@@ -142,7 +148,7 @@ def describe_commands() -> str:
     return '\n'.join(f'  {usage:20} {text}' for usage, text in [*rows, *OTHERS.items()])
 
 
-def execute(line: str, devices: Sequence[Device], now: float) -> str:
+def execute(line: str, lights: Sequence[Light], now: float) -> str:
     """
     Do what a line says, and return the answer.
 
@@ -151,14 +157,14 @@ def execute(line: str, devices: Sequence[Device], now: float) -> str:
     words = line.split()
     if not words:
         return ''
-    selected = [one for one in devices if words[0] in (str(one.source), one.properties.name)]
+    selected = [one for one in lights if words[0] in (str(one.address), one.name)]
     if words[0] in ('all', '*') or (selected and words[0] not in COMMANDS):
         words = words[1:] or ['status']
     else:
         selected = []
     name, *rest = words
     if name == 'help':
-        return f'{describe_commands()}\nfaults:\n{describe_faults()}'
+        return f'{describe_commands()}\nfaults:\n{FAULTS.describe()}'
     # The option's way to name a light, which has a place of its own here.
     light, colon, fault = words[-1].rpartition(':')
     if colon and words[:-1] in ([], ['fault'], ['--fault']):
@@ -172,7 +178,7 @@ def execute(line: str, devices: Sequence[Device], now: float) -> str:
     if len(rest) not in command.counts:
         return f'usage: {command.usage}'
     try:
-        answers = [command.do(device, rest, now) for device in selected or devices]
+        answers = [command.do(one, rest, now) for one in selected or lights]
     except (_Wrong, FaultError, InvalidValue) as error:
         return str(error)
     return '\n'.join(filter(None, answers)) or 'done'

@@ -24,7 +24,7 @@ from typing import Any
 
 from .settings import merged, profile_of, properties, read, SettingError, SETTINGS
 from ..options import address
-from ...illuminator.device_properties import DeviceProperties
+from ...illuminator.simulated_properties import IlluminatorProperties
 from ...mavlink.messages import Address
 
 MAX_LIGHTS = 200
@@ -34,7 +34,7 @@ LIGHT_KEYS = ('id', 'name')
 
 
 @dataclass
-class Scene:
+class Scenario:
     """
     What a file asks for.
 
@@ -47,7 +47,7 @@ class Scene:
     lights: list[tuple[Address, str, dict[str, Any]]] = field(default_factory=list)
 
 
-def load(path: str) -> Scene:
+def load(path: str) -> Scenario:
     """
     Read a YAML file.
 
@@ -65,17 +65,17 @@ def load(path: str) -> Scene:
         raise SettingError(f'{path}: {error.strerror}') from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise SettingError(f'{path}: no YAML: {" ".join(str(error).split())}') from error
-    return scene(content, path)
+    return scenario(content, path)
 
 
-def scene(content: Any, path: str) -> Scene:
+def scenario(content: Any, path: str) -> Scenario:
     """Return what the content of a file asks for."""
     if not isinstance(content, Mapping):
         raise SettingError(f'{path}: it has no keys such as lights')
     listed = content.get('lights') or []
     if not isinstance(listed, list) or not all(isinstance(one, Mapping) for one in listed):
         raise SettingError(f'{path}: lights is no list of lights')
-    result = Scene(str(content.get('url') or ''), _settings(content, FILE_KEYS, path))
+    result = Scenario(str(content.get('url') or ''), _settings(content, FILE_KEYS, path))
     for number, one in enumerate(listed, 1):
         place = f'{path}: light {number}'
         try:
@@ -114,7 +114,7 @@ def _named(text: str) -> tuple[Address, str]:
         raise SettingError(f'--light {text}: {error}') from error
 
 
-def lights(options: argparse.Namespace, file: Scene) -> list[DeviceProperties]:
+def lights(options: argparse.Namespace, file: Scenario) -> list[IlluminatorProperties]:
     """
     Return the lights that command line and file describe.
 
@@ -144,8 +144,8 @@ def _counted(
     options: argparse.Namespace, settings: Mapping[str, Any],
 ) -> list[tuple[Address, str, dict[str, Any]]]:
     profile = profile_of(settings)
-    system = options.system_id or profile.source.system
-    first = profile.source.component if options.component_id is None else options.component_id
+    system = options.system_id or profile.address.system
+    first = profile.address.component if options.component_id is None else options.component_id
     count = options.count or 1
     last = first + count - 1
     if last > 255:

@@ -22,8 +22,8 @@ from .console import describe_commands
 from .settings import read, SettingError, SETTINGS, THERMAL
 from ..options import add_signing, integer, Parser
 from ... import __version__
-from ...illuminator.behaviour import PROFILES
-from ...illuminator.faults import describe
+from ...illuminator.faults import FAULTS
+from ...illuminator.simulated_properties import PROFILES
 
 DEFAULT_URL = 'udpout://127.0.0.1:14590'
 
@@ -47,7 +47,7 @@ thermal, with defaults (degC, K and s; throttle_to is a share of the brightness)
   {thermal}
 
 faults, for --fault, the file and the console; several are separated by commas:
-{describe()}
+{FAULTS.describe()}
 
 console: lines on standard input, for all lights or, behind its id or name, for one
 {describe_commands()}

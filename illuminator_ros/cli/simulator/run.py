@@ -25,14 +25,14 @@ import sys
 import threading
 
 from .console import execute
-from .lights import lights, load, Scene
+from .lights import lights, load, Scenario
 from .options import DEFAULT_URL, parser
 from .settings import SettingError
-from .view import Glance, glance, LiveView, PlainView
+from .view import LiveView, Look, look, PlainView
 from ..options import signing
 from ..termination import Termination
-from ...illuminator.device_properties import DeviceProperties
-from ...illuminator.devices import Devices
+from ...illuminator.simulated import simulated_lights
+from ...illuminator.simulated_properties import IlluminatorProperties
 from ...mavlink.link import Link
 from ...mavlink.link_state import LinkEvent
 from ...mavlink.signing_files import KeyFileError
@@ -47,23 +47,23 @@ class _Simulation:
 
     def __init__(
         self, options: argparse.Namespace, url: Url, label: str,
-        described: list[DeviceProperties],
+        described: list[IlluminatorProperties],
     ) -> None:
-        signs, store = signing(options, f'simulator {described[0].source}')
+        signs, store = signing(options, f'simulator {described[0].address}')
         # What is to be written, with the line that it answers; None ends it all.
         self._texts: queue.SimpleQueue[tuple[str, str | None] | None] = queue.SimpleQueue()
-        self._glances: list[Glance] = []
+        self._looks: list[Look] = []
         live = sys.stdout is not None and sys.stdout.isatty() and not options.plain
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
-        self._endpoint = Devices(described, 0.0)
+        self._endpoint = simulated_lights(described, 0.0)
         self._link = Link(url, self._endpoint, label=label, on_event=self._note,
                           signing=signs, store=store)
-        for device in self._endpoint.devices:
-            device.power_on(self._link.clock())
+        for component in self._endpoint.components:
+            component.power_on(self._link.clock())
 
     def run(self, termination: Termination) -> None:
         """Run until a signal or ``quit``."""
-        names = [str(device.source) for device in self._endpoint.devices]
+        names = [str(component.address) for component in self._endpoint.components]
         self._view.say(f'{len(names)} light{"s"[:len(names) > 1]}: ' + ', '.join(names[:8])
                        + (' ...' if len(names) > 8 else ''))
         termination.calls(self._end)
@@ -81,14 +81,14 @@ class _Simulation:
                 if text is None:
                     break
                 self._view.say(text[0], typed=text[1])
-            self._view.show(self._glances)
+            self._view.show(self._looks)
         self._link.stop()
 
     def _end(self) -> None:
         self._texts.put(None)
 
     def _look(self, now: float) -> None:
-        self._glances = [glance(device, now) for device in self._endpoint.devices]
+        self._looks = [look(component, now) for component in self._endpoint.components]
 
     def _listen(self) -> None:
         """Do what is typed; without anybody to type there is nothing to do."""
@@ -108,7 +108,7 @@ class _Simulation:
         if line.strip() == 'quit':
             self._end()
         else:
-            self._texts.put((execute(line, self._endpoint.devices, now), line))
+            self._texts.put((execute(line, self._endpoint.components, now), line))
 
     def _note(self, event: LinkEvent) -> None:
         self._texts.put((str(event), None))
@@ -123,7 +123,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
     options = parser().parse_args(args)
     logging.basicConfig(format='%(message)s')
     try:
-        file = load(options.file) if options.file else Scene()
+        file = load(options.file) if options.file else Scenario()
         label = options.url or file.url or DEFAULT_URL
         simulation = _Simulation(options, parse_url(label), label, lights(options, file))
     except (UrlError, SettingError, KeyFileError, ValueError) as error:

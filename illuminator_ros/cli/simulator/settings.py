@@ -28,13 +28,19 @@ from typing import Any
 
 from ..options import integer, number
 from ... import __version__
-from ...illuminator.behaviour import Behaviour, Extension, Profile, PROFILES
-from ...illuminator.device_properties import DeviceProperties
-from ...illuminator.faults import FaultError, with_fault
+from ...illuminator.faults import FAULTS
 from ...illuminator.identity import Identity
 from ...illuminator.model import InvalidValue, Limits, Mode, MODES
+from ...illuminator.simulated_properties import (
+    Extension,
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+    Profile,
+    PROFILES,
+)
 from ...illuminator.thermal import ThermalProperties
 from ...mavlink.messages import Address
+from ...payload.faults import FaultError
 
 THERMAL = {field.name: field.default for field in fields(ThermalProperties)}
 
@@ -86,7 +92,7 @@ def _thermal(text: str) -> dict[str, float]:
 def _faults(text: str) -> tuple[str, ...]:
     names = tuple(part.strip() for part in text.split(',') if part.strip())
     for name in names:
-        with_fault(Behaviour(), name)
+        FAULTS.add(IlluminatorBehaviour(), name)
     return names
 
 
@@ -183,8 +189,8 @@ def profile_of(settings: Mapping[str, Any]) -> Profile:
 
 
 def properties(
-    settings: Mapping[str, Any], source: Address, *, name: str = '', several: bool = False,
-) -> DeviceProperties:
+    settings: Mapping[str, Any], address: Address, *, name: str = '', several: bool = False,
+) -> IlluminatorProperties:
     """
     Return the light that settings describe.
 
@@ -204,16 +210,16 @@ def properties(
             **({'ambient': settings['ambient']} if 'ambient' in settings else {}),
             **settings.get('thermal', {})})
     except ValueError as error:
-        raise SettingError(f'light {source}: {error}') from error
-    return DeviceProperties(
-        source=source, name=name, identity=_identity(settings, profile, source, several),
+        raise SettingError(f'light {address}: {error}') from error
+    return IlluminatorProperties(
+        address=address, name=name, identity=_identity(settings, profile, address, several),
         limits=limits, modes=modes, mode_bitmask=settings.get('mode_bitmask', bitmask),
         status_interval=settings.get('status_interval', 1.0), thermal=thermal,
         time_scale=settings.get('time_scale', 1.0), behaviour=_behaviour(settings, profile),
         normal=_normal(settings, profile), seed=settings.get('seed', 0))
 
 
-def _normal(settings: Mapping[str, Any], profile: Profile) -> Behaviour:
+def _normal(settings: Mapping[str, Any], profile: Profile) -> IlluminatorBehaviour:
     behaviour = profile.behaviour
     given = {name: settings[name] for name in Extension._fields if name in settings}
     if given:
@@ -222,22 +228,22 @@ def _normal(settings: Mapping[str, Any], profile: Profile) -> Behaviour:
     return behaviour
 
 
-def _behaviour(settings: Mapping[str, Any], profile: Profile) -> Behaviour:
+def _behaviour(settings: Mapping[str, Any], profile: Profile) -> IlluminatorBehaviour:
     behaviour = _normal(settings, profile)
     for fault in settings.get('fault', ()):
-        behaviour = with_fault(behaviour, fault)
+        behaviour = FAULTS.add(behaviour, fault)
     return behaviour
 
 
 def _identity(
-    settings: Mapping[str, Any], profile: Profile, source: Address, several: bool,
+    settings: Mapping[str, Any], profile: Profile, address: Address, several: bool,
 ) -> Identity:
     usual = profile.identity or Identity(
         'illuminator_ros', 'simulator', __version__, '1.0.0',
-        f'SIM-{source.system}-{source.component}')
+        f'SIM-{address.system}-{address.component}')
     serial = settings.get('serial_number', usual.serial_number)
     if several and 'serial_number' in settings:
-        serial += f'-{source.component}'
+        serial += f'-{address.component}'
     return Identity(
         settings.get('vendor', usual.vendor), settings.get('model', usual.model),
         settings.get('software_version', usual.software_version),

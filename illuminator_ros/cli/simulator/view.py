@@ -20,63 +20,39 @@ from collections.abc import Sequence
 import contextlib
 from dataclasses import dataclass
 import shutil
-from typing import TextIO
+from typing import Any, TextIO
 
-from ...illuminator.device import Device
-from ...illuminator.error_flags import flag_names
-from ...illuminator.faults import active
-from ...illuminator.model import Mode
+from ...payload.simulated import SimulatedComponent, Snapshot
 
-# K by which the temperature has to change to be worth a plain line.
-TEMPERATURE_STEP = 5.0
 # Lines of a terminal that are left for the console.
 SPARE_LINES = 4
 
 
 @dataclass(frozen=True)
-class Glance:
-    """What a light does at a moment, as text for people."""
+class Look:
+    """The state of a simulated component at a moment, for people."""
 
     name: str
-    on: bool
-    brightness: str
-    strobe: str
-    mode: str
-    temperature: float
-    flags: str
+    snapshot: Snapshot
     faults: str
 
     def __str__(self) -> str:
         """Return the line."""
-        parts = [f'{self.name:12}', 'ON ' if self.on else 'off', f'{self.brightness:>5} %',
-                 f'{self.strobe:18}', f'{self.temperature:6.1f} degC']
-        parts += filter(None, (self.mode, self.flags, self.faults))
-        return '  '.join(parts)
+        return '  '.join(filter(None, (f'{self.name:12}', self.snapshot.text, self.faults)))
 
-    def differs(self, other: Glance | None) -> bool:
-        """Return whether it is worth a line after another one."""
-        if other is None:
-            return True
-        return (abs(self.temperature - other.temperature) >= TEMPERATURE_STEP
-                or _steady(self) != _steady(other))
+    def differs(self, other: Look | None) -> bool:
+        """Return whether it deserves a line after another one."""
+        return other is None or (
+            (self.snapshot.state, self.faults) != (other.snapshot.state, other.faults)
+            or abs(self.snapshot.drift - other.snapshot.drift) >= 1)
 
 
-def _steady(one: Glance) -> tuple[object, ...]:
-    return one.on, one.brightness, one.strobe, one.mode, one.flags, one.faults
-
-
-def glance(device: Device, now: float) -> Glance:
-    """Return what a light does now, whatever it says of itself."""
-    status = device.status(now)
-    period, duty = status.strobe_period, status.strobe_duty_cycle
-    faults = active(device.behaviour, device.properties.normal)
-    name = ' '.join(filter(None, (str(device.source), device.properties.name)))
-    mode = Mode(status.mode)
-    return Glance(
-        name, device.enabled, f'{status.brightness:.3g}',
-        f'strobe {period:g} s, {duty:g} %' if period else 'no strobe',
-        '' if mode is Mode.INTERNAL_CONTROL else mode.label, device.thermal.temperature,
-        ', '.join(flag_names(status.error_status)), f'[{", ".join(faults)}]' if faults else '')
+def look(component: SimulatedComponent[Any], now: float) -> Look:
+    """Return the actual state of a component, whatever it reports."""
+    device = component.device
+    faults = device.faults.active(device.behaviour, device.normal)
+    return Look(' '.join(filter(None, (str(component.address), component.name))),
+                device.snapshot(now), f'[{", ".join(faults)}]' if faults else '')
 
 
 class PlainView:
@@ -84,11 +60,11 @@ class PlainView:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._shown: dict[str, Glance] = {}
+        self._shown: dict[str, Look] = {}
 
-    def show(self, glances: Sequence[Glance]) -> None:
+    def show(self, looks: Sequence[Look]) -> None:
         """Take what the lights do now."""
-        for one in glances:
+        for one in looks:
             if one.differs(self._shown.get(one.name)):
                 self._shown[one.name] = one
                 self.say(str(one))
@@ -115,13 +91,13 @@ class LiveView:
         self._lines: list[str] = []
         self._height = 0
 
-    def show(self, glances: Sequence[Glance]) -> None:
+    def show(self, looks: Sequence[Look]) -> None:
         """Take what the lights do now."""
         size = shutil.get_terminal_size()
         room = max(size.lines - SPARE_LINES, 1)
-        lines = [str(one) for one in glances[:room]]
-        if len(glances) > room:
-            lines[-1] = f'... and {len(glances) - room + 1} lights more'
+        lines = [str(one) for one in looks[:room]]
+        if len(looks) > room:
+            lines[-1] = f'... and {len(looks) - room + 1} lights more'
         lines = [line[:size.columns - 1] for line in lines]
         if len(lines) != self._height:
             self._lines = lines

@@ -1,0 +1,156 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The properties of a simulated light, and the profiles: kinds of lights seen in the field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from .identity import Identity
+from .model import Limits, Mode
+from .thermal import ThermalProperties
+from ..mavlink.messages import (
+    Address,
+    MAV_AUTOPILOT_ARDUPILOTMEGA,
+    MAV_COMP_ID_AUTOPILOT1,
+    MAV_COMP_ID_ILLUMINATOR,
+    MAV_STATE_UNINIT,
+    MavType,
+)
+from ..payload.faults import Behaviour
+
+
+class Extension(NamedTuple):
+    """The three fields that follow the common 35 bytes in a vendor's ILLUMINATOR_STATUS."""
+
+    zoom_level: int = 0
+    color_mode: int = 0
+    gimbal_device_id: int = 0
+
+
+@dataclass(frozen=True)
+class IlluminatorBehaviour(Behaviour):
+    """
+    How a simulated light behaves; the defaults follow the protocol.
+
+    :param has_clock: whether uptime_ms and time_boot_ms run; else they are 0.
+    :param measures: whether it has a temperature and strobe limits to report; else they are 0,
+        and it does not strobe.
+    :param extension: makes the status one of 38 bytes.
+    :param identifies: whether it sends COMPONENT_INFORMATION_BASIC.
+    :param terminates: whether a string that is too long ends with a NUL.
+    :param padding: fills its strings to the last byte, '' for nothing.
+    :param brightness_is_switch: whether a brightness above 0 is on, and 0 is off.
+    :param accepts_nan: whether range checks are comparisons that NaN passes.
+    :param accepts_out_of_range: whether values out of range are accepted and applied.
+    :param toggles: whether ON switches it off if it is on.
+    :param false_flags: ILLUMINATOR_ERROR_FLAGS that are set without a reason.
+    :param inverted_flags: whether THERMAL_THROTTLING is set while the light is cold.
+    :param thermistor_failed: whether its temperature sensor is broken.
+    """
+
+    heartbeat_type: int = MavType.ILLUMINATOR
+    has_clock: bool = True
+    measures: bool = True
+    extension: Extension | None = None
+    identifies: bool = True
+    terminates: bool = True
+    padding: str = ''
+    brightness_is_switch: bool = False
+    accepts_nan: bool = False
+    accepts_out_of_range: bool = False
+    toggles: bool = False
+    false_flags: int = 0
+    inverted_flags: bool = False
+    thermistor_failed: bool = False
+
+
+@dataclass(frozen=True)
+class IlluminatorProperties:
+    """
+    The properties of a simulated light.
+
+    :param name: its name for people.
+    :param mode_bitmask: as reported; by default the enum values of the supported modes, or-ed.
+    :param modes: the modes that it can be configured to.
+    :param status_interval: s between statuses by default; 0 sends none.
+    :param time_scale: factor by which it heats and cools faster than real time.
+    :param behaviour: how it behaves at first.
+    :param normal: how it behaves without faults.
+    :param seed: of its random numbers.
+    """
+
+    address: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
+    identity: Identity = field(default_factory=lambda: Identity(
+        'illuminator_ros', 'simulator', '1.0.0', '1.0.0', 'SIM-1-243'))
+    limits: Limits = Limits(0.05, 10.0)
+    mode_bitmask: int = Mode.INTERNAL_CONTROL | Mode.EXTERNAL_SYNC
+    status_interval: float = 1.0
+    thermal: ThermalProperties = ThermalProperties()
+    time_scale: float = 1.0
+    name: str = ''
+    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
+    behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
+    normal: IlluminatorBehaviour = IlluminatorBehaviour()
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Profile:
+    """
+    A light seen in the field.
+
+    :param shifted_bitmask: whether mode_bitmask has 1 << mode for a mode, else the mode itself.
+    """
+
+    description: str
+    address: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
+    behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
+    limits: Limits = Limits(0.05, 10.0)
+    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
+    shifted_bitmask: bool = False
+    identity: Identity | None = field(default=None)
+
+
+PROFILES = {
+    'default': Profile('follows the protocol in all that it does'),
+    # The emulator of the developer guide, as it is and not as it should be.
+    'reference': Profile(
+        'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
+        'status at 1 Hz or not at all',
+        Address(255, 0),
+        IlluminatorBehaviour(
+            heartbeat_state=MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
+            status_on_change=False, terminates=False, filters_target=False,
+            answers_command_int=False, acks_target=False, apply_after=0.005, accepts_nan=True),
+        limits=Limits(0.0, 10.0),
+        identity=Identity(
+            'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
+            'Illuminator Hardware Version', 'Illuminator Serial Number')),
+    'ardusub': Profile(
+        "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
+        'for what it does not measure, brightness 0 is off',
+        Address(1, MAV_COMP_ID_AUTOPILOT1),
+        IlluminatorBehaviour(
+            heartbeat_type=MavType.SUBMARINE, heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA,
+            measures=False, identifies=False, brightness_is_switch=True, status_on_change=False,
+            accepts_nan=True),
+        limits=Limits(0.0, 0.0), modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True),
+    'extended': Profile(
+        'a vendor extension: 38 bytes of status, with zoom_level, color_mode and '
+        'gimbal_device_id',
+        behaviour=IlluminatorBehaviour(extension=Extension(zoom_level=25, color_mode=1))),
+}

@@ -1,0 +1,289 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The faults of a simulated component, and the behaviour that each changes.
+
+Each payload has one table: its names are what ``--fault``, the YAML file and the console take,
+its descriptions are what ``--help`` and doc/simulator.md show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+import math
+from typing import Any, TypeVar
+
+from ..mavlink.messages import (
+    MAV_AUTOPILOT_INVALID,
+    MAV_STATE_ACTIVE,
+    MavResult,
+    MavType,
+)
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """
+    How a simulated component behaves; the defaults follow the protocol.
+
+    :param heartbeat_type: MAV_TYPE.
+    :param heartbeat_autopilot: MAV_AUTOPILOT.
+    :param heartbeat_state: MAV_STATE.
+    :param heartbeat_interval: s, 0 for no heartbeat.
+    :param fixed_rate: whether MAV_CMD_SET_MESSAGE_INTERVAL only starts and stops a stream.
+    :param endless_stream: whether a stream cannot be stopped.
+    :param resumes: whether a stream can be started again.
+    :param on_request: whether a streamed message can be requested.
+    :param status_on_change: whether each change is followed by the streamed messages.
+    :param filters_target: whether messages to other addresses are ignored.
+    :param answers_command_int: whether it answers COMMAND_INT.
+    :param answers_broadcast: whether it answers messages to all components.
+    :param acks_target: whether COMMAND_ACK has a target.
+    :param acks_wrong_target: whether the target of COMMAND_ACK is another component.
+    :param apply_after: s from the acknowledgement to the change.
+    :param applies_rejected: whether rejected commands are applied.
+    :param accepts_unknown: whether unknown commands, and requests for unknown messages, are
+        accepted.
+    :param ignores_changes: whether accepted changes are not applied.
+    :param silence: s for which it neither receives nor sends.
+    :param reboot_interval: s, 0 for never.
+    :param refuse: result of each change, None to consider it.
+    :param rejections: how many changes get MAV_RESULT_TEMPORARILY_REJECTED.
+    :param progress: s of MAV_RESULT_IN_PROGRESS before a change is applied.
+    :param slow: s from a command to its acknowledgement.
+    :param drop: share (0..1) of messages that are not sent.
+    :param duplicate: share (0..1) of messages that are sent twice.
+    :param delay: maximum delay of a message, s.
+    :param corrupt: share (0..1) of messages with a wrong checksum.
+    """
+
+    heartbeat_type: int = 0
+    heartbeat_autopilot: int = MAV_AUTOPILOT_INVALID
+    heartbeat_state: int = MAV_STATE_ACTIVE
+    heartbeat_interval: float = 1.0
+    fixed_rate: bool = False
+    endless_stream: bool = False
+    resumes: bool = True
+    on_request: bool = True
+    status_on_change: bool = True
+    filters_target: bool = True
+    answers_command_int: bool = True
+    answers_broadcast: bool = True
+    acks_target: bool = True
+    acks_wrong_target: bool = False
+    apply_after: float = 0.0
+    applies_rejected: bool = False
+    accepts_unknown: bool = False
+    ignores_changes: bool = False
+    silence: float = 0.0
+    reboot_interval: float = 0.0
+    refuse: MavResult | None = None
+    rejections: int = 0
+    progress: float = 0.0
+    slow: float = 0.0
+    drop: float = 0.0
+    duplicate: float = 0.0
+    delay: float = 0.0
+    corrupt: float = 0.0
+
+    @cached_property
+    def link_faults(self) -> bool:
+        """Whether messages are dropped, duplicated, delayed or corrupted."""
+        return bool(self.drop or self.duplicate or self.delay or self.corrupt)
+
+
+B = TypeVar('B', bound=Behaviour)
+
+
+class FaultError(ValueError):
+    """A fault that does not exist, or a value that it cannot have; the message says which."""
+
+
+def seconds(text: str) -> float:
+    """Read a duration, s."""
+    value = float(text)
+    if not 0 < value <= 3600:
+        raise ValueError('not within 0 to 3600 s')
+    return value
+
+
+def share(text: str) -> float:
+    """Read a share, 0..1."""
+    value = float(text)
+    if not 0 < value <= 1:
+        raise ValueError('not within 0 to 1')
+    return value
+
+
+def count(text: str) -> int:
+    """Read a number of times."""
+    value = int(text)
+    if not 1 <= value <= 1_000_000:
+        raise ValueError('not within 1 to 1000000')
+    return value
+
+
+def uint8(text: str) -> int:
+    """Read a field of one byte."""
+    value = int(text)
+    if not 0 <= value <= 255:
+        raise ValueError('not within 0 to 255')
+    return value
+
+
+def _result(text: str) -> MavResult:
+    name = text.upper().removeprefix('MAV_RESULT_')
+    if name not in MavResult.__members__:
+        raise ValueError('not a MAV_RESULT')
+    return MavResult[name]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """
+    One fault.
+
+    :param field: the field of the behaviour that it sets.
+    :param description: its effect, for people.
+    :param metavar: its unit or type, '' if it has no value.
+    :param read: makes a value from text.
+    :param default: the value if none is given; for a fault without values, the value it sets.
+    """
+
+    field: str
+    description: str
+    metavar: str = ''
+    read: Callable[[str], Any] | None = None
+    default: Any = True
+
+    @property
+    def default_text(self) -> str:
+        """The default value as people write it, '' if the fault has no value."""
+        if self.read is None:
+            return ''
+        if isinstance(self.default, MavResult):
+            return self.default.name.lower()
+        return 'for ever' if self.default == math.inf else f'{self.default:g}'
+
+    def value_text(self, value: Any) -> str:
+        """Return a value as it is typed, '' if there is none to type."""
+        if self.read is None or value == math.inf:
+            return ''
+        return value.name.lower() if isinstance(value, MavResult) else f'{value}'
+
+
+class FaultTable(dict[str, Fault]):
+    """The faults of one payload, by name."""
+
+    def find(self, name: str) -> Fault:
+        """
+        Return a fault.
+
+        :raises FaultError: if there is none of this name.
+        """
+        if name not in self:
+            raise FaultError(f'no fault {name!r}; there are {", ".join(self)}')
+        return self[name]
+
+    def add(self, behaviour: B, text: str) -> B:
+        """
+        Return a behaviour with one more fault.
+
+        :param text: ``NAME`` or ``NAME=VALUE``.
+        :raises FaultError: if there is no such fault, or it cannot have that value.
+        """
+        name, equals, value = text.strip().partition('=')
+        fault = self.find(name)
+        if not equals:
+            return replace(behaviour, **{fault.field: fault.default})
+        if fault.read is None:
+            raise FaultError(f'fault {text!r}: {name} takes no value')
+        try:
+            return replace(behaviour, **{fault.field: fault.read(value.strip())})
+        except ValueError as error:
+            raise FaultError(
+                f'fault {text!r}: {value!r} is not a {fault.metavar}: {error}') from error
+
+    def remove(self, behaviour: B, normal: B, name: str) -> B:
+        """
+        Return a behaviour without one fault.
+
+        :param normal: the behaviour without faults.
+        :raises FaultError: if there is no such fault.
+        """
+        field = self.find(name).field
+        return replace(behaviour, **{field: getattr(normal, field)})
+
+    def active(self, behaviour: B, normal: B) -> list[str]:
+        """Return the names of the faults of a behaviour."""
+        return [name for name, fault in self.items()
+                if getattr(behaviour, fault.field) != getattr(normal, fault.field)]
+
+    def as_typed(self, behaviour: B, normal: B) -> list[str]:
+        """Return the faults of a behaviour as :meth:`add` takes them, with values."""
+        values = [(name, self[name].value_text(getattr(behaviour, self[name].field)))
+                  for name in self.active(behaviour, normal)]
+        return [f'{name}={value}' if value else name for name, value in values]
+
+    def describe(self) -> str:
+        """Return the table for people, a line for each fault."""
+        lines = []
+        for name, fault in self.items():
+            shown = f'{name}[={fault.metavar}]' if fault.metavar else name
+            default = f' (default: {fault.default_text})' if fault.metavar else ''
+            lines.append(f'  {shown:20} {fault.description}{default}')
+        return '\n'.join(lines)
+
+
+FAULTS = FaultTable({
+    'silence': Fault('silence', 'neither receives nor sends for S seconds', 'S', seconds,
+                     math.inf),
+    'reboot': Fault('reboot_interval', 'restarts every S seconds; on the console, '
+                    'without S, once', 'S', seconds, 10.0),
+    'refuse': Fault('refuse', 'answers changes with RESULT, such as failed',
+                    'RESULT', _result, MavResult.DENIED),
+    'progress': Fault('progress', 'reports IN_PROGRESS for S seconds before each change',
+                      'S', seconds, 2.5),
+    'busy': Fault('rejections', 'rejects N changes temporarily', 'N', count, 3),
+    'slow': Fault('slow', 'answers S seconds late', 'S', seconds, 1.5),
+    'drop': Fault('drop', 'loses a share of its messages', 'SHARE', share, 0.3),
+    'duplicate': Fault('duplicate', 'sends a share of its messages twice',
+                       'SHARE', share, 0.3),
+    'delay': Fault('delay', 'delays and reorders its messages by up to S seconds',
+                   'S', seconds, 2.0),
+    'corrupt': Fault('corrupt', 'sends a share of its messages with a wrong checksum',
+                     'SHARE', share, 0.3),
+    'lie': Fault('ignores_changes', 'accepts changes and does not apply them'),
+    'heartbeat': Fault('heartbeat_interval', 'sends a heartbeat every S seconds',
+                       'S', seconds, 4.0),
+    'type': Fault('heartbeat_type', 'sends a heartbeat of MAV_TYPE N',
+                  'N', uint8, int(MavType.ONBOARD_CONTROLLER)),
+    'autopilot': Fault('heartbeat_autopilot', 'sends a heartbeat with MAV_AUTOPILOT N',
+                       'N', uint8, 3),
+    'no-int': Fault('answers_command_int', 'does not answer COMMAND_INT', default=False),
+    'no-broadcast': Fault('answers_broadcast', 'does not answer messages to all components',
+                          default=False),
+    'any-target': Fault('filters_target', 'obeys commands to other addresses', default=False),
+    'no-stop': Fault('endless_stream', 'does not stop its status stream'),
+    'fixed-rate': Fault('fixed_rate', 'ignores the interval that it is given'),
+    'disobey': Fault('applies_rejected', 'applies the commands that it rejects'),
+    'unknown': Fault('accepts_unknown', 'accepts unknown commands, and requests for unknown '
+                     'messages'),
+    'no-request': Fault('on_request', 'does not send its status on request', default=False),
+    'no-resume': Fault('resumes', 'does not start its status stream again', default=False),
+    'misaddress': Fault('acks_wrong_target', 'sends acknowledgements to another component'),
+})

@@ -1,0 +1,447 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Simulated components: the device's side of the protocols that all payloads share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+import functools
+import heapq
+import itertools
+import math
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+from .fault_injector import FaultInjector
+from .faults import Behaviour, FAULTS, FaultTable
+from ..mavlink.component import Endpoint
+from ..mavlink.deadline_queue import DeadlineQueue
+from ..mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    MavCmd,
+    MAVLINK_VERSION,
+    MavResult,
+)
+
+# s; the shortest interval of a stream, which also serves requests for shorter ones.
+SHORTEST_INTERVAL = 0.01
+# s between reports of progress.
+PROGRESS_INTERVAL = 0.5
+
+Change = Callable[[], None]
+
+
+class CommandReply(NamedTuple):
+    """A device's reply to a command: the result, and the change that the command makes."""
+
+    result: MavResult
+    change: Change | None = None
+
+
+class Snapshot(NamedTuple):
+    """
+    The state of a simulated device at a moment, for people.
+
+    :param text: one line.
+    :param state: differs between two snapshots if the second deserves a line of its own.
+    :param drift: a slow quantity, in steps; a change by one step deserves a line, too.
+    """
+
+    text: str
+    state: tuple[object, ...]
+    drift: float = 0.0
+
+
+class SimulatedDevice(ABC):
+    """
+    The part of a simulated component that is its payload's: state, commands and messages.
+
+    No I/O; ``now`` is s on the link's clock.
+
+    :param behaviour: how it behaves at first.
+    :param normal: how it behaves without faults; None is the same.
+    :cvar changes: the MAV_CMDs that change its state.
+    :cvar faults: the faults that it can have.
+    """
+
+    changes: ClassVar[frozenset[int]]
+    faults: ClassVar[FaultTable] = FAULTS
+
+    def __init__(self, behaviour: Behaviour, normal: Behaviour | None = None) -> None:
+        self.behaviour = behaviour
+        self.normal = behaviour if normal is None else normal
+
+    def behave(self, behaviour: Behaviour, now: float) -> None:
+        """Behave differently from now on."""
+        self.behaviour = behaviour
+
+    @abstractmethod
+    def restart(self, now: float) -> None:
+        """Return to the state after a power cycle."""
+
+    @abstractmethod
+    def streams(self) -> Mapping[int, float]:
+        """Return the default interval (s, 0 for none) of each streamed message, by message id."""
+
+    @abstractmethod
+    def message(self, message_id: int, now: float) -> Any:
+        """Return a message of this moment, None if the device does not have it."""
+
+    @abstractmethod
+    def execute(self, command: CommandLong | CommandInt, now: float) -> CommandReply | None:
+        """Return the reply to a command, None if the device does not support it."""
+
+    @abstractmethod
+    def snapshot(self, now: float) -> Snapshot:
+        """Return the actual state, whatever the device reports."""
+
+
+D = TypeVar('D', bound=SimulatedDevice)
+
+
+@dataclass(frozen=True)
+class Description(Generic[D]):
+    """
+    A component to simulate.
+
+    :param name: its name for people, '' for none.
+    :param seed: of its random numbers.
+    """
+
+    address: Address
+    device: D
+    name: str = ''
+    seed: int = 0
+
+
+class _Stream:
+
+    def __init__(self, default: float, now: float) -> None:
+        self.default = default
+        self.interval = default
+        self.due = now if default else math.inf
+
+    def set(self, interval: float, now: float) -> None:  # noqa: A003
+        self.interval = interval
+        self.due = now + interval if interval else math.inf
+
+    def advance(self, now: float) -> None:
+        """Set the next due time; sendings that were missed are left out."""
+        self.due += self.interval
+        if self.due <= now:
+            self.due = now + self.interval
+
+
+class _Schedule:
+    """Actions that are due later."""
+
+    def __init__(self) -> None:
+        self._entries: list[tuple[float, int, Callable[[float], None]]] = []
+        self._order = itertools.count()
+
+    def add(self, due: float, action: Callable[[float], None]) -> None:
+        """Call ``action(now)`` when it is due."""
+        heapq.heappush(self._entries, (due, next(self._order), action))
+
+    def poll(self, now: float) -> None:
+        while self._entries and self._entries[0][0] <= now:
+            heapq.heappop(self._entries)[2](now)
+
+    def next_deadline(self) -> float:
+        return self._entries[0][0] if self._entries else math.inf
+
+    def clear(self) -> None:
+        self._entries.clear()
+
+
+class SimulatedComponent(Generic[D]):
+    """
+    One simulated component: heartbeat, commands, streams and faults. No I/O.
+
+    :param outgoing: takes the messages that it sends, each with its address.
+    :param changed: called when :meth:`next_deadline` may have changed.
+    """
+
+    def __init__(
+        self, described: Description[D], now: float,
+        outgoing: deque[tuple[Address, Any]] | None = None,
+        changed: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.address = described.address
+        self.name = described.name
+        self.device = described.device
+        self.outgoing = deque() if outgoing is None else outgoing
+        self._changed = changed
+        self._injector = FaultInjector(self.address, self.outgoing, described.seed)
+        self._schedule = _Schedule()
+        self.power_on(now)
+
+    @property
+    def behaviour(self) -> Any:
+        """The behaviour of the device, of the payload's type."""
+        return self.device.behaviour
+
+    def power_on(self, now: float) -> None:
+        """Begin; the faults that last for a time last from now on."""
+        self._silent_until = now + (self.behaviour.silence or -math.inf)
+        self.restart(now)
+
+    def restart(self, now: float) -> None:
+        """Restart, as after a power cycle."""
+        self.device.restart(now)
+        self._streams = {message_id: _Stream(interval, now)
+                         for message_id, interval in self.device.streams().items()}
+        self._in_progress: set[int] = set()
+        self._heartbeat_due = now if self.behaviour.heartbeat_interval else math.inf
+        self._injector.clear()
+        self._schedule.clear()
+        self._reboot_due = now + (self.behaviour.reboot_interval or math.inf)
+        self._changed()
+
+    def behave(self, behaviour: Behaviour, now: float) -> None:
+        """Behave differently from now on."""
+        before = self.behaviour
+        self.device.behave(behaviour, now)
+        if behaviour.silence != before.silence:
+            self._silent_until = now + behaviour.silence
+        if behaviour.reboot_interval != before.reboot_interval:
+            self._reboot_due = now + (behaviour.reboot_interval or math.inf)
+        if behaviour.heartbeat_interval != before.heartbeat_interval:
+            self._heartbeat_due = now if behaviour.heartbeat_interval else math.inf
+        self._changed()
+
+    def silent(self, now: float) -> bool:
+        """Return whether it neither receives nor sends."""
+        return now < self._silent_until
+
+    def interval(self, message_id: int) -> float:
+        """Return the interval of a streamed message, s, 0 for none."""
+        return self._streams[message_id].interval
+
+    def apply(self, change: Change, now: float) -> None:
+        """Make a change, by command or by hand, and send the streamed messages."""
+        change()
+        if self.behaviour.status_on_change:
+            for message_id, stream in self._streams.items():
+                if stream.interval:
+                    stream.due = now + stream.interval
+                    self._send(self.device.message(message_id, now), now)
+        self._changed()
+
+    def addressed(self, message: Any) -> bool:
+        """Return whether a message is for this component (MAVLink guide, "Routing")."""
+        behaviour = self.behaviour
+        system, component = message.target_system, message.target_component
+        if (system, component) == self.address or not behaviour.filters_target:
+            return True
+        return bool(behaviour.answers_broadcast and (
+            system == 0 or system == self.address.system and component == 0))
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        """Answer a command for this component; ignore all other messages."""
+        if (not isinstance(message, CommandLong | CommandInt) or not self.addressed(message)
+                or self.silent(now)):
+            return
+        behaviour = self.behaviour
+        if isinstance(message, CommandInt) and not behaviour.answers_command_int:
+            return
+        if behaviour.slow:
+            self._schedule.add(now + behaviour.slow,
+                               functools.partial(self._consider, source, message))
+        else:
+            self._consider(source, message, now)
+        self._changed()
+
+    def _consider(self, source: Address, message: Any, now: float) -> None:
+        """Answer a command at once, or report its progress first."""
+        behaviour = self.behaviour
+        if message.command not in self.device.changes:
+            self._finish(source, message, now)
+        elif behaviour.rejections or message.command in self._in_progress:
+            if behaviour.rejections:
+                self.device.behave(replace(behaviour, rejections=behaviour.rejections - 1), now)
+            self._acknowledge(source, message.command, MavResult.TEMPORARILY_REJECTED, now)
+        elif behaviour.refuse is not None:
+            self._acknowledge(source, message.command, behaviour.refuse, now)
+        elif behaviour.progress:
+            self._progress(source, message, now, now)
+        else:
+            self._finish(source, message, now)
+
+    def _acknowledge(
+        self, source: Address, command: int, result: int, now: float, progress: int = 0,
+    ) -> None:
+        target = source if self.behaviour.acks_target else Address(0, 0)
+        if self.behaviour.acks_wrong_target:
+            target = Address(source.system, source.component ^ 1)
+        self._send(CommandAck(command, result, progress, 0, *target), now)
+
+    def _progress(self, source: Address, message: Any, begun: float, now: float) -> None:
+        """Report progress until its time is over, then finish the command."""
+        duration = self.behaviour.progress
+        if now >= begun + duration:
+            self._in_progress.discard(message.command)
+            self._finish(source, message, now)
+            return
+        self._in_progress.add(message.command)
+        self._acknowledge(source, message.command, MavResult.IN_PROGRESS, now,
+                          int(100 * (now - begun) / duration))
+        self._schedule.add(min(now + PROGRESS_INTERVAL, begun + duration),
+                           functools.partial(self._progress, source, message, begun))
+
+    def _finish(self, source: Address, message: Any, now: float) -> None:
+        """Acknowledge a command and do what it asks for."""
+        behaviour = self.behaviour
+        if message.command == MavCmd.REQUEST_MESSAGE:
+            requested = self._requested(message.param1, now)
+            result = MavResult.ACCEPTED if requested else self._unknown(MavResult.DENIED)
+            self._acknowledge(source, message.command, result, now)
+            if requested:
+                self._send(requested, now)
+            return
+        if message.command == MavCmd.SET_MESSAGE_INTERVAL:
+            self._acknowledge(source, message.command, self._set_interval(message, now), now)
+            return
+        reply = self.device.execute(message, now)
+        if reply is None:
+            reply = CommandReply(self._unknown(MavResult.UNSUPPORTED))
+        accepted = reply.result == MavResult.ACCEPTED
+        self._acknowledge(source, message.command, reply.result, now)
+        change = reply.change
+        if change is None or not (
+                not behaviour.ignores_changes if accepted else behaviour.applies_rejected):
+            return
+        if behaviour.apply_after:
+            self._schedule.add(now + behaviour.apply_after, functools.partial(self.apply, change))
+        else:
+            self.apply(change, now)
+
+    def _requested(self, message_id: float, now: float) -> Any:
+        if not math.isfinite(message_id) or (
+                message_id in self._streams and not self.behaviour.on_request):
+            return None
+        return self.device.message(int(message_id), now) if message_id % 1 == 0 else None
+
+    def _unknown(self, result: MavResult) -> MavResult:
+        return MavResult.ACCEPTED if self.behaviour.accepts_unknown else result
+
+    def _set_interval(self, message: Any, now: float) -> MavResult:
+        """MAV_CMD_SET_MESSAGE_INTERVAL: param2 is µs, -1 stops, 0 is the default rate."""
+        behaviour, microseconds = self.behaviour, message.param2
+        stream = self._streams.get(message.param1)
+        if stream is None or not math.isfinite(microseconds):
+            return MavResult.DENIED
+        default = stream.default or 1.0
+        if microseconds == -1:
+            stream.set(default if behaviour.endless_stream else 0.0, now)
+        elif microseconds == 0 or behaviour.fixed_rate:
+            stream.set(default if stream.interval or behaviour.resumes else 0.0, now)
+        elif microseconds > 0:
+            stream.set(max(microseconds / 1e6, SHORTEST_INTERVAL), now)
+        else:
+            return MavResult.DENIED
+        return MavResult.ACCEPTED
+
+    def _send(self, message: Any, now: float) -> None:
+        if not self.silent(now):
+            self._injector.send(message, self.behaviour, now)
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""
+        if self.behaviour.heartbeat_interval:
+            self._send_heartbeat(now)
+        self._changed()
+
+    def _send_heartbeat(self, now: float) -> None:
+        behaviour = self.behaviour
+        self._heartbeat_due = now + (behaviour.heartbeat_interval or math.inf)
+        self._send(Heartbeat(
+            behaviour.heartbeat_type, behaviour.heartbeat_autopilot, 0, 0,
+            behaviour.heartbeat_state, MAVLINK_VERSION), now)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Endpoint.poll`."""
+        if now >= self._silent_until > -math.inf:
+            self._silent_until = -math.inf
+            self.device.behave(replace(self.behaviour, silence=0.0), now)
+        if now >= self._reboot_due:
+            self.restart(now)
+        self._schedule.poll(now)
+        if now >= self._heartbeat_due:
+            self._send_heartbeat(now)
+        for message_id, stream in self._streams.items():
+            if now >= stream.due:
+                stream.advance(now)
+                self._send(self.device.message(message_id, now), now)
+        self._injector.poll(now)
+        self._changed()
+
+    def next_deadline(self) -> float:
+        """See :meth:`Endpoint.next_deadline`."""
+        end_of_silence = math.inf if self._silent_until == -math.inf else self._silent_until
+        return min(self._heartbeat_due, self._reboot_due, end_of_silence,
+                   self._schedule.next_deadline(), self._injector.next_deadline(),
+                   *(stream.due for stream in self._streams.values()))
+
+
+class SimulatedComponents(Endpoint, Generic[D]):
+    """
+    Any number of simulated components on one link, of one payload or of several.
+
+    :ivar components: in the order of their descriptions.
+    """
+
+    def __init__(self, described: Iterable[Description[D]], now: float) -> None:
+        super().__init__()
+        self._deadlines: DeadlineQueue[int] = DeadlineQueue()
+        # Indexes of the components whose deadline is entered when the next one is asked for.
+        self._changed: set[int] = set()
+        self.components = [
+            SimulatedComponent(one, now, self.outgoing,
+                               functools.partial(self._changed.add, index))
+            for index, one in enumerate(described)]
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Endpoint.link_opened`."""
+        for component in self.components:
+            component.link_opened(now)
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        """See :meth:`Endpoint.receive`."""
+        if isinstance(message, CommandLong | CommandInt):
+            for component in self.components:
+                component.receive(source, message, now)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Endpoint.poll`."""
+        self._enter_deadlines()
+        for index in self._deadlines.due(now):
+            self.components[index].poll(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Endpoint.next_deadline`."""
+        self._enter_deadlines()
+        return self._deadlines.next_deadline()
+
+    def _enter_deadlines(self) -> None:
+        while self._changed:
+            index = self._changed.pop()
+            self._deadlines.set(index, self.components[index].next_deadline())
