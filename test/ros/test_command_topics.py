@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``~/cmd/enable`` and ``~/cmd/brightness``."""
+"""``~/cmd/enable`` and ``~/cmd/brightness`` command the light; the newest message wins."""
 
 import math
 import threading
@@ -24,134 +24,111 @@ from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.waiting import PATIENCE
 
-
-class TestEnable:
-
-    @pytest.mark.parametrize('on', [True, False])
-    def test_it_switches_the_light(self, ros: Ros, light: ServedLight, on: bool) -> None:
-        ros.publish(Bool, '/illuminator/cmd/enable', on)
-
-        [command] = light.wait_for(ON_OFF)
-
-        assert command.param1 == float(on)
-
-    def test_of_what_comes_while_it_switches_only_the_newest_is_done(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        light.fake.delays[ON_OFF] = math.inf
-        ros.publish(Bool, '/illuminator/cmd/enable', *[True] * 50, False)
-        light.wait_for(ON_OFF)
-        # The node has taken what came before it answers.
-        parameters.get('frame_id')
-
-        light.release(ON_OFF)
-
-        eventually(lambda: light.commands(ON_OFF)[-1:] and not light.commands(ON_OFF)[-1].param1)
-        assert len(light.commands(ON_OFF)) < 10
-
-    def test_a_refusal_is_logged(self, ros: Ros, light: ServedLight, bridge: Program) -> None:
-        light.fake.results[ON_OFF] = MavResult.DENIED
-
-        ros.publish(Bool, '/illuminator/cmd/enable', True)
-
-        bridge.wait_for('~/cmd/enable: refused: MAV_RESULT_DENIED')
+ENABLE, BRIGHTNESS = '/illuminator/cmd/enable', '/illuminator/cmd/brightness'
+COUNT = 250
 
 
-class TestBrightness:
-    def test_it_configures_the_light_and_keeps_the_other_fields(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        light.report(mode=1, strobe_period=2.0, strobe_duty_cycle=20.0)
-        parameters.wait(strobe_period=2.0)
+@pytest.mark.parametrize('on', [True, False])
+def test_enable_message_switches_the_light(ros: Ros, light: ServedLight, on: bool) -> None:
+    ros.publish(Bool, ENABLE, on)
 
-        ros.publish(Float32, '/illuminator/cmd/brightness', 41.0)
+    [command] = light.wait_for(ON_OFF)
 
-        [command] = light.wait_for(CONFIGURE)
-        assert params(command) == (1.0, 41.0, 2.0, 20.0)
+    assert command.param1 == float(on)
 
-    def test_the_parameter_follows(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        ros.publish(Float32, '/illuminator/cmd/brightness', 43.0)
 
-        parameters.wait(brightness=43.0)
+def test_newest_enable_message_wins_while_the_light_is_being_switched(
+    ros: Ros, light: ServedLight, parameters: Parameters,
+) -> None:
+    light.fake.delays[ON_OFF] = math.inf
+    ros.publish(Bool, ENABLE, *[True] * 50, False)
+    light.wait_for(ON_OFF)
+    # The node has taken what came before it answers.
+    parameters.get('frame_id')
 
-    @pytest.mark.parametrize(('value', 'reason'), [
-        (math.nan, 'brightness nan is not a finite number'),
-        (math.inf, 'brightness inf is not a finite number'),
-        (100.5, 'brightness 100.5 % is out of range: 0 to 100 %'),
-        (-1.0, 'brightness -1 % is out of range: 0 to 100 %'),
-    ])
-    def test_nonsense_is_logged_and_not_sent(
-        self, own_ros: Ros, port: int, value: float, reason: str,
-    ) -> None:
-        with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+    light.release(ON_OFF)
+
+    eventually(lambda: light.commands(ON_OFF)[-1:] and not light.commands(ON_OFF)[-1].param1)
+    assert len(light.commands(ON_OFF)) < 10
+
+
+@pytest.mark.parametrize(('topic', 'type_', 'value', 'command'), [
+    ('enable', Bool, True, ON_OFF), ('brightness', Float32, 44.0, CONFIGURE)])
+def test_refusal_is_logged_and_parameters_keep_their_values(
+    ros: Ros, light: ServedLight, bridge: Program, parameters: Parameters, topic: str,
+    type_: type, value: object, command: int,
+) -> None:
+    light.fake.results[command] = MavResult.DENIED
+    before = parameters.get('brightness')
+
+    ros.publish(type_, f'/illuminator/cmd/{topic}', value)
+
+    bridge.wait_for(f'~/cmd/{topic}: refused: MAV_RESULT_DENIED')
+    assert parameters.get('brightness') == before
+
+
+def test_brightness_message_keeps_the_other_fields_and_moves_the_parameter(
+    ros: Ros, light: ServedLight, parameters: Parameters,
+) -> None:
+    light.report(mode=1, strobe_period=2.0, strobe_duty_cycle=20.0)
+    parameters.wait(strobe_period=2.0)
+
+    ros.publish(Float32, BRIGHTNESS, 41.0)
+
+    [command] = light.wait_for(CONFIGURE)
+    assert params(command) == (1.0, 41.0, 2.0, 20.0)
+    parameters.wait(brightness=41.0)
+
+
+def test_invalid_or_early_brightness_is_logged_with_its_reason_and_not_sent(
+    own_ros: Ros, port: int,
+) -> None:
+    with running_bridge(own_ros.domain, port) as bridge:
+        own_ros.publish(Float32, BRIGHTNESS, 44.0)
+        bridge.wait_for('~/cmd/brightness: no light connected')
+        with ServedLight(port) as light:
             Parameters(own_ros).wait(mode='internal_control')
 
-            own_ros.publish(Float32, '/illuminator/cmd/brightness', value, 50.0)
+            own_ros.publish(Float32, BRIGHTNESS, math.nan, math.inf, 100.5, -1.0, 50.0)
 
-            bridge.wait_for(f'~/cmd/brightness: {reason}')
+            bridge.wait_for('~/cmd/brightness: brightness nan is not a finite number')
             light.wait_for(CONFIGURE)
             assert [params(c)[1] for c in light.commands(CONFIGURE)] == [50.0]
 
-    def test_a_refusal_is_logged_and_the_parameter_keeps_its_value(
-        self, ros: Ros, light: ServedLight, bridge: Program, parameters: Parameters,
-    ) -> None:
-        light.fake.results[CONFIGURE] = MavResult.DENIED
-        before = parameters.get('brightness')
 
-        ros.publish(Float32, '/illuminator/cmd/brightness', 44.0)
+def test_brightness_stream_at_500_hz_has_one_command_in_flight_and_ends_with_its_newest(
+    ros: Ros, light: ServedLight,
+) -> None:
+    light.fake.delays[CONFIGURE] = math.inf
+    publisher = ros.publisher(Float32, BRIGHTNESS)
+    values = iter(range(1, COUNT + 1))
+    done = threading.Event()
 
-        bridge.wait_for('~/cmd/brightness: refused: MAV_RESULT_DENIED')
-        assert parameters.get('brightness') == before
+    def publish() -> None:
+        value = next(values, None)
+        if value is None:
+            timer.cancel()
+            done.set()
+        else:
+            publisher.publish(Float32(data=value * 100.0 / COUNT))
 
-    def test_without_a_light_it_says_so(self, own_ros: Ros, port: int) -> None:
-        with running_bridge(own_ros.domain, port) as bridge:
-            own_ros.publish(Float32, '/illuminator/cmd/brightness', 44.0)
+    timer = ros.node.create_timer(0.002, publish)
 
-            bridge.wait_for('~/cmd/brightness: no light connected')
+    assert done.wait(PATIENCE)
+    light.release(CONFIGURE)
+    eventually(lambda: light.fake.fields['brightness'] == 100.0)
+    assert len(light.commands(CONFIGURE)) < COUNT / 4
+    assert light.fake.most_at_once == 1
 
 
-class TestStream:
-    COUNT = 250
+def test_brightness_that_the_light_has_already_is_not_sent_again(
+    ros: Ros, light: ServedLight, parameters: Parameters,
+) -> None:
+    ros.publish(Float32, BRIGHTNESS, 71.0)
+    parameters.wait(brightness=71.0)
+    light.forget()
 
-    def test_at_500_hz_the_newest_wins_and_one_command_is_in_flight(
-        self, ros: Ros, light: ServedLight,
-    ) -> None:
-        light.fake.delays[CONFIGURE] = math.inf
-        publisher = ros.publisher(Float32, '/illuminator/cmd/brightness')
-        values = iter(range(1, self.COUNT + 1))
-        done = threading.Event()
+    ros.publish(Float32, BRIGHTNESS, 71.0, 72.0)
 
-        def publish() -> None:
-            value = next(values, None)
-            if value is None:
-                timer.cancel()
-                done.set()
-            else:
-                publisher.publish(Float32(data=value * 100.0 / self.COUNT))
-
-        timer = ros.node.create_timer(0.002, publish)
-
-        assert done.wait(PATIENCE)
-        light.release(CONFIGURE)
-        eventually(lambda: light.fake.fields['brightness'] == 100.0)
-        assert len(light.commands(CONFIGURE)) < self.COUNT / 4
-        assert light.fake.most_at_once == 1
-
-    def test_a_burst_ends_with_its_last_value(self, ros: Ros, light: ServedLight) -> None:
-        ros.publish(Float32, '/illuminator/cmd/brightness', *map(float, range(10, 71)))
-
-        eventually(lambda: light.fake.fields['brightness'] == 70.0)
-
-    def test_a_setpoint_that_is_reached_already_is_not_sent_again(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        ros.publish(Float32, '/illuminator/cmd/brightness', 71.0)
-        parameters.wait(brightness=71.0)
-        light.forget()
-
-        ros.publish(Float32, '/illuminator/cmd/brightness', 71.0, 72.0)
-
-        parameters.wait(brightness=72.0)
-        assert [params(command)[1] for command in light.commands(CONFIGURE)] == [72.0]
+    parameters.wait(brightness=72.0)
+    assert [params(command)[1] for command in light.commands(CONFIGURE)] == [72.0]

@@ -12,104 +12,100 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``~/enable``: success is what the light has accepted and shows (DESIGN.md, 3.1)."""
+"""``~/enable`` succeeds only if the light has accepted the command and shows it."""
 
+import math
 import re
+import socket
+from typing import Any
 
 import pytest
-from std_srvs.srv import SetBool
-from support.light import Address, MavCmd, MavResult, ON_OFF, ServedLight
-from support.recording import Call
-from support.ros import Ros
-from support.slow import CLOCK, SPEED
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+from support.light import Address, eventually, MavCmd, MavResult, ON_OFF, ServedLight
+from support.ros import Parameters, Ros, running_bridge
+from support.slow import CLOCK, pass_time_until, SPEED
 
-MS = r'\d+ ms'
+ONCE = r'\(1 try, \d+ ms\)'
 # s for which each try is waited for at most.
 A_TRY = 0.5
+STATUS = 440
 
 
-def start(ros: Ros, on: bool = True) -> Call:
-    return ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=on))
-
-
-def enable(ros: Ros, on: bool = True) -> SetBool.Response:
-    return start(ros, on).result()
-
-
-@pytest.fixture(autouse=True)
-def light_is_off(light: ServedLight) -> None:
+@pytest.fixture
+def off(light: ServedLight) -> ServedLight:
+    """Return the light, which is off."""
     light.report(enable=0, error_status=0)
+    return light
 
 
+@pytest.mark.parametrize('before', [True, False])
 @pytest.mark.parametrize('on', [True, False])
-def test_a_light_that_obeys_is_switched(ros: Ros, light: ServedLight, on: bool) -> None:
-    light.report(enable=int(not on))
+def test_obedient_light_is_commanded_once_and_confirmed_whatever_it_showed_before(
+    ros: Ros, light: ServedLight, on: bool, before: bool,
+) -> None:
+    light.report(enable=int(before))
 
-    response = enable(ros, on)
+    response = ros.enable(on)
 
     assert response.success
+    assert re.fullmatch(f'{"on" if on else "off"}, confirmed by ILLUMINATOR_STATUS: '
+                        f'MAV_RESULT_ACCEPTED {ONCE}', response.message)
     assert light.fake.fields['enable'] == int(on)
     assert [command.param1 for command in light.commands(ON_OFF)] == [float(on)]
 
 
-def test_the_message_tells_how_success_was_confirmed(ros: Ros, light: ServedLight) -> None:
-    message = enable(ros).message
-
-    assert re.fullmatch(
-        rf'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED \(1 try, {MS}\)', message)
-
-
-def test_a_light_that_is_on_already_is_commanded_all_the_same(
-    ros: Ros, light: ServedLight,
+@pytest.mark.parametrize(('result', 'name'), [
+    *((result, f'MAV_RESULT_{result.name}') for result in (
+        MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, MavResult.CANCELLED,
+        MavResult.NOT_IN_CONTROL)),
+    (42, 'MAV_RESULT 42 (unknown)')])
+def test_refusal_is_reported_with_the_name_of_its_result(
+    ros: Ros, off: ServedLight, result: int, name: str,
 ) -> None:
-    light.report(enable=1)
+    off.fake.results[ON_OFF] = result
 
-    assert enable(ros).success
-    assert len(light.commands(ON_OFF)) == 1
-
-
-@pytest.mark.parametrize('result', [
-    MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, MavResult.CANCELLED,
-    MavResult.NOT_IN_CONTROL,
-])
-def test_a_refusal_fails_with_the_result_s_name(
-    ros: Ros, light: ServedLight, result: MavResult,
-) -> None:
-    light.fake.results[ON_OFF] = result
-
-    response = enable(ros)
+    response = ros.enable()
 
     assert not response.success
-    assert re.fullmatch(rf'refused: MAV_RESULT_{result.name} \(1 try, {MS}\)', response.message)
+    assert re.fullmatch(rf'refused: {re.escape(name)} {ONCE}', response.message)
 
 
-def test_a_result_that_mavlink_does_not_know_is_a_refusal(
-    ros: Ros, light: ServedLight,
+@pytest.mark.parametrize('first', [MavResult.TEMPORARILY_REJECTED, None])
+def test_command_that_is_rejected_for_now_or_lost_is_sent_again(
+    ros: Ros, off: ServedLight, first: MavResult | None,
 ) -> None:
-    light.fake.results[ON_OFF] = 42
-
-    response = enable(ros)
-
-    assert not response.success
-    assert response.message.startswith('refused: MAV_RESULT 42 (unknown)')
-
-
-def test_a_light_that_rejects_for_a_moment_is_asked_again(ros: Ros, light: ServedLight) -> None:
-    light.fake.results[ON_OFF] = [MavResult.TEMPORARILY_REJECTED, MavResult.ACCEPTED]
-    call = start(ros)
-    light.wait_for(ON_OFF)
+    off.fake.results[ON_OFF] = [first, MavResult.ACCEPTED]
+    call = ros.start_enable()
+    off.wait_for(ON_OFF)
     ros.catch_up()
 
     CLOCK.forward(A_TRY)
 
     assert call.result().success
-    assert '(2 tries, ' in call.result().message
+    assert 'MAV_RESULT_ACCEPTED (2 tries, ' in call.result().message
 
 
-def test_a_light_that_accepts_and_stays_dark_has_failed(ros: Ros, light: ServedLight) -> None:
-    light.fake.applies = False
-    call = start(ros)
-    light.wait_for(ON_OFF)
+def test_silent_light_fails_after_all_tries_which_are_numbered(
+    ros: Ros, off: ServedLight,
+) -> None:
+    off.fake.results[ON_OFF] = None
+    call = ros.start_enable()
+    for tries in range(1, 5):
+        off.wait_for(ON_OFF, tries)
+        CLOCK.forward(A_TRY)
+
+    assert not call.result().success
+    assert call.result().message.startswith('no acknowledgement (4 tries, ')
+    assert [command.confirmation for command in off.commands(ON_OFF)] == [0, 1, 2, 3]
+
+
+def test_accepted_command_fails_if_the_status_contradicts_it(
+    ros: Ros, off: ServedLight,
+) -> None:
+    off.fake.applies = False
+    call = ros.start_enable()
+    off.wait_for(ON_OFF)
     ros.catch_up()
 
     CLOCK.forward(1.0)
@@ -120,28 +116,13 @@ def test_a_light_that_accepts_and_stays_dark_has_failed(ros: Ros, light: ServedL
         r'\(1 try, 1\.\d\d s\)', call.result().message)
 
 
-def test_a_light_that_changes_a_little_later_has_succeeded(
-    ros: Ros, light: ServedLight,
-) -> None:
-    light.fake.apply_after = 0.9
-    call = start(ros)
-    light.wait_for(ON_OFF)
-    ros.catch_up()
-    assert not call.answered
-
-    CLOCK.forward(0.9)
-
-    assert call.result().success
-    assert 'confirmed by' in call.result().message
-
-
-def test_a_light_whose_status_stays_away_has_failed(ros: Ros, light: ServedLight) -> None:
-    light.fake.stream = 0.0
-    light.fake.pushes = False
-    light.fake.answers.discard(440)
-    call = start(ros)
-    # What has accepted is asked for its status.
-    light.wait_for(MavCmd.REQUEST_MESSAGE)
+def test_accepted_command_fails_if_no_status_follows(ros: Ros, off: ServedLight) -> None:
+    off.fake.stream = 0.0
+    off.fake.pushes = False
+    off.fake.answers.discard(STATUS)
+    call = ros.start_enable()
+    # The bridge asks for the status once the command is acknowledged.
+    off.wait_for(MavCmd.REQUEST_MESSAGE)
 
     CLOCK.forward(1.0)
 
@@ -150,82 +131,148 @@ def test_a_light_whose_status_stays_away_has_failed(ros: Ros, light: ServedLight
         r'but no ILLUMINATOR_STATUS came within 1\.\d\d s', call.result().message)
 
 
-def test_a_silent_light_is_tried_again_and_has_failed(ros: Ros, light: ServedLight) -> None:
-    light.fake.results[ON_OFF] = None
-    call = start(ros)
-    for tries in range(1, 5):
-        light.wait_for(ON_OFF, tries)
-        CLOCK.forward(A_TRY)
-
-    assert not call.result().success
-    assert call.result().message.startswith('no acknowledgement (4 tries, ')
-    assert [command.confirmation for command in light.commands(ON_OFF)] == [0, 1, 2, 3]
-
-
-def test_a_light_that_misses_the_first_try_is_switched_by_the_second(
-    ros: Ros, light: ServedLight,
+def test_change_within_a_second_of_the_acknowledgement_is_a_success(
+    ros: Ros, off: ServedLight,
 ) -> None:
-    light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
-    call = start(ros)
-    light.wait_for(ON_OFF)
+    off.fake.apply_after = 0.9
+    call = ros.start_enable()
+    off.wait_for(ON_OFF)
+    ros.catch_up()
+    assert not call.answered
 
-    CLOCK.forward(A_TRY)
+    CLOCK.forward(0.9)
 
     assert call.result().success
-    assert 'MAV_RESULT_ACCEPTED (2 tries, ' in call.result().message
 
 
-def test_a_slow_light_is_waited_for_and_not_asked_again(ros: Ros, light: ServedLight) -> None:
-    light.fake.results[ON_OFF] = None
-    call = start(ros)
-    light.wait_for(ON_OFF)
-    light.acknowledge(ON_OFF, MavResult.IN_PROGRESS, progress=50)
+@pytest.mark.parametrize('result', [MavResult.ACCEPTED, MavResult.FAILED])
+def test_command_in_progress_is_awaited_and_not_sent_again(
+    ros: Ros, off: ServedLight, result: MavResult,
+) -> None:
+    off.fake.results[ON_OFF] = None
+    call = ros.start_enable()
+    off.wait_for(ON_OFF)
+    off.acknowledge(ON_OFF, MavResult.IN_PROGRESS, progress=50)
     ros.catch_up()
-    light.forget()
+    off.forget()
 
     CLOCK.forward(5 * A_TRY)
     ros.catch_up()
     assert not call.answered
-    light.report(enable=1)
-    light.acknowledge(ON_OFF, MavResult.ACCEPTED)
+    off.report(enable=int(result == MavResult.ACCEPTED))
+    off.acknowledge(ON_OFF, result)
 
-    assert call.result().success
-    assert light.commands(ON_OFF) == []
-
-
-def test_a_slow_light_that_fails_in_the_end_has_failed(ros: Ros, light: ServedLight) -> None:
-    light.fake.results[ON_OFF] = None
-    call = start(ros)
-    light.wait_for(ON_OFF)
-    light.acknowledge(ON_OFF, MavResult.IN_PROGRESS, progress=50)
-    light.acknowledge(ON_OFF, MavResult.FAILED)
-
-    response = call.result()
-
-    assert not response.success
-    assert response.message.startswith('refused: MAV_RESULT_FAILED')
+    assert call.result().success is (result == MavResult.ACCEPTED)
+    assert f'MAV_RESULT_{result.name}' in call.result().message
+    assert off.commands(ON_OFF) == []
 
 
-def test_an_acknowledgement_from_somebody_else_does_not_count(
-    ros: Ros, light: ServedLight,
+def test_acknowledgement_from_another_component_does_not_count(
+    ros: Ros, off: ServedLight,
 ) -> None:
-    light.fake.results[ON_OFF] = None
-    call = start(ros)
-    light.wait_for(ON_OFF)
+    off.fake.results[ON_OFF] = None
+    call = ros.start_enable()
+    off.wait_for(ON_OFF)
 
-    light.acknowledge(ON_OFF, MavResult.ACCEPTED, source=Address(1, 1))
-    light.acknowledge(ON_OFF, MavResult.DENIED)
+    off.acknowledge(ON_OFF, MavResult.ACCEPTED, source=Address(1, 1))
+    off.acknowledge(ON_OFF, MavResult.DENIED)
 
     assert call.result().message.startswith('refused: MAV_RESULT_DENIED')
 
 
 def test_two_callers_each_get_the_answer_to_their_own_request(
-    ros: Ros, light: ServedLight,
+    ros: Ros, off: ServedLight,
 ) -> None:
-    light.fake.delays[ON_OFF] = 0.1 * SPEED
+    off.fake.delays[ON_OFF] = 0.1 * SPEED
 
-    on, off = start(ros, True), start(ros, False)
+    on, also_off = ros.start_enable(True), ros.start_enable(False)
 
     assert on.result().message.startswith('on, confirmed')
-    assert off.result().message.startswith('off, confirmed')
-    assert light.fake.fields['enable'] == 0
+    assert also_off.result().message.startswith('off, confirmed')
+    assert off.fake.fields['enable'] == 0
+
+
+def test_other_services_and_topics_go_on_while_an_enable_waits(
+    ros: Ros, off: ServedLight, parameters: Parameters,
+) -> None:
+    off.fake.results[ON_OFF] = None
+    waiting = ros.start_enable()
+    off.wait_for(ON_OFF)
+
+    assert ros.refresh().success
+    assert parameters.get('frame_id') and parameters.describe('brightness')
+    assert not parameters.set(brightness=200.0)[0].successful
+    assert parameters.set(brightness=61.0)[0].successful
+    ros.subscribe(Float64, '/illuminator/uptime').wait(count=3)
+
+    assert not waiting.answered
+    off.acknowledge(ON_OFF, MavResult.FAILED)
+    waiting.result()
+
+
+def no_light_messages(ros: Ros) -> set[str]:
+    """Call both services and set a parameter; return the reasons for which all of them fail."""
+    calls = [ros.start_enable(), ros.start(Trigger, '/illuminator/refresh', Trigger.Request())]
+    responses = [call.result() for call in calls]
+    [result] = Parameters(ros).set(brightness=30.0)
+    assert [*(response.success for response in responses), result.successful] == [False] * 3
+    return {*(response.message for response in responses), result.reason}
+
+
+def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
+    own_ros: Ros, port: int,
+) -> None:
+    with running_bridge(own_ros.domain, port):
+        assert no_light_messages(own_ros) == {
+            f'no light connected: none heard yet on udp 127.0.0.1:{port}: nothing comes in'}
+        assert Parameters(own_ros).get('brightness') == [None]
+
+
+def test_requests_fail_at_once_and_say_why_while_the_light_is_lost(
+    own_ros: Ros, port: int,
+) -> None:
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        Parameters(own_ros).wait(brightness=100.0)
+        light.fake.silent = True
+        pass_time_until(lambda: bridge.count('lost'))
+
+        for message in no_light_messages(own_ros):
+            assert message.startswith('light 1/243 is lost: no heartbeat for ')
+        assert Parameters(own_ros).get('brightness') == [100.0]
+
+
+def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
+    own_ros: Ros, port: int,
+) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as occupant:
+        occupant.bind(('127.0.0.1', port))
+        with running_bridge(own_ros.domain, port, until='link not open'):
+            assert no_light_messages(own_ros) == {
+                f'no light connected: udpin://127.0.0.1:{port} is not open: '
+                f'cannot listen on 127.0.0.1:{port}: Address already in use'}
+
+
+def test_light_that_never_sends_a_status_is_believed_and_the_answer_says_so(
+    own_ros: Ros, port: int,
+) -> None:
+    light = ServedLight(port, stream=0.0)
+    light.fake.pushes = False
+    light.fake.answers.clear()
+
+    def is_asked_for_its_status_after_the_command() -> bool:
+        received: list[Any] = list(light.fake.received)
+        first = next((number for number, message in enumerate(received)
+                      if message.command == ON_OFF), math.inf)
+        return any(message.command == MavCmd.REQUEST_MESSAGE and message.param1 == STATUS
+                   for number, message in enumerate(received) if number > first)
+
+    with running_bridge(own_ros.domain, port) as bridge, light:
+        bridge.wait_for('connected')
+
+        call = own_ros.start_enable()
+        eventually(is_asked_for_its_status_after_the_command)
+        CLOCK.forward(1.0)
+
+        assert call.result().success
+        assert 'accepted, not confirmed' in call.result().message
+        assert len(light.commands(ON_OFF)) == 1

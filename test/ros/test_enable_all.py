@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``~/enable_all`` and ``~/cmd/enable_all``: every connected light, and one answer."""
+"""``~/enable_all`` and ``~/cmd/enable_all`` switch every connected light, with one answer."""
 
 from collections.abc import Iterator
 import contextlib
@@ -21,7 +21,7 @@ import math
 import pytest
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
-from support.light import Address, eventually, ON_OFF, ServedLight
+from support.light import Address, eventually, MavResult, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
@@ -33,7 +33,7 @@ NAMES = ['illuminator (1/243)', 'illuminator_1_244 (1/244)', 'tail (1/245)']
 
 
 @pytest.fixture(scope='module')
-def fleet(domain: int) -> Iterator[tuple[Program, list[ServedLight]]]:
+def group(domain: int) -> Iterator[tuple[Program, list[ServedLight]]]:
     """Run a bridge and three lights."""
     port = free_port()
     with contextlib.ExitStack() as stack:
@@ -45,13 +45,13 @@ def fleet(domain: int) -> Iterator[tuple[Program, list[ServedLight]]]:
 
 
 @pytest.fixture
-def lights(fleet: tuple[Program, list[ServedLight]]) -> Iterator[list[ServedLight]]:
+def lights(group: tuple[Program, list[ServedLight]]) -> Iterator[list[ServedLight]]:
     """Return the lights, all off and obedient, which a test may change."""
-    for light in fleet[1]:
+    for light in group[1]:
         light.report(enable=0)
         light.forget()
-    yield fleet[1]
-    for light in fleet[1]:
+    yield group[1]
+    for light in group[1]:
         light.behave()
 
 
@@ -63,13 +63,12 @@ def are_on(lights: list[ServedLight]) -> list[bool]:
     return [bool(light.fake.fields['enable']) for light in lights]
 
 
-def test_one_request_switches_all_and_names_each(
+def test_one_request_switches_all_lights_and_names_each(
     ros: Ros, lights: list[ServedLight],
 ) -> None:
     response = enable_all(ros)
 
-    assert response.success
-    assert are_on(lights) == [True] * 3
+    assert (response.success, are_on(lights)) == (True, [True] * 3)
     summary, *outcomes = response.message.split('; ')
     assert summary == '3 of 3 on'
     assert [outcome.partition(': ')[0] for outcome in outcomes] == NAMES
@@ -77,10 +76,10 @@ def test_one_request_switches_all_and_names_each(
     assert are_on(lights) == [False] * 3
 
 
-def test_one_failure_is_named_and_makes_it_no_success(
+def test_one_refusal_is_named_and_fails_the_request(
     ros: Ros, lights: list[ServedLight],
 ) -> None:
-    lights[1].fake.results[ON_OFF] = 2
+    lights[1].fake.results[ON_OFF] = MavResult.DENIED
 
     response = enable_all(ros)
 
@@ -90,8 +89,8 @@ def test_one_failure_is_named_and_makes_it_no_success(
     assert are_on(lights) == [True, False, True]
 
 
-def test_a_lost_light_is_named_and_does_not_count(
-    ros: Ros, fleet: tuple[Program, list[ServedLight]], lights: list[ServedLight],
+def test_lost_light_is_named_and_does_not_fail_the_request(
+    ros: Ros, lights: list[ServedLight],
 ) -> None:
     connected = ros.subscribe(Bool, '/tail/connected')
     lights[2].vanish()
@@ -108,13 +107,19 @@ def test_a_lost_light_is_named_and_does_not_count(
     connected.wait_value(True)
 
 
-def test_the_topic_does_the_same(ros: Ros, lights: list[ServedLight]) -> None:
+def test_topic_switches_all_lights_and_a_failure_is_logged(
+    ros: Ros, group: tuple[Program, list[ServedLight]], lights: list[ServedLight],
+) -> None:
+    lights[1].fake.results[ON_OFF] = MavResult.DENIED
+
     ros.publish(Bool, '/illuminator/cmd/enable_all', True)
-    eventually(lambda: are_on(lights) == [True] * 3)
+
+    eventually(lambda: are_on(lights) == [True, False, True])
+    group[0].wait_for('~/cmd/enable_all: 2 of 3 on; ')
 
 
-def test_of_what_comes_on_the_topic_while_it_switches_only_the_newest_is_done(
-    ros: Ros, fleet: tuple[Program, list[ServedLight]], lights: list[ServedLight],
+def test_newest_message_wins_while_the_lights_are_being_switched(
+    ros: Ros, lights: list[ServedLight],
 ) -> None:
     lights[1].fake.delays[ON_OFF] = math.inf
     ros.publish(Bool, '/illuminator/cmd/enable_all', *[True] * 50)
@@ -130,16 +135,9 @@ def test_of_what_comes_on_the_topic_while_it_switches_only_the_newest_is_done(
     assert all(len(light.commands(ON_OFF)) < 10 for light in lights)
 
 
-def test_the_topic_warns_of_what_failed(
-    ros: Ros, fleet: tuple[Program, list[ServedLight]], lights: list[ServedLight],
-) -> None:
-    lights[1].fake.results[ON_OFF] = 2
-    ros.publish(Bool, '/illuminator/cmd/enable_all', True)
-    fleet[0].wait_for('~/cmd/enable_all: 2 of 3 on; ')
-
-
-def test_without_any_light_it_fails(own_ros: Ros, port: int) -> None:
+def test_request_fails_while_no_light_is_connected(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port):
         response = enable_all(own_ros)
+
     assert not response.success
     assert response.message.startswith('no light connected: ')

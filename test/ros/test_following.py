@@ -12,173 +12,116 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameters show the light, whoever has changed it (DESIGN.md, 3.2)."""
+"""Parameters show the light, whichever sender has changed it."""
+
+import math
 
 import pytest
 from std_msgs.msg import Float32
-from std_srvs.srv import Trigger
 from support.light import CONFIGURE, ServedLight
 from support.processes import Program
+from support.recording import Recorder
 from support.ros import Parameters, Ros
 
 THROTTLING = 1
-FIELDS = ('mode', 'brightness', 'strobe_period', 'strobe_duty_cycle')
+START = {'mode': 'internal_control', 'brightness': 80.0, 'strobe_period': 0.0,
+         'strobe_duty_cycle': 0.0}
 
 
-@pytest.fixture(autouse=True)
-def start(light: ServedLight, parameters: Parameters) -> None:
-    """Have every test begin with the same configuration, and no status of its own."""
+@pytest.fixture
+def events(light: ServedLight, parameters: Parameters) -> Recorder:
+    """Return the parameter events from now on; each test begins with the same configuration."""
     light.report(mode=1, brightness=80.0, strobe_period=0.0, strobe_duty_cycle=0.0,
                  error_status=0)
-    parameters.wait(mode='internal_control', brightness=80.0, strobe_period=0.0,
-                    strobe_duty_cycle=0.0)
+    parameters.wait(**START)
     light.forget()
+    return parameters.events()
 
 
-def all_is_done(ros: Ros) -> None:
-    """Wait until the node has done what follows from all that it has heard."""
-    assert ros.call(Trigger, '/illuminator/refresh', Trigger.Request()).success
-
-
-@pytest.mark.parametrize(('report', 'shown'), [
-    ({'brightness': 35.0}, {'brightness': 35.0}),
-    ({'mode': 2}, {'mode': 'external_sync'}),
-    ({'strobe_period': 0.5}, {'strobe_period': 0.5}),
-    ({'strobe_duty_cycle': 12.5}, {'strobe_duty_cycle': 12.5}),
-    ({'brightness': 36.0, 'strobe_period': 2.0}, {'brightness': 36.0, 'strobe_period': 2.0}),
+@pytest.mark.parametrize(('report', 'shown', 'line'), [
+    ({'brightness': 35.0}, {'brightness': 35.0}, 'brightness 35 %'),
+    ({'mode': 2}, {'mode': 'external_sync'}, 'mode external_sync'),
+    ({'strobe_duty_cycle': 12.5}, {'strobe_duty_cycle': 12.5}, 'strobe_duty_cycle 12.5 %'),
+    ({'brightness': 36.0, 'strobe_period': 2.0}, {'brightness': 36.0, 'strobe_period': 2.0},
+     'brightness 36 %, strobe_period 2 s'),
 ])
-class TestChangedByAnother:
-    def test_the_parameters_move_and_nothing_is_sent(
-        self, ros: Ros, light: ServedLight, parameters: Parameters, report: dict[str, float],
-        shown: dict[str, object],
-    ) -> None:
-        light.report(**report)
-
-        parameters.wait(**shown)
-        all_is_done(ros)
-        assert light.commands(CONFIGURE) == []
-
-    def test_it_is_one_line_in_the_log_and_one_event(
-        self, ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program,
-        report: dict[str, float], shown: dict[str, object],
-    ) -> None:
-        events = parameters.events()
-        lines = bridge.count('was changed')
-
-        light.report(**report)
-        parameters.wait(**shown)
-        all_is_done(ros)
-
-        assert bridge.count('was changed') == lines + 1
-        assert {p.name for p in events.wait().changed_parameters} == set(shown)
-        assert len(events.messages) == 1
-
-
-def test_the_line_is_info_and_tells_the_new_values(
-    light: ServedLight, parameters: Parameters, bridge: Program,
+def test_change_by_another_sender_moves_parameters_with_one_line_one_event_and_no_command(
+    ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program, events: Recorder,
+    report: dict[str, float], shown: dict[str, object], line: str,
 ) -> None:
-    light.report(brightness=37.0, strobe_period=0.25)
+    lines = len(bridge.lines)
 
-    bridge.wait_for(
-        'light 1/243 was changed: brightness 37 %, strobe_period 0.25 s')
-    [line] = [line for line in bridge.lines if 'brightness 37 %' in line]
-    assert line.startswith('[INFO]')
+    light.report(**report)
+
+    parameters.wait(**shown)
+    ros.catch_up()
+    [told] = [line for line in bridge.lines[lines:] if 'was changed' in line]
+    assert told.startswith('[INFO]') and f'light 1/243 was changed: {line}' in told
+    assert {p.name for p in events.wait().changed_parameters} == set(shown)
+    assert len(events.messages) == 1
+    assert light.commands(CONFIGURE) == []
 
 
-class TestNoChange:
-    """What is not a change by somebody: no line, no event, no command."""
+@pytest.mark.parametrize('reports', [
+    # Float32 carries 60.1 as 60.099998.
+    [{'brightness': 80.000003}, {}],
+    [{'brightness': 40.0, 'error_status': THROTTLING}, {'brightness': 80.0, 'error_status': 0}],
+    [{'mode': 0}, {'mode': 1}],
+    [{'brightness': math.nan}, {'brightness': 80.0}],
+], ids=['rounding', 'throttling', 'unknown mode', 'implausible'])
+def test_report_that_is_no_change_makes_no_line_no_event_and_no_command(
+    ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program, events: Recorder,
+    reports: list[dict[str, float]],
+) -> None:
+    lines = bridge.count('was changed')
 
-    @pytest.fixture(autouse=True)
-    def unmoved(self, ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program):
-        self.events = parameters.events()
-        self.lines = bridge.count('was changed')
-        yield
-        all_is_done(ros)
-        assert self.events.messages == []
-        assert bridge.count('was changed') == self.lines
-        assert light.commands(CONFIGURE) == []
+    for report in reports:
+        light.report(**report)
+        ros.catch_up()
 
-    def test_the_rounding_of_float32(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        assert parameters.set(brightness=60.1)[0].successful
-        self.events.wait()
-        self.events.clear()
-        light.forget()
+    assert parameters.get(*START) == list(START.values())
+    assert events.messages == []
+    assert bridge.count('was changed') == lines
+    assert light.commands(CONFIGURE) == []
 
-        # What comes back on the wire is 60.099998.
+
+def test_throttled_brightness_is_published_while_the_parameter_stays(
+    ros: Ros, light: ServedLight, parameters: Parameters, events: Recorder,
+) -> None:
+    light.report(brightness=40.0, error_status=THROTTLING)
+
+    ros.subscribe(Float32, '/illuminator/brightness').wait_value(40.0)
+    assert parameters.get('brightness') == [80.0]
+
+
+@pytest.mark.parametrize(('steps', 'value', 'shown'), [(0.0, 60.1, 60.1), (1.0, 33.3, 33.0)])
+def test_set_is_one_command_and_no_change_even_if_the_light_rounds_it(
+    ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program, events: Recorder,
+    steps: float, value: float, shown: float,
+) -> None:
+    lines = bridge.count('was changed')
+    light.fake.steps = steps
+
+    [result] = parameters.set(brightness=value)
+    light.fake.steps = 0.0
+    for _ in range(3):
         light.report()
-        all_is_done(ros)
+    ros.catch_up()
 
-        assert parameters.get('brightness') == [60.1]
-
-    def test_less_light_because_of_heat(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        topic = ros.subscribe(Float32, '/illuminator/brightness')
-
-        light.report(brightness=40.0, error_status=THROTTLING)
-        topic.wait_value(40.0)
-        light.report(brightness=80.0, error_status=0)
-        all_is_done(ros)
-
-        assert parameters.get('brightness') == [80.0]
-
-    def test_a_status_in_which_the_mode_is_unknown(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        light.report(mode=0)
-        all_is_done(ros)
-        light.report(mode=1)
-
-        assert parameters.get('mode') == ['internal_control']
-
-    def test_a_value_that_cannot_be_true(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        light.report(brightness=float('nan'))
-        all_is_done(ros)
-        light.report(brightness=80.0)
-
-        assert parameters.get('brightness') == [80.0]
+    assert result.successful
+    assert parameters.get('brightness') == [shown]
+    assert len(light.commands(CONFIGURE)) == 1
+    assert bridge.count('was changed') == lines
 
 
-class TestNoFeedback:
-    def test_a_set_is_followed_by_nothing(
-        self, ros: Ros, light: ServedLight, parameters: Parameters,
-    ) -> None:
-        parameters.set(brightness=22.0)
-        light.forget()
-        for _ in range(3):
-            light.report()
-
-        all_is_done(ros)
-        assert light.commands(CONFIGURE) == []
-
-    def test_a_light_that_rounds_to_its_steps_has_the_last_word(
-        self, ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program,
-    ) -> None:
-        lines = bridge.count('was changed')
-        light.fake.steps = 1.0
-
-        [result] = parameters.set(brightness=33.3)
-
-        light.fake.steps = 0.0
-        assert result.successful
-        assert parameters.get('brightness') == [33.0]
-        all_is_done(ros)
-        assert bridge.count('was changed') == lines
-        assert len(light.commands(CONFIGURE)) == 1
-
-
-def test_two_who_change_the_light_do_not_fight(
-    ros: Ros, light: ServedLight, parameters: Parameters,
+def test_set_after_a_change_by_another_sender_keeps_that_change(
+    light: ServedLight, parameters: Parameters, events: Recorder,
 ) -> None:
     parameters.set(brightness=50.0)
     light.report(brightness=20.0)
     parameters.wait(brightness=20.0)
 
-    parameters.set(strobe_period=1.0)
+    parameters.set(strobe_duty_cycle=1.0)
 
-    assert parameters.get('brightness', 'strobe_period') == [20.0, 1.0]
+    assert parameters.get('brightness', 'strobe_duty_cycle') == [20.0, 1.0]
     assert light.fake.fields['brightness'] == 20.0

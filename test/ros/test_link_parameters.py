@@ -12,62 +12,47 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the parameters of the link do (DESIGN.md, 2)."""
+"""The effect of the parameters of the link, and of use_sim_time."""
 
-from pathlib import Path
 import re
 
-from illuminator_ros.mavlink.signing import ticks
-from illuminator_ros.mavlink.signing_files import TimestampStore
+from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from std_srvs.srv import SetBool
-from support.embedded import resting_bridge
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Temperature
 from support.light import Address, MavCmd, ON_OFF, params, ServedLight
-from support.ros import Parameters, Ros, running_bridge
+from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import CLOCK, pass_time_until
 
 INTERVAL = MavCmd.SET_MESSAGE_INTERVAL
 STATUS = 440.0
 
 
-def test_our_address_is_1_194_by_default(own_ros: Ros, port: int) -> None:
-    with running_bridge(own_ros.domain, port), ServedLight(port) as light:
-        light.wait_for(MavCmd.REQUEST_MESSAGE)
+@pytest.mark.parametrize(('given', 'address'), [
+    ({}, Address(1, 194)), ({'system_id': 7, 'component_id': 42}, Address(7, 42))])
+def test_bridge_sends_from_its_address_and_leaves_the_status_interval_alone(
+    own_ros: Ros, port: int, given: dict[str, int], address: Address,
+) -> None:
+    with running_bridge(own_ros.domain, port, **given), ServedLight(port) as light:
+        Parameters(own_ros).wait(brightness=100.0)
 
-        assert light.fake.heard_from == {Address(1, 194)}
-
-
-def test_our_address_is_what_system_id_and_component_id_say(own_ros: Ros, port: int) -> None:
-    with (running_bridge(own_ros.domain, port, system_id=7, component_id=42),
-          ServedLight(port) as light):
-        light.wait_for(MavCmd.REQUEST_MESSAGE)
-
-        assert light.fake.heard_from == {Address(7, 42)}
+        assert light.fake.heard_from == {address}
+        assert light.commands(INTERVAL) == []
 
 
-def test_status_interval_is_asked_for_in_microseconds(own_ros: Ros, port: int) -> None:
-    with running_bridge(own_ros.domain, port, status_interval=0.05), ServedLight(port) as light:
-        [command] = light.wait_for(INTERVAL)
-
-        assert params(command)[:2] == (STATUS, 50_000.0)
-
-
-def test_a_light_that_has_restarted_is_asked_again(own_ros: Ros, port: int) -> None:
+def test_status_interval_is_requested_in_microseconds_and_again_after_a_restart(
+    own_ros: Ros, port: int,
+) -> None:
     with (running_bridge(own_ros.domain, port, status_interval=0.05) as bridge,
           ServedLight(port) as light):
+        [command] = light.wait_for(INTERVAL)
+        assert params(command)[:2] == (STATUS, 50_000.0)
         Parameters(own_ros).wait(brightness=100.0)
 
         light.restart()
 
         bridge.wait_for('has restarted')
         light.wait_for(INTERVAL, 2)
-
-
-def test_the_light_s_own_interval_is_left_alone_by_default(own_ros: Ros, port: int) -> None:
-    with running_bridge(own_ros.domain, port), ServedLight(port) as light:
-        Parameters(own_ros).wait(brightness=100.0)
-
-        assert light.commands(INTERVAL) == []
 
 
 @pytest.mark.parametrize(('retries', 'text'), [(0, '(1 try, '), (1, '(2 tries, ')])
@@ -78,20 +63,16 @@ def test_command_retries_and_command_timeout_bound_the_wait(
           ServedLight(port) as light):
         Parameters(own_ros).wait(brightness=100.0)
         light.fake.results[ON_OFF] = None
-        call = own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+        call = own_ros.start_enable()
         for tries in range(1, retries + 2):
             light.wait_for(ON_OFF, tries)
             CLOCK.forward(0.1)
 
-        response = call.result()
-
-        assert not response.success
-        assert text in response.message
+        assert not call.result().success
+        assert text in call.result().message
 
 
-def test_heartbeat_timeout_is_the_silence_after_which_a_light_is_lost(
-    own_ros: Ros, port: int,
-) -> None:
+def test_light_is_lost_after_a_silence_of_heartbeat_timeout(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port, heartbeat_timeout=20) as bridge:
         with ServedLight(port):
             bridge.wait_for('connected')
@@ -104,16 +85,22 @@ def test_heartbeat_timeout_is_the_silence_after_which_a_light_is_lost(
         assert int(match[1]) >= 20
 
 
-def test_signing_goes_on_from_the_last_time_stamp_with_this_key(
-    domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv('ROS_HOME', str(tmp_path))
-    key = tmp_path / 'key'
-    key.write_text('correct horse')
-    key.chmod(0o600)
-    later = ticks(4e9)
-    TimestampStore(str(key), 'bridge 1/194').store(later, last=True)
+def test_simulated_time_without_a_clock_affects_stamps_only(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port, use_sim_time=True), ServedLight(port):
+        Parameters(own_ros).wait(brightness=100.0)
+        diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        temperature = own_ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
 
-    with resting_bridge(
-            domain, lambda: 0.0, signing_mode='sign', signing_key_file=str(key)) as process:
-        assert process.link._signing.timestamp == later
+        assert own_ros.enable().success
+        assert Parameters(own_ros).set(brightness=20)[0].successful
+        diagnostics.clear()
+        CLOCK.forward(1.0)
+        diagnostics.wait()
+        assert temperature.wait().header.stamp.sec == 0
+
+        clock = own_ros.node.create_publisher(Clock, '/clock', 10)
+        message = Clock()
+        message.clock.sec = 1234
+        timer = own_ros.node.create_timer(0.05, lambda: clock.publish(message))
+        temperature.wait(lambda message: message.header.stamp.sec == 1234)
+        timer.cancel()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A light that goes and comes back, and what a link carries besides (DESIGN.md, 3.4)."""
+"""Lights that go and return, components that are none, and frames that harm nothing."""
 
 from collections.abc import Iterator
 import random
@@ -21,8 +21,7 @@ import socket
 from illuminator_ros.mavlink.messages import heartbeat
 import pytest
 from std_msgs.msg import Float64
-from std_srvs.srv import SetBool
-from support.light import Address, ServedLight
+from support.light import Address, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until
@@ -32,143 +31,109 @@ AUTOPILOT = 2
 
 @pytest.fixture
 def bridge(own_ros: Ros, port: int) -> Iterator[Program]:
-    """Run a bridge that waits for a light for 10 s."""
+    """Run a bridge with a heartbeat_timeout of 10 s."""
     with running_bridge(own_ros.domain, port, heartbeat_timeout=10) as bridge:
         yield bridge
 
 
-def enable(ros: Ros) -> bool:
-    response = ros.call(SetBool, '/illuminator/enable', SetBool.Request(data=True))
-    return bool(response.success)
+def test_lost_light_that_returns_is_served_with_one_line_each_way(
+    own_ros: Ros, port: int, bridge: Program,
+) -> None:
+    light = ServedLight(port)
+    with light:
+        bridge.wait_for('light 1/243 connected')
+        uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
+        uptime.wait()
+    pass_time_until(lambda: bridge.count('light 1/243 lost: no heartbeat for 1'))
+    with light:
+        bridge.wait_for('light 1/243 connected', count=2)
+        uptime.clear()
+        uptime.wait(count=3)
+
+        assert own_ros.enable().success
+        assert Parameters(own_ros).set(brightness=31)[0].successful
+    assert (bridge.count('lost'), bridge.count('connected')) == (1, 2)
+    assert bridge.count('WARN') + bridge.count('ERROR') == 1
 
 
-class TestOutage:
-    def test_a_light_that_goes_and_comes_is_one_line_each_way(
-        self, own_ros: Ros, port: int, bridge: Program,
-    ) -> None:
-        light = ServedLight(port)
-        with light:
-            bridge.wait_for('light 1/243 connected')
-            uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
-            uptime.wait()
-        pass_time_until(lambda: bridge.count('light 1/243 lost: no heartbeat for 1'))
-        with light:
-            bridge.wait_for('light 1/243 connected', count=2)
-            uptime.clear()
-            uptime.wait(count=3)
+def test_light_that_was_lost_through_a_power_cycle_is_configured_again(
+    own_ros: Ros, port: int, bridge: Program,
+) -> None:
+    light = ServedLight(port)
+    with light:
+        Parameters(own_ros).wait(brightness=100.0)
+        assert Parameters(own_ros).set(brightness=31)[0].successful
+    pass_time_until(lambda: bridge.count('lost'))
+    light.fake.boot = CLOCK()
+    light.fake.fields['brightness'] = 100.0
+    with light:
+        bridge.wait_for('light 1/243 has restarted')
+        bridge.wait_for('light 1/243 configured')
 
-            assert enable(own_ros)
-            assert Parameters(own_ros).set(brightness=31)[0].successful
-        assert (bridge.count('lost'), bridge.count('connected')) == (1, 2)
-        assert bridge.count('WARN') + bridge.count('ERROR') == 1
-
-    def test_a_power_cycle_is_told_and_the_light_configured(
-        self, own_ros: Ros, port: int, bridge: Program,
-    ) -> None:
-        light = ServedLight(port)
-        with light:
-            assert Parameters(own_ros).wait(brightness=100.0) is None
-            assert Parameters(own_ros).set(brightness=31)[0].successful
-        pass_time_until(lambda: bridge.count('lost'))
-        light.fake.boot = CLOCK()
-        light.fake.fields['brightness'] = 100.0
-        with light:
-            bridge.wait_for('light 1/243 has restarted')
-            bridge.wait_for('light 1/243 configured')
-
-            assert light.fake.fields['brightness'] == 31.0
-            Parameters(own_ros).wait(brightness=31.0)
-
-    def test_an_outage_shorter_than_the_time_out_is_none(
-        self, own_ros: Ros, port: int, bridge: Program,
-    ) -> None:
-        light = ServedLight(port)
-        with light:
-            bridge.wait_for('connected')
-        CLOCK.forward(5.0)
-        with light:
-            uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
-            uptime.wait(count=3)
-
-            assert enable(own_ros)
-        assert (bridge.count('lost'), bridge.count('connected')) == (0, 1)
-
-    def test_a_service_that_waits_for_a_light_that_goes_is_answered(
-        self, own_ros: Ros, port: int, bridge: Program,
-    ) -> None:
-        with ServedLight(port) as light:
-            bridge.wait_for('connected')
-            light.fake.results[405] = None
-            call = own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
-            light.wait_for(405)
-
-        pass_time_until(lambda: call.answered)
-        response = call.result()
-
-        assert not response.success
-        assert response.message
+        assert light.fake.fields['brightness'] == 31.0
+        Parameters(own_ros).wait(brightness=31.0)
 
 
-class TestLink:
-    def test_a_port_in_use_is_one_line_until_it_is_free(
-        self, own_ros: Ros, port: int,
-    ) -> None:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as occupant:
-            occupant.bind(('127.0.0.1', port))
-            with running_bridge(own_ros.domain, port, until='link not open') as bridge:
-                # Several tries are made meanwhile; diagnostics come every second.
-                assert not enable(own_ros)
-                occupant.close()
-                bridge.wait_for('link open')
+def test_silence_shorter_than_the_timeout_is_not_a_loss(
+    own_ros: Ros, port: int, bridge: Program,
+) -> None:
+    light = ServedLight(port)
+    with light:
+        bridge.wait_for('connected')
+    CLOCK.forward(5.0)
+    with light:
+        own_ros.subscribe(Float64, '/illuminator/uptime').wait(count=3)
 
-                assert bridge.count('link not open') == 1
-
-    def test_garbage_does_no_harm(self, own_ros: Ros, port: int, bridge: Program) -> None:
-        noise = random.Random(1)
-        with (ServedLight(port) as light,
-              socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger):
-            bridge.wait_for('connected')
-            for size in range(1000):
-                stranger.sendto(b'\xfd' + noise.randbytes(size % 300), ('127.0.0.1', port))
-
-            assert enable(own_ros)
-            assert light.fake.fields['enable'] == 1
+        assert own_ros.enable().success
+    assert (bridge.count('lost'), bridge.count('connected')) == (0, 1)
 
 
-class TestWhatIsALight:
+def test_request_to_a_light_that_is_lost_meanwhile_is_answered(
+    own_ros: Ros, port: int, bridge: Program,
+) -> None:
+    with ServedLight(port) as light:
+        bridge.wait_for('connected')
+        light.fake.results[ON_OFF] = None
+        call = own_ros.start_enable()
+        light.wait_for(ON_OFF)
 
-    def test_one_that_sends_only_heartbeats(self, port: int, bridge: Program) -> None:
-        light = ServedLight(port, stream=0.0)
-        light.fake.pushes = False
-        light.fake.answers.clear()
-        with light:
-            bridge.wait_for('light 1/243 connected')
+    pass_time_until(lambda: call.answered)
 
-    def test_one_that_sends_only_statuses(
-        self, own_ros: Ros, port: int, bridge: Program,
-    ) -> None:
-        with ServedLight(port, source=Address(1, 1), heartbeat_type=None):
-            bridge.wait_for('light 1/1 connected')
+    assert not call.result().success
+    assert call.result().message
 
-            assert enable(own_ros)
 
-    def test_a_component_that_is_none_is_not_served(
-        self, own_ros: Ros, port: int, bridge: Program,
-    ) -> None:
-        with ServedLight(port) as light:
-            light.send(heartbeat(AUTOPILOT), Address(1, 1))
-            bridge.wait_for('light 1/243 connected')
+def test_port_in_use_is_one_line_until_it_is_free(own_ros: Ros, port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as occupant:
+        occupant.bind(('127.0.0.1', port))
+        with running_bridge(own_ros.domain, port, until='link not open') as bridge:
+            assert not own_ros.enable().success
+            occupant.close()
+            bridge.wait_for('link open')
 
-            assert enable(own_ros)
-        assert '1/1 ' not in bridge.log
+            assert bridge.count('link not open') == 1
 
-    def test_the_target_parameters_choose_one(self, own_ros: Ros, port: int) -> None:
-        with (running_bridge(own_ros.domain, port, target_component=244) as bridge,
-              ServedLight(port) as other, ServedLight(port, source=Address(1, 244)) as chosen):
-            bridge.wait_for('light 1/244 connected')
-            bridge.wait_for('light 1/243 connected')
 
-            assert enable(own_ros)
+def test_garbage_from_a_stranger_does_not_disturb_the_light(
+    own_ros: Ros, port: int, bridge: Program,
+) -> None:
+    noise = random.Random(1)
+    with (ServedLight(port) as light,
+          socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger):
+        bridge.wait_for('connected')
+        for size in range(1000):
+            stranger.sendto(b'\xfd' + noise.randbytes(size % 300), ('127.0.0.1', port))
 
-            assert len(chosen.commands(405)) == 1
-            assert other.commands(405) == []
+        assert own_ros.enable().success
+        assert light.fake.fields['enable'] == 1
+
+
+def test_component_that_sends_only_statuses_is_a_light_and_an_autopilot_is_not(
+    own_ros: Ros, port: int, bridge: Program,
+) -> None:
+    with ServedLight(port, source=Address(1, 2), heartbeat_type=None) as light:
+        light.send(heartbeat(AUTOPILOT), Address(1, 1))
+        bridge.wait_for('light 1/2 connected')
+
+        assert own_ros.enable().success
+    assert '1/1 ' not in bridge.log

@@ -12,78 +12,46 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the node publishes of each status (DESIGN.md, 2)."""
+"""The topics that the node publishes from each ILLUMINATOR_STATUS."""
 
 import math
+from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
-from support.embedded import resting_bridge
-from support.light import ServedLight
+from support.light import ON_OFF, ServedLight
 from support.recording import Recorder
-from support.ros import Ros, running_bridge
-from support.slow import pass_time_until
+from support.ros import Parameters, Ros, running_bridge, STREAM
+from support.slow import CLOCK, pass_time_until
 
 STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
-    'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64,
-}
-STATE = (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL, 1)
-STREAM = (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE, 10)
-
-
-QUALITIES = [
-    ('/illuminator/connected', 'std_msgs/msg/Bool', STATE),
-    ('/illuminator/enabled', 'std_msgs/msg/Bool', STATE),
-    ('/illuminator/brightness', 'std_msgs/msg/Float32', STATE),
-    ('/illuminator/mode', 'std_msgs/msg/String', STATE),
-    ('/illuminator/strobe_period', 'std_msgs/msg/Float32', STATE),
-    ('/illuminator/strobe_duty_cycle', 'std_msgs/msg/Float32', STATE),
-    ('/illuminator/error_flags', 'std_msgs/msg/UInt32', STATE),
-    ('/illuminator/uptime', 'std_msgs/msg/Float64', STATE),
-    ('/illuminator/temperature', 'sensor_msgs/msg/Temperature', STREAM),
-    ('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray', STREAM),
-]
-
-
-@pytest.mark.parametrize(('topic', 'type_', 'quality'), QUALITIES)
-def test_type_and_quality_of_service(
-    ros: Ros, light: ServedLight, topic: str, type_: str, quality: tuple[object, ...],
-) -> None:
-    ros.find_publisher(topic)
-    [info] = ros.node.get_publishers_info_by_topic(topic)
-    profile = info.qos_profile
-
-    assert info.topic_type == type_
-    assert (profile.reliability, profile.durability) == quality[:2]
-
-
-def test_the_depths(domain: int) -> None:
-    """Fast DDS does not tell them to others."""
-    with resting_bridge(domain, lambda: 0.0) as process:
-        published = {publisher.topic_name: publisher.qos_profile
-                     for publisher in process.node.publishers}
-
-    assert {topic: (published[topic].history, published[topic].depth)
-            for topic, _, _ in QUALITIES} == {
-        topic: (HistoryPolicy.KEEP_LAST, quality[2]) for topic, _, quality in QUALITIES}
+    'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64}
+THERMISTOR_FAILURE = 4
 
 
 @pytest.fixture(scope='module')
-def uptimes(ros: Ros, shared_bridge: object) -> Recorder:
-    """Return the topic that is published last of each status."""
-    return ros.subscribe(Float64, '/illuminator/uptime')
+def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
+    """Return the topics of the module's bridge by their names."""
+    found = {name: ros.subscribe(type_, f'/illuminator/{name}')
+             for name, type_ in STATUS_TOPICS.items()}
+    found['temperature'] = ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
+    return found
 
 
 @pytest.fixture
-def quiet(light: ServedLight, uptimes: Recorder) -> ServedLight:
-    """Return the light, which sends a status only when a test says so."""
+def topics(light: ServedLight, recorders: dict[str, Recorder]) -> dict[str, Recorder]:
+    """Return empty recorders of a light that sends a status only when a test says so."""
     light.fake.stream = 0.0
     last = light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0,
-                        strobe_duty_cycle=0.0, error_status=0)
-    uptimes.wait(lambda message: message.data >= last)
-    return light
+                        strobe_duty_cycle=0.0, error_status=0, temp_c=25.0)
+    recorders['uptime'].wait(lambda message: message.data >= last)
+    for recorder in recorders.values():
+        recorder.clear()
+    return recorders
 
 
 @pytest.mark.parametrize(('topic', 'field', 'sent', 'published'), [
@@ -95,104 +63,150 @@ def quiet(light: ServedLight, uptimes: Recorder) -> ServedLight:
     ('mode', 'mode', 77, 'unknown'),
     ('strobe_period', 'strobe_period', 0.5, 0.5),
     ('strobe_duty_cycle', 'strobe_duty_cycle', 25.0, 25.0),
-    ('error_flags', 'error_status', 5, 5),
-    ('error_flags', 'error_status', 0x80000002, 0x80000002),
+    ('error_flags', 'error_status', 0x80000005, 0x80000005),
 ])
-def test_a_status_is_published_as_sent(
-    ros: Ros, quiet: ServedLight, topic: str, field: str, sent: float, published: object,
+def test_status_field_is_published_as_sent(
+    light: ServedLight, topics: dict[str, Recorder], topic: str, field: str, sent: float,
+    published: object,
 ) -> None:
-    recorder = ros.subscribe(STATUS_TOPICS[topic], f'/illuminator/{topic}')
-    recorder.wait()
-    recorder.clear()
+    light.report(**{field: sent})
 
-    quiet.report(**{field: sent})
-
-    assert recorder.wait().data == published
-
-
-def test_the_uptime_is_in_seconds(ros: Ros, quiet: ServedLight) -> None:
-    recorder = ros.subscribe(Float64, '/illuminator/uptime')
-    recorder.wait()
-    recorder.clear()
-    before = quiet.do(quiet.fake.uptime_ms)
-
-    quiet.report()
-
-    assert before / 1000 <= recorder.wait().data <= quiet.do(quiet.fake.uptime_ms) / 1000
+    assert topics[topic].wait().data == published
 
 
 @pytest.mark.parametrize('topic', STATUS_TOPICS)
-def test_a_late_subscriber_gets_the_last_value(
-    ros: Ros, quiet: ServedLight, topic: str,
+def test_status_is_published_once_on_each_topic_and_kept_for_late_subscribers(
+    ros: Ros, light: ServedLight, topics: dict[str, Recorder], topic: str,
 ) -> None:
-    recorder = ros.subscribe(STATUS_TOPICS[topic], f'/illuminator/{topic}')
+    for count in range(1, 5):
+        uptime = light.report()
+        topics[topic].wait(count=count)
+    late = ros.subscribe(STATUS_TOPICS[topic], f'/illuminator/{topic}')
 
-    recorder.wait()
-
-    assert len(recorder.messages) == 1
-
-
-@pytest.mark.parametrize('topic', STATUS_TOPICS)
-def test_each_status_is_published_once_changed_or_not(
-    ros: Ros, quiet: ServedLight, topic: str,
-) -> None:
-    recorder = ros.subscribe(STATUS_TOPICS[topic], f'/illuminator/{topic}')
-    recorder.wait()
-
-    for count in range(2, 6):
-        quiet.report()
-        recorder.wait(count=count)
-
-    assert len(recorder.messages) == 5
+    assert late.wait() == topics[topic].messages[-1]
+    assert (len(topics[topic].messages), len(late.messages)) == (4, 1)
+    assert topic != 'uptime' or late.wait().data == pytest.approx(uptime)
 
 
-@pytest.mark.parametrize(('topic', 'field', 'sent'), [
-    ('enabled', 'enable', 2),
-    ('brightness', 'brightness', math.nan),
-    ('brightness', 'brightness', math.inf),
-    ('brightness', 'brightness', 200.0),
-    ('brightness', 'brightness', -1.0),
-    ('strobe_period', 'strobe_period', math.nan),
-    ('strobe_period', 'strobe_period', -0.1),
-    ('strobe_duty_cycle', 'strobe_duty_cycle', math.nan),
-    ('strobe_duty_cycle', 'strobe_duty_cycle', 101.0),
+@pytest.mark.parametrize(('topic', 'field', 'values'), [
+    ('enabled', 'enable', (2,)),
+    ('brightness', 'brightness', (math.nan, math.inf, 200.0, -1.0)),
+    ('strobe_period', 'strobe_period', (math.nan, -0.1)),
+    ('strobe_duty_cycle', 'strobe_duty_cycle', (math.nan, 101.0)),
+    ('temperature', 'temp_c', (math.nan, math.inf, -300.0, 1e6)),
 ])
-def test_what_cannot_be_true_is_not_published_and_the_rest_is(
-    ros: Ros, quiet: ServedLight, topic: str, field: str, sent: float,
+def test_implausible_value_is_not_published_while_the_others_are(
+    light: ServedLight, topics: dict[str, Recorder], topic: str, field: str,
+    values: tuple[float, ...],
 ) -> None:
-    recorder = ros.subscribe(STATUS_TOPICS[topic], f'/illuminator/{topic}')
-    uptime = ros.subscribe(Float64, '/illuminator/uptime')
-    recorder.wait()
-    uptime.wait()
-    good = quiet.fake.fields[field]
+    good = light.fake.fields[field]
 
-    quiet.report(**{field: sent})
-    uptime.wait(count=2)
-    quiet.report(**{field: good})
-    recorder.wait(count=2)
+    for count, value in enumerate(values, 1):
+        light.report(**{field: value})
+        topics['uptime'].wait(count=count)
+    light.report(**{field: good})
+    last = topics[topic].wait()
 
-    assert recorder.values[0] == recorder.values[1] == pytest.approx(good)
-    assert len(recorder.values) == 2
+    assert (last.temperature if topic == 'temperature' else last.data) == good
+    assert len(topics[topic].messages) == 1
 
 
-class TestConnected:
+def test_temperature_is_stamped_at_reception_in_the_default_frame(
+    ros: Ros, light: ServedLight, topics: dict[str, Recorder],
+) -> None:
+    before = ros.node.get_clock().now().nanoseconds
+    light.report(temp_c=41.5)
+    message = topics['temperature'].wait()
+    after = ros.node.get_clock().now().nanoseconds
 
-    def test_it_is_false_before_a_light_is_heard(self, own_ros: Ros, port: int) -> None:
-        with running_bridge(own_ros.domain, port):
-            recorder = own_ros.subscribe(Bool, '/illuminator/connected')
+    stamp = message.header.stamp
+    assert before <= stamp.sec * 10**9 + stamp.nanosec <= after
+    assert (message.temperature, message.variance, message.header.frame_id) == (
+        41.5, 0.0, 'illuminator')
 
-            assert recorder.wait().data is False
 
-    def test_it_is_published_on_change_only(self, own_ros: Ros, port: int) -> None:
-        with running_bridge(own_ros.domain, port):
-            recorder = own_ros.subscribe(Bool, '/illuminator/connected')
-            uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
-            recorder.wait()
-            with ServedLight(port) as light:
-                uptime.wait(count=3)
-                light.fake.silent = True
-                pass_time_until(lambda: recorder.values.count(False) == 2)
-                light.fake.silent = False
-                uptime.wait(count=6)
+def test_temperature_of_a_failed_thermistor_is_not_published_and_zero_degrees_are(
+    light: ServedLight, topics: dict[str, Recorder],
+) -> None:
+    light.report(temp_c=30.0, error_status=THERMISTOR_FAILURE)
+    light.report(temp_c=0.0, error_status=0)
 
-            assert recorder.values == [False, True, False, True]
+    assert topics['temperature'].wait().temperature == 0.0
+
+
+def test_light_that_reports_zero_degrees_from_the_start_has_no_temperature(
+    own_ros: Ros, port: int,
+) -> None:
+    with (running_bridge(own_ros.domain, port, frame_id='belly') as bridge,
+          ServedLight(port, stream=0.0, temp_c=0.0) as light):
+        bridge.wait_for('connected')
+        recorder = own_ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
+        uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
+        light.report()
+        uptime.wait()
+
+        light.report(temp_c=20.0)
+
+        assert recorder.wait().temperature == 20.0
+        assert [message.header.frame_id for message in recorder.messages] == ['belly']
+
+
+def test_connected_is_false_before_a_light_is_heard_and_published_on_change_only(
+    own_ros: Ros, port: int,
+) -> None:
+    with running_bridge(own_ros.domain, port):
+        recorder = own_ros.subscribe(Bool, '/illuminator/connected')
+        uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
+        assert recorder.wait().data is False
+        with ServedLight(port) as light:
+            uptime.wait(count=3)
+            light.fake.silent = True
+            pass_time_until(lambda: recorder.values.count(False) == 2)
+            light.fake.silent = False
+            uptime.wait(count=6)
+
+        assert recorder.values == [False, True, False, True]
+
+
+@pytest.mark.parametrize('topic', [*STATUS_TOPICS, 'connected', 'temperature'])
+def test_state_topics_are_latched_and_streams_are_not(
+    ros: Ros, light: ServedLight, topic: str,
+) -> None:
+    ros.find_publisher(f'/illuminator/{topic}')
+    [info] = ros.node.get_publishers_info_by_topic(f'/illuminator/{topic}')
+
+    assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+    assert info.qos_profile.durability is (
+        DurabilityPolicy.VOLATILE if topic == 'temperature' else DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+@pytest.mark.parametrize(('arguments', 'node'), [
+    (('-r', '__ns:=/uav1', '-r', '__node:=spot'), '/uav1/spot'),
+    (('-r', '~/connected:=/lamp/alive', '-r', '/diagnostics:=/uav1/diagnostics'),
+     '/illuminator'),
+])
+def test_all_names_follow_namespace_node_name_and_remapping(
+    own_ros: Ros, port: int, arguments: tuple[str, ...], node: str,
+) -> None:
+    def foreign() -> set[str]:
+        graph: Any = own_ros.node
+        return {name for name, _ in [*graph.get_topic_names_and_types(),
+                                     *graph.get_service_names_and_types()]
+                if not name.startswith((f'{node}/', '/tester/'))}
+
+    remapped = {rule.rpartition(':=')[2] for rule in arguments if rule[:2] in ('~/', '/d')}
+    diagnostics = next(iter(name for name in remapped if 'diag' in name), '/diagnostics')
+    with running_bridge(own_ros.domain, port, *arguments), ServedLight(port) as light:
+        Parameters(own_ros, node).wait(mode='internal_control')
+        assert own_ros.enable(node=node).success
+        own_ros.subscribe(Bool, f'{node}/enabled').wait_value(True)
+        assert Parameters(own_ros, node).set(brightness=20)[0].successful
+        own_ros.publish(Bool, f'{node}/cmd/enable', False)
+        light.wait_for(ON_OFF, 2)
+        recorder = own_ros.subscribe(DiagnosticArray, diagnostics, STREAM)
+        CLOCK.forward(1.0)
+        array = recorder.wait(lambda array: len(array.status) == 2)
+
+        name = node.rpartition('/')[2]
+        assert [status.name for status in array.status] == [f'{name}: link', f'{name}: lamp']
+        assert foreign() == {'/parameter_events', '/rosout', diagnostics, *remapped}

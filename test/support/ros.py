@@ -33,7 +33,7 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 from support.light import eventually
 from support.ports import claimed_domain
 from support.processes import ended, Program, python, slow_python
@@ -140,9 +140,21 @@ class Ros(SpunNode):
         """Call a service, once it is there, without waiting for the answer."""
         return Call(self._client(type_, service).call_async(request))
 
+    def start_enable(self, on: bool = True, node: str = '/illuminator') -> Call:
+        """Begin to switch a light on or off."""
+        return self.start(SetBool, f'{node}/enable', SetBool.Request(data=on))
+
+    def enable(self, on: bool = True, node: str = '/illuminator') -> SetBool.Response:
+        """Switch a light on or off and return the answer."""
+        return self.start_enable(on, node).result()
+
+    def refresh(self, node: str = '/illuminator') -> Trigger.Response:
+        """Have a light report again and return the answer."""
+        return self.call(Trigger, f'{node}/refresh', Trigger.Request())
+
     def catch_up(self, node: str = '/illuminator') -> None:
         """Wait until a node has taken all that its light has sent until now."""
-        answer = self.call(Trigger, f'{node}/refresh', Trigger.Request())
+        answer = self.refresh(node)
         assert 'ILLUMINATOR_STATUS: received' in answer.message, answer.message
 
     def outlast(self, seconds: float, others: Iterable[str]) -> None:
