@@ -33,7 +33,7 @@ unit: environment
 
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .
-	@$(PYTHON_IN_VENV) -m mypy -p illuminator_ros
+	@$(PYTHON_IN_VENV) -m mypy
 
 lint: check
 	@$(PYTHON_IN_VENV) -m pytest -q test/lint

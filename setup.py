@@ -13,6 +13,7 @@
 # limitations under the License.
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
 
@@ -23,6 +24,10 @@ def files(folder: str) -> list[str]:
     """Return the files that lie in a folder."""
     return sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
 
+
+# A wheel's executables go on the PATH, where "bridge" is iproute2's. colcon runs "install" or
+# "develop", which put them into lib/illuminator_ros (setup.cfg), where "ros2 run" looks.
+prefix = 'illuminator-' if {'bdist_wheel', 'dist_info', 'editable_wheel'} & {*sys.argv} else ''
 
 setup(
     name=package_name,
@@ -55,10 +60,8 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'bridge = illuminator_ros.cli.bridge:main',
-            'conformance = illuminator_ros.cli.conformance:main',
-            'monitor = illuminator_ros.cli.monitor:main',
-            'simulator = illuminator_ros.cli.simulator:main',
+            f'{prefix}{name} = illuminator_ros.cli.{name}:main'
+            for name in ('bridge', 'conformance', 'monitor', 'simulator')
         ],
     },
 )

@@ -63,11 +63,12 @@ def answers(bench: Bench) -> None:
         bench.take('a set is answered, by a light that does not do it', '3.1', 0.9,
                    [bench.set(brightness=float(n)) for n in range(bench.count)])
     with bench.bridge(free_port()):
-        for name, ask in {
+        asks: dict[str, Callable[[], float]] = {
             '~/enable': lambda: bench.call(SetBool, 'enable', ON),
             '~/refresh': lambda: bench.call(Trigger, 'refresh', Trigger.Request()),
             'a set': lambda: bench.set(brightness=50.0),
-        }.items():
+        }
+        for name, ask in asks.items():
             bench.take(f'{name} fails at once without a light', '3.1', 0.3,
                        [ask() for _ in range(bench.count)])
 

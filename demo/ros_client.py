@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
 import threading
 from typing import Any
 
@@ -50,8 +51,7 @@ class RosClient:
         for topic, type_ in TOPICS.items():
             self._node.create_subscription(
                 type_, f'/{node_name}/{topic}',
-                lambda message, topic=topic: self._note(self._topics, topic, message.data),
-                LATCHED)
+                functools.partial(self._note_topic, topic), LATCHED)
         self._node.create_subscription(
             DiagnosticArray, '/diagnostics', self._note_diagnostics, 10)
         self._executor = SingleThreadedExecutor()
@@ -63,6 +63,9 @@ class RosClient:
         with self._changed:
             into[key] = value
             self._changed.notify_all()
+
+    def _note_topic(self, topic: str, message: Any) -> None:
+        self._note(self._topics, topic, message.data)
 
     def _note_diagnostics(self, array: Any) -> None:
         for status in array.status:

