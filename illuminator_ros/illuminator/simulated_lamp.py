@@ -28,7 +28,7 @@ from .thermal import ThermalModel
 from ..mavlink.messages import ComponentInformationBasic, IlluminatorStatus
 
 
-class ExtendedIlluminatorStatus(IlluminatorStatus):  # type: ignore[misc, valid-type]
+class ExtendedIlluminatorStatus(IlluminatorStatus):  # type: ignore[misc]
     """
     A vendor's ILLUMINATOR_STATUS of 38 bytes, to be sent.
 
