@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Several lights on one link: a node for each, and none waits for another (DESIGN.md, 3.6)."""
+"""Several lights on one link: a node for each, and none waits for another."""
 
 from collections.abc import Iterator
 import contextlib
@@ -20,7 +20,7 @@ import contextlib
 import pytest
 from rclpy.node import NodeNameNonExistentError
 from std_msgs.msg import Bool, Float32
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 from support.light import Address, eventually, MavResult, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
@@ -29,17 +29,16 @@ from support.slow import pass_time_until
 
 # s; the default.
 HEARTBEAT_TIMEOUT = 3.0
-# The first one is that which the target selects, whoever is heard first.
+# The first node serves the light that the target selects, in whatever order they are heard.
 NODES = {'/illuminator': Address(1, 244), '/illuminator_1_243': Address(1, 243),
          '/belly': Address(7, 243)}
-FURTHER = [node for node in NODES if node != '/illuminator']
-FLEET_ONLY = {'/enable_all', '/cmd/enable_all'}
+FOR_ALL_LIGHTS = {'/enable_all', '/cmd/enable_all'}
 
-Fleet = dict[str, ServedLight]
+Group = dict[str, ServedLight]
 
 
 @pytest.fixture(scope='module')
-def fleet(domain: int) -> Iterator[tuple[Program, Fleet]]:
+def group(domain: int) -> Iterator[tuple[Program, Group]]:
     """Run a bridge and three lights."""
     port = free_port()
     with contextlib.ExitStack() as stack:
@@ -52,22 +51,18 @@ def fleet(domain: int) -> Iterator[tuple[Program, Fleet]]:
 
 
 @pytest.fixture
-def lights(fleet: tuple[Program, Fleet]) -> Iterator[Fleet]:
+def lights(group: tuple[Program, Group]) -> Iterator[Group]:
     """Return the lights by their nodes, all off and obedient, which a test may change."""
-    for light in fleet[1].values():
+    for light in group[1].values():
         light.report(enable=0, brightness=100.0)
         light.forget()
-    yield fleet[1]
-    for light in fleet[1].values():
+    yield group[1]
+    for light in group[1].values():
         light.behave()
 
 
-def enable(node: str, ros: Ros) -> SetBool.Response:
-    return ros.call(SetBool, f'{node}/enable', SetBool.Request(data=True))
-
-
 def interface(ros: Ros, node: str) -> set[tuple[str, str]]:
-    """Return names and types of what a node offers, without its own name; none before it is."""
+    """Return names and types of a node's topics and services, without the node's name."""
     graph, name = ros.node, node.lstrip('/')
     try:
         found = [*graph.get_publisher_names_and_types_by_node(name, '/'),
@@ -78,94 +73,74 @@ def interface(ros: Ros, node: str) -> set[tuple[str, str]]:
     return {(topic.removeprefix(node), types[0]) for topic, types in found}
 
 
-def test_names_are_from_ids_or_from_the_parameter(ros: Ros, lights: Fleet) -> None:
-    eventually(lambda: {*NODES} <= {f'/{name}' for name in ros.node.get_node_names()})
-
-
-@pytest.mark.parametrize('node', FURTHER)
-def test_a_further_light_has_all_that_the_first_one_has_but_what_is_for_all(
-    ros: Ros, lights: Fleet, node: str,
+@pytest.mark.parametrize('node', [node for node in NODES if node != '/illuminator'])
+def test_further_light_has_the_interface_of_the_first_one_but_for_the_services_for_all(
+    ros: Ros, lights: Group, node: str,
 ) -> None:
     def missing() -> set[str]:
         return {name for name, _ in interface(ros, '/illuminator') ^ interface(ros, node)}
 
-    eventually(lambda: len(interface(ros, '/illuminator')) > 20 and missing() == FLEET_ONLY)
+    eventually(
+        lambda: len(interface(ros, '/illuminator')) > 20 and missing() == FOR_ALL_LIGHTS)
 
 
 @pytest.mark.parametrize('node', NODES)
-def test_each_node_commands_its_own_light_only(ros: Ros, lights: Fleet, node: str) -> None:
-    assert enable(node, ros).success
+def test_node_commands_its_own_light_only(ros: Ros, lights: Group, node: str) -> None:
+    assert ros.enable(node=node).success
     assert [name for name, light in lights.items() if light.fake.fields['enable']] == [node]
     assert [name for name, light in lights.items() if light.commands(ON_OFF)] == [node]
 
 
-def test_each_node_shows_its_own_light(ros: Ros, lights: Fleet) -> None:
+def test_nodes_show_and_set_their_own_lights(ros: Ros, lights: Group) -> None:
     for number, light in enumerate(lights.values()):
         light.report(brightness=10.0 * (number + 1))
     for number, node in enumerate(lights):
         ros.subscribe(Float32, f'{node}/brightness').wait_value(10.0 * (number + 1))
         Parameters(ros, node).wait(brightness=10.0 * (number + 1))
-
-
-def test_each_node_sets_its_own_light(ros: Ros, lights: Fleet) -> None:
     for number, node in enumerate(lights):
         assert Parameters(ros, node).set(brightness=20.0 + number)[0].successful
     assert [light.fake.fields['brightness'] for light in lights.values()] == [20.0, 21.0, 22.0]
 
 
 @pytest.mark.parametrize('silent', NODES)
-def test_while_one_light_is_silent_the_others_answer(
-    ros: Ros, lights: Fleet, silent: str,
+def test_services_parameters_and_topics_of_other_lights_go_on_while_one_is_silent(
+    ros: Ros, lights: Group, silent: str,
 ) -> None:
     lights[silent].fake.results[ON_OFF] = None
-    waiting = ros.start(SetBool, f'{silent}/enable', SetBool.Request(data=True))
+    waiting = ros.start_enable(node=silent)
     lights[silent].wait_for(ON_OFF)
 
     for node in NODES:
-        assert node == silent or enable(node, ros).success
+        if node != silent:
+            assert ros.enable(node=node).success
+            assert Parameters(ros, node).set(brightness=33.0)[0].successful
+            ros.subscribe(Bool, f'{node}/enabled').wait_value(True)
 
     assert not waiting.answered
     lights[silent].acknowledge(ON_OFF, MavResult.FAILED, source=NODES[silent])
     assert 'MAV_RESULT_FAILED' in waiting.result().message
 
 
-def test_while_one_light_is_silent_parameters_and_topics_of_another_go_on(
-    ros: Ros, lights: Fleet,
-) -> None:
-    lights['/illuminator'].fake.results[ON_OFF] = None
-    enabled = ros.subscribe(Bool, '/belly/enabled')
-    waiting = ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
-    lights['/illuminator'].wait_for(ON_OFF)
-    enabled.clear()
-
-    assert Parameters(ros, '/belly').set(brightness=33.0)[0].successful
-    enabled.wait_value(False)
-
-    assert not waiting.answered
-    lights['/illuminator'].acknowledge(ON_OFF, MavResult.FAILED, source=NODES['/illuminator'])
-    waiting.result()
-
-
 @pytest.mark.parametrize('node', NODES)
-def test_a_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
-    ros: Ros, fleet: tuple[Program, Fleet], lights: Fleet, node: str,
+def test_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
+    ros: Ros, group: tuple[Program, Group], lights: Group, node: str,
 ) -> None:
     connected = ros.subscribe(Bool, f'{node}/connected')
     connected.wait_value(True)
     connected.clear()
-    served = fleet[0].count('is served by')
+    served = group[0].count('is served by')
 
     lights[node].vanish()
     ros.outlast(HEARTBEAT_TIMEOUT, [other for other in NODES if other != node])
     connected.wait_value(False)
-    assert f'light {NODES[node]} is lost' in enable(node, ros).message
-    assert all(enable(other, ros).success for other in NODES if other != node)
+    assert f'light {NODES[node]} is lost' in ros.enable(node=node).message
+    assert all(ros.enable(node=other).success for other in NODES if other != node)
 
     lights[node].serve()
     connected.wait_value(True)
-    assert enable(node, ros).success
+    assert ros.enable(node=node).success
     refreshed = ros.start(Trigger, f'{node}/refresh', Trigger.Request())
-    # A status that was asked for when it had gone already is first asked for once more.
+    # The first request for a status may have been lost with the light.
     pass_time_until(lambda: refreshed.answered, step=0.1)
     assert refreshed.result().success
-    assert fleet[0].count('is served by') == served
+    assert group[0].count('is served by') == served

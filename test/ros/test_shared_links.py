@@ -1,0 +1,129 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Two bridges on one link, and two lights behind one component."""
+
+from collections.abc import Callable, Iterator
+import contextlib
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from illuminator_ros.mavlink.url import parse_url
+import pytest
+from std_msgs.msg import Bool
+from support.fake_light import FakeLight
+from support.light import Address
+from support.ports import free_port
+from support.processes import Program
+from support.relay import Relay
+from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
+from support.shared_address import SharedAddress
+from support.slow import CLOCK, pass_time_until, SlowLink, SPEED
+
+CLASH = 'another sender uses our address 1/194'
+SHARED = 'several lights answer as 1/1: their statuses contradict one another'
+
+
+def says(text: str, name: str, level: bytes) -> Callable[[DiagnosticArray], bool]:
+    """Return a condition for arrays: a status has this level and contains this text."""
+    return lambda array: any(
+        status.name == name and status.level == level and text in status.message
+        for status in array.status)
+
+
+def test_two_bridges_of_different_addresses_share_the_lights_and_do_not_clash(
+    own_ros: Ros,
+) -> None:
+    port = free_port()
+    url = f'udpin://127.0.0.1:{port}'
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(running_simulator(url, '--count', '2'))
+        for name, component in (('first', 194), ('second', 195)):
+            bridge = stack.enter_context(running_bridge(
+                own_ros.domain, port, '-r', f'__node:={name}', component_id=component,
+                connection_url=url.replace('udpin', 'udpout'), target_component=243))
+            bridge.wait_for('connected', count=2)
+        arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+
+        first, second = (Parameters(own_ros, f'/{name}') for name in ('first', 'second'))
+        first.wait(brightness=100.0)
+        assert first.set(brightness=40.0)[0].successful
+        second.wait(brightness=40.0)
+        assert second.set(brightness=70.0)[0].successful
+        first.wait(brightness=70.0)
+        calls = [own_ros.start_enable(node=f'/{node}')
+                 for node in ('first', 'second', 'first_1_244', 'second_1_244')]
+        assert all(call.result().success for call in calls)
+
+        for count in (1, 2, 3):
+            CLOCK.forward(1.0)
+            for name in ('first', 'second'):
+                arrays.wait(lambda array, name=name: array.status[0].name == f'{name}: link',
+                            count=count)
+        assert not any(CLASH in array.status[0].message for array in arrays.messages)
+
+
+def test_two_bridges_of_one_address_both_report_the_clash(own_ros: Ros) -> None:
+    relay = Relay()
+    relay.start()
+    with contextlib.ExitStack() as stack:
+        stack.callback(relay.stop)
+        for name, port in (('first', relay.near_port), ('second', relay.far_port)):
+            stack.enter_context(running_bridge(
+                own_ros.domain, port, '-r', f'__node:={name}',
+                connection_url=f'udpout://127.0.0.1:{port}'))
+        arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        for name in ('first', 'second'):
+            clash = says(CLASH, f'{name}: link', DiagnosticStatus.ERROR)
+            pass_time_until(lambda clash=clash: any(map(clash, list(arrays.messages))))
+
+
+@pytest.fixture(scope='module')
+def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
+    """Run a bridge and an autopilot with two lights, one on and one off."""
+    port = free_port()
+    url = f'udpout://127.0.0.1:{port}'
+    lights = SharedAddress(
+        FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=100.0),
+        FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, enable=1,
+                  brightness=40.0))
+    with running_bridge(domain, port) as bridge:
+        link = SlowLink(parse_url(url), lights, label=url)
+        link.start()
+        bridge.wait_for('several lights answer as 1/1: parameters stay as they are')
+        yield bridge, lights
+        link.stop()
+
+
+def test_two_lights_at_one_address_are_a_warning_and_topics_show_each_status(
+    ros: Ros, contradiction: tuple[Program, SharedAddress],
+) -> None:
+    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+    events = Parameters(ros).events()
+    enabled = ros.subscribe(Bool, '/illuminator/enabled', STREAM)
+
+    CLOCK.forward(1.0)
+    recorder.wait(says(SHARED, 'illuminator: lamp', DiagnosticStatus.WARN))
+    enabled.wait(count=30)
+
+    assert set(enabled.values) == {False, True}
+    assert events.messages == []
+    assert contradiction[0].count('was changed') <= 1
+
+
+def test_set_reaches_both_lights_at_one_address_and_is_shown(
+    ros: Ros, contradiction: tuple[Program, SharedAddress],
+) -> None:
+    assert Parameters(ros).set(brightness=60.0)[0].successful
+    assert [light.fields['brightness'] for light in contradiction[1].lights] == [60.0, 60.0]
+    assert Parameters(ros).get('brightness') == [60.0]
