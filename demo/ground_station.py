@@ -20,8 +20,7 @@ import math
 import threading
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, CommandResult
-from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.command import Command, CommandResult, CommandSender
 from illuminator_ros.mavlink.component import Endpoint, Heartbeat
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address, CommandAck, MavCmd

@@ -24,7 +24,7 @@ from .events import AnyLightEvent, ClientSnapshot, LightFound
 from .identity import Identity
 from .light import Light, Settings
 from .model import Status
-from ..mavlink.command_sender import CommandSender
+from ..mavlink.command import CommandSender
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (
     Address,

@@ -91,7 +91,7 @@ class Identification:
         """
         if self._command is not None:
             self._gives_way = True
-            self._light.sender.withdraw(self._command, now)
+            self._light.sender.cancel(self._command, now)
             self._gives_way = False
 
     def received(self, identity: Identity, now: float) -> None:
@@ -108,10 +108,10 @@ class Identification:
             return
         if outcome.accepted:
             self._message_until = now + MESSAGE_TIMEOUT
-        elif outcome.ending is CommandStatus.ANSWERED and outcome.result is not None:
+        elif outcome.status is CommandStatus.ANSWERED and outcome.result is not None:
             self._finish(f'refused: {result_name(outcome.result)}', now)
         else:
-            self._finish(outcome.verdict, now)
+            self._finish(outcome.describe(), now)
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""

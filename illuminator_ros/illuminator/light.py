@@ -41,8 +41,7 @@ from .operation_queue import OperationQueue
 from .refresh import Refresh
 from .sharing import Sharing
 from .uptime import compare_uptime, SendingTimes, Uptime
-from ..mavlink.command import Command, CommandResult, CommandStatus, format_seconds
-from ..mavlink.command_sender import CommandSender
+from ..mavlink.command import Command, CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd, STATUS_ID
 
 # s without a status after which the light is asked for one, and between the askings.

@@ -137,10 +137,10 @@ class Operation(ABC):
 
     def _answered(self, outcome: CommandResult, now: float) -> None:
         if not outcome.accepted:
-            refused = 'refused: ' if outcome.ending is CommandStatus.ANSWERED else ''
+            refused = 'refused: ' if outcome.status is CommandStatus.ANSWERED else ''
             self._finish(Result(
-                False, f'{refused}{outcome.verdict} ({outcome.spent(now - self._submitted)})',
-                outcome.ending is CommandStatus.ANSWERED and outcome.result in _PERMANENT), now)
+                False, f'{refused}{outcome.describe()} ({outcome.timing(now - self._submitted)})',
+                outcome.status is CommandStatus.ANSWERED and outcome.result in _PERMANENT), now)
             return
         self._outcome = outcome
         self._accepted_at = now
@@ -215,14 +215,14 @@ class Operation(ABC):
 
     def _success(self, how: str, now: float) -> Result:
         assert self._outcome is not None
-        spent = self._outcome.spent(now - self._submitted)
-        return Result(True, f'{self.wish}, {how}: {self._outcome.verdict} ({spent})')
+        spent = self._outcome.timing(now - self._submitted)
+        return Result(True, f'{self.wish}, {how}: {self._outcome.describe()} ({spent})')
 
     def _failure(self, what: str, now: float, *, contradicted: bool = False) -> None:
         assert self._outcome is not None
-        spent = self._outcome.spent(now - self._submitted)
+        spent = self._outcome.timing(now - self._submitted)
         self._finish(Result(
-            False, f'{self.wish} not confirmed: {self._outcome.verdict}, {what} ({spent})',
+            False, f'{self.wish} not confirmed: {self._outcome.describe()}, {what} ({spent})',
             contradicted=contradicted), now)
 
     def fail(self, message: str, now: float) -> None:

@@ -56,7 +56,7 @@ class Refresh:
 
     def _answered(self, outcome: CommandResult, now: float) -> None:
         if not outcome.accepted and self._status is None:
-            self._status = outcome.verdict
+            self._status = outcome.describe()
             self._check(now)
 
     def poll(self, now: float) -> None:

@@ -12,99 +12,205 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A MAVLink command, and what became of it."""
+"""
+The sending side of the MAVLink command protocol; no I/O, and time is passed in.
+
+https://mavlink.io/en/services/command.html: a command is resent, with ``confirmation`` counted
+up, until it is acknowledged; MAV_RESULT_IN_PROGRESS lengthens the wait and ends the resending.
+An acknowledgement names only the command, so one command of a kind at a time is sent to a
+component, and the others wait.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import bisect
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from enum import Enum
+import math
+from typing import NamedTuple
 
-from .messages import Address, MavResult, result_name
+from .messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    MavCmd,
+    MavResult,
+    Message,
+    result_name,
+)
+
+# s between two reports of progress. The specification leaves it open; MAVSDK also takes 3 s.
+PROGRESS_TIMEOUT = 3.0
+# s between tries of a command that was temporarily rejected: the first, doubling up to the last.
+REJECTED_BACKOFF = (0.1, 0.8)
+# Commands of one kind that may wait for one target. More are refused, so memory is bounded.
+MAX_WAITING = 32
+# s. A shorter time-out is unsafe on a 57,600 baud line, where another frame may be on the wire
+# for 49 ms before ours and another before the answer.
+MIN_TIMEOUT = 0.2
+MAX_SAMPLES = 64
+# Before this many samples the given time-out holds.
+MIN_SAMPLES = 4
+# COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
+GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
+DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
+# COMMAND_INT: stands for NaN in x and y.
+INT32_UNSET = 0x7FFFFFFF
 
 
 class CommandStatus(Enum):
     """How a command ended. Each ends in exactly one of these."""
 
     ANSWERED = 'answered'
-    NO_ANSWER = 'no answer'
-    PROGRESS_STOPPED = 'progress stopped'
-    OUT_OF_TIME = 'out of time'
-    LINK_LOST = 'link lost'
+    NO_ANSWER = 'no acknowledgement'
+    PROGRESS_STOPPED = 'no final acknowledgement'
+    OUT_OF_TIME = 'not finished in time'
+    LINK_LOST = 'the link was lost'
     CANCELLED = 'cancelled'
-    REFUSED_LOCALLY = 'refused locally'
+    REFUSED_LOCALLY = 'too many commands are waiting for this component'
 
 
 @dataclass(frozen=True)
-class Command:
+class Position:
+    """
+    The position of a COMMAND_INT.
+
+    :param frame: a MAV_FRAME.
+    :param x: latitude, deg, in a global frame; m in a local one. NaN means "not used".
+    :param y: longitude, deg, or m; NaN means "not used".
+    :param z: altitude, m, as the frame defines it.
+    :raises ValueError: if x or y does not fit into the message.
+    """
+
+    frame: int
+    x: float
+    y: float
+    z: float
+
+    def __post_init__(self) -> None:
+        for value in self.scaled:
+            if not -0x80000000 <= value <= INT32_UNSET:
+                raise ValueError(f'a position of {self.x:g}, {self.y:g} does not fit COMMAND_INT')
+
+    @property
+    def scaled(self) -> tuple[int, int]:
+        """Return x and y as COMMAND_INT carries them."""
+        scale = DEGREE_SCALE if self.frame in GLOBAL_FRAMES else METRE_SCALE
+        return _int32(self.x * scale), _int32(self.y * scale)
+
+
+class Command(NamedTuple):
     """
     A command to one component.
 
     :param command: a MAV_CMD.
-    :param params: param1 to param7; what is not given is 0, which the commands used here define
-        as "not used".
+    :param params: param1 to param7, or to param4 where there is a position.
+    :param unset: the value of the params that are not given: 0 or NaN, as the command defines.
+    :param position: makes it a COMMAND_INT.
     """
 
     target: Address
     command: int
     params: tuple[float, ...] = ()
+    unset: float = 0.0
+    position: Position | None = None
 
     @property
-    def key(self) -> tuple[Address, int]:
-        """Return what an acknowledgement can tell apart."""
-        return self.target, self.command
+    def key(self) -> tuple[Address, int, float]:
+        """Return the kind: commands of one kind wait for each other."""
+        # As in MAVSDK: a request for one message must not wait for that of another.
+        detail = self.params[0] if self.command == MavCmd.REQUEST_MESSAGE and self.params else 0.0
+        return self.target, self.command, detail
+
+    def message(self, tries: int, as_int: bool) -> Message:
+        """Return the message of a try, counted from 0, as COMMAND_LONG or COMMAND_INT."""
+        p1, p2, p3, p4, p5, p6, p7 = (
+            *self.params, *(self.unset,) * (7 - len(self.params)))
+        if self.position:
+            (x, y), z, frame = self.position.scaled, self.position.z, self.position.frame
+        elif as_int:
+            # MAV_FRAME_GLOBAL: the command has no position.
+            x, y, z, frame = _int32(p5), _int32(p6), p7, 0
+        else:
+            return CommandLong(
+                *self.target, self.command, min(tries, 255), p1, p2, p3, p4, p5, p6, p7)
+        return CommandInt(*self.target, frame, self.command, 0, 0, p1, p2, p3, p4, x, y, z)
 
 
-@dataclass(frozen=True)
-class CommandResult:
+class EarlierCommand(NamedTuple):
+    """
+    The last command of the same kind, and how it ended.
+
+    :param result: its MAV_RESULT, None if there was no answer.
+    :param ended_at: s, on the clock of the calls.
+    """
+
+    command: Command
+    result: int | None
+    ended_at: float
+
+
+class CommandResult(NamedTuple):
     """
     The one outcome of a command.
 
-    :param result: the last MAV_RESULT heard, None if there was none.
+    :param result: the last MAV_RESULT received, None if there was none.
     :param tries: how often it was sent.
     :param elapsed: s, from the first sending.
     :param progress: %, the last that was reported, None where unknown.
+    :param earlier: the command of the same kind that had ended before this one was answered,
+        None if there was none. See :meth:`may_answer_earlier`.
     """
 
-    ending: CommandStatus
+    status: CommandStatus
     result: int | None = None
     tries: int = 0
     elapsed: float = 0.0
     progress: int | None = None
     result_param2: int = 0
+    earlier: EarlierCommand | None = None
 
     @property
     def accepted(self) -> bool:
         """Whether the target acknowledged with MAV_RESULT_ACCEPTED."""
-        return self.ending is CommandStatus.ANSWERED and self.result == MavResult.ACCEPTED
+        return self.status is CommandStatus.ANSWERED and self.result == MavResult.ACCEPTED
 
-    @property
-    def verdict(self) -> str:
-        """Return what happened, for people, with the name of the MAV_RESULT."""
-        if self.ending is CommandStatus.ANSWERED and self.result is not None:
+    def may_answer_earlier(self, now: float, reach: float) -> bool:
+        """
+        Return whether the acknowledgement may be one of the earlier command of this kind.
+
+        It may where that command got the same result, which may come twice, or none, which may
+        still come; a status must then decide.
+
+        :param now: when this command was answered.
+        :param reach: s for which an acknowledgement may be under way.
+        """
+        return (self.status is CommandStatus.ANSWERED and self.earlier is not None
+                and self.earlier.result in (None, self.result)
+                and now - self.earlier.ended_at <= reach)
+
+    def describe(self) -> str:
+        """Return the outcome for people, with the name of the MAV_RESULT."""
+        if self.status is CommandStatus.ANSWERED and self.result is not None:
             return result_name(self.result)
         last = '' if self.result is None else f', last answer {result_name(self.result)}'
         if self.progress is not None:
             last += f' at {self.progress} %'
-        return f'{_ENDINGS[self.ending]}{last}'
+        return f'{self.status.value}{last}'
 
-    def spent(self, elapsed: float | None = None) -> str:
+    def timing(self, elapsed: float | None = None) -> str:
         """Return the number of tries and the time taken, or another time (s)."""
         time = format_seconds(self.elapsed if elapsed is None else elapsed)
         return f'{plural(self.tries, "try", "tries")}, {time}'
 
     def __str__(self) -> str:
-        return f'{self.verdict} ({self.spent()})'
+        return f'{self.describe()} ({self.timing()})'
 
 
-_ENDINGS = {
-    CommandStatus.NO_ANSWER: 'no acknowledgement',
-    CommandStatus.PROGRESS_STOPPED: 'no final acknowledgement',
-    CommandStatus.OUT_OF_TIME: 'not finished in time',
-    CommandStatus.LINK_LOST: 'the link was lost',
-    CommandStatus.CANCELLED: 'cancelled',
-    CommandStatus.REFUSED_LOCALLY: 'too many commands are waiting for this component',
-}
+Done = Callable[[CommandResult, float], None]
 
 
 def plural(number: int, one: str, many: str) -> str:
@@ -117,4 +223,339 @@ def format_seconds(seconds: float) -> str:
     return f'{seconds * 1000:.0f} ms' if seconds < 0.9995 else f'{seconds:.2f} s'
 
 
-Done = Callable[[CommandResult, float], None]
+class RttEstimator:
+    """The last :data:`MAX_SAMPLES` round-trip times of one target, s."""
+
+    def __init__(self) -> None:
+        self._samples: deque[float] = deque()
+        self._sorted: list[float] = []
+
+    def add(self, seconds: float) -> None:
+        """Add a sample, s."""
+        self._samples.append(seconds)
+        bisect.insort(self._sorted, seconds)
+        if len(self._samples) > MAX_SAMPLES:
+            del self._sorted[bisect.bisect_left(self._sorted, self._samples.popleft())]
+
+    def quantile(self, share: float) -> float | None:
+        """Return the round-trip time that this share (0..1) does not exceed, None if unknown."""
+        if not self._sorted:
+            return None
+        return self._sorted[min(int(share * len(self._sorted)), len(self._sorted) - 1)]
+
+    def timeout(self, longest: float) -> float:
+        """
+        Return the wait for an acknowledgement, s: four times the 95th percentile, bounded.
+
+        :param longest: s; the wait while fewer than :data:`MIN_SAMPLES` samples are known.
+        """
+        slow = self.quantile(0.95)
+        if slow is None or len(self._sorted) < MIN_SAMPLES:
+            return longest
+        return min(max(4 * slow, MIN_TIMEOUT), longest)
+
+
+class RequestState(Enum):
+    """
+    The state of a command that has not ended.
+
+    SENT waits for an acknowledgement, BACKOFF to send a rejected command again, IN_PROGRESS for
+    the next report of progress. WAITING was not sent: another of its kind was.
+    """
+
+    WAITING = 'waiting'
+    SENT = 'sent'
+    BACKOFF = 'backoff'
+    IN_PROGRESS = 'in progress'
+
+
+# The state after an acknowledgement. Results that are not here end the command.
+TRANSITIONS: dict[tuple[RequestState, int], RequestState] = {
+    (RequestState.SENT, MavResult.IN_PROGRESS): RequestState.IN_PROGRESS,
+    (RequestState.SENT, MavResult.TEMPORARILY_REJECTED): RequestState.BACKOFF,
+    (RequestState.SENT, MavResult.COMMAND_INT_ONLY): RequestState.SENT,
+    (RequestState.BACKOFF, MavResult.IN_PROGRESS): RequestState.IN_PROGRESS,
+    (RequestState.BACKOFF, MavResult.TEMPORARILY_REJECTED): RequestState.BACKOFF,
+    (RequestState.BACKOFF, MavResult.COMMAND_INT_ONLY): RequestState.SENT,
+    (RequestState.IN_PROGRESS, MavResult.IN_PROGRESS): RequestState.IN_PROGRESS,
+}
+
+
+@dataclass(eq=False, slots=True)
+class _Request:
+    command: Command
+    done: Done
+    limit: float
+    state: RequestState = RequestState.WAITING
+    as_int: bool = False
+    tries: int = 0
+    # Tries that were answered with a reason to try again: those are not lost frames.
+    rejected: int = 0
+    first_sent: float = 0.0
+    last_sent: float = 0.0
+    due: float = math.inf
+    deadline: float = math.inf
+    result: int | None = None
+    progress: int | None = None
+
+    def next_deadline(self) -> float:
+        return min(self.due, self.limit)
+
+    def answers_another_try(self, result: int) -> bool:
+        """
+        Return whether an acknowledgement is for a try that does not matter any more.
+
+        A try that meets an earlier one at work, or its own copy, is rejected for that. And a
+        COMMAND_LONG may be refused once more after the COMMAND_INT was sent.
+        """
+        if result == MavResult.COMMAND_INT_ONLY:
+            return self.as_int
+        return result == MavResult.TEMPORARILY_REJECTED and (
+            self.state is RequestState.IN_PROGRESS or self.rejected == self.tries)
+
+
+@dataclass
+class CommandCounters:
+    """Totals over all targets."""
+
+    sent: int = 0
+    resent: int = 0
+    unanswered: int = 0
+    unexpected_acks: int = 0
+
+
+@dataclass
+class CommandSender:
+    """
+    Sends commands to any number of components, in parallel across them.
+
+    :param address: our own address, which acknowledgements are matched against.
+    :param timeout: s, > 0: the longest wait for the acknowledgement of one try.
+    :param retries: resends after the first try, >= 0.
+    :ivar outgoing: messages to send, each with the address that sends it.
+    :ivar unanswering: the targets whose last command got no acknowledgement.
+    :raises ValueError: if one of the two is out of its range.
+    """
+
+    address: Address
+    timeout: float = 0.5
+    retries: int = 3
+    outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
+    counters: CommandCounters = field(default_factory=CommandCounters)
+    unanswering: set[Address] = field(default_factory=set)
+    # In the order of sending; those that wait are behind the one that was sent.
+    _requests: dict[Address, list[_Request]] = field(default_factory=dict)
+    _earlier: dict[tuple[Address, int, float], EarlierCommand] = field(default_factory=dict)
+    _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.timeout) and self.timeout > 0):
+            raise ValueError(f'timeout {self.timeout} s is not above 0')
+        if self.retries < 0:
+            raise ValueError(f'retries {self.retries} is below 0')
+
+    def __len__(self) -> int:
+        """Return how many commands have not ended."""
+        return sum(map(len, self._requests.values()))
+
+    def send(self, message: Message) -> None:
+        """Send a message that is not a command from our address."""
+        self.outgoing.append((self.address, message))
+
+    def start(
+        self, command: Command, now: float, done: Done, *, limit: float = math.inf,
+        overtake: bool = False,
+    ) -> None:
+        """
+        Send a command, or queue it behind the one of its kind that was sent.
+
+        :param done: called once, with the outcome and the time.
+        :param limit: the time by which it ends whatever happens, progress or not.
+        :param overtake: end all commands of its kind that wait or are not acknowledged with
+            CANCELLED, and send this one at once, beside one that is in progress.
+        """
+        request = _Request(command, done, limit, as_int=command.position is not None)
+        if now >= limit:
+            done(CommandResult(CommandStatus.OUT_OF_TIME), now)
+            return
+        kind = list(self._of_kind(command.key))
+        if not kind or overtake:
+            self._requests.setdefault(command.target, []).append(request)
+            self._begin(request, now)
+            # Those that wait first, so that none is sent in the place of another.
+            for other in reversed(kind):
+                if other.state is not RequestState.IN_PROGRESS:
+                    self._end(other, CommandStatus.CANCELLED, now)
+        elif sum(other.state is RequestState.WAITING for other in kind) >= MAX_WAITING:
+            done(CommandResult(CommandStatus.REFUSED_LOCALLY), now)
+        else:
+            self._requests[command.target].append(request)
+
+    def pending(self, target: Address, command: int) -> bool:
+        """Return whether a command was sent to a target and has not ended."""
+        return any(request.command.command == command
+                   for request in self._requests.get(target, ()))
+
+    def cancel(self, command: Command, now: float) -> None:
+        """End a command that was started with CANCELLED, if it has not ended."""
+        for request in list(self._requests.get(command.target, ())):
+            if request.command is command:
+                self._end(request, CommandStatus.CANCELLED, now)
+
+    def round_trip(self, target: Address) -> RttEstimator:
+        """Return the round-trip times of a target's acknowledgements."""
+        return self._round_trips.get(target) or RttEstimator()
+
+    def acknowledge(self, source: Address, ack: CommandAck, now: float) -> None:
+        """
+        Receive a COMMAND_ACK.
+
+        It counts where source and command match a command that was sent, and where it is
+        addressed to us or to 0, as the extension fields may be missing. It answers the oldest of
+        several commands, but progress is reported for the one that is in progress.
+        """
+        ours = self.address
+        if (ack.target_system not in (0, ours.system)
+                or ack.target_component not in (0, ours.component)):
+            return
+        self.unanswering.discard(source)
+        sent = [request for request in self._requests.get(source, ())
+                if request.command.command == ack.command
+                and request.state is not RequestState.WAITING]
+        if not sent:
+            self.counters.unexpected_acks += 1
+            return
+        # A command in progress is not rejected: the rejection is that of a command beside it.
+        request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
+        if request is not None:
+            self._answered(request, ack, now)
+
+    def _answered(self, request: _Request, ack: CommandAck, now: float) -> None:
+        if request.tries == 1 and request.result is None:
+            # An acknowledgement after a resend may be that of either try: no measure (RFC 6298).
+            self._round_trips.setdefault(request.command.target, RttEstimator()).add(
+                now - request.last_sent)
+        request.result = ack.result
+        state = TRANSITIONS.get((request.state, ack.result))
+        if state is RequestState.IN_PROGRESS:
+            request.progress = ack.progress if ack.progress <= 100 else None
+            request.due = now + PROGRESS_TIMEOUT
+        elif state is RequestState.BACKOFF:
+            first, last = REJECTED_BACKOFF
+            request.due = now + min(first * 2 ** min(request.rejected, 8), last)
+            request.rejected += 1
+            if request.due >= min(request.deadline, request.limit):
+                # A try that was never answered may be what keeps the target busy.
+                self._end(request, CommandStatus.ANSWERED if request.rejected == request.tries
+                          else CommandStatus.OUT_OF_TIME, now)
+                return
+        elif state is RequestState.SENT and now < request.limit:
+            request.as_int = True
+            request.rejected += 1
+            self._transmit(request, now)
+        else:
+            self._end(request, CommandStatus.ANSWERED, now, ack.result_param2)
+            return
+        request.state = state
+
+    def poll(self, now: float) -> None:
+        """Resend or end what is due."""
+        for requests in list(self._requests.values()):
+            for request in list(requests):
+                if request in requests and now >= request.next_deadline():
+                    self._overdue(request, now)
+
+    def _overdue(self, request: _Request, now: float) -> None:
+        if now >= request.limit:
+            unanswered = request.state is RequestState.SENT and not request.rejected
+            self._end(request, CommandStatus.NO_ANSWER if unanswered
+                      else CommandStatus.OUT_OF_TIME, now)
+        elif request.state is RequestState.IN_PROGRESS:
+            self._end(request, CommandStatus.PROGRESS_STOPPED, now)
+        elif request.tries - request.rejected > self.retries or now >= request.deadline:
+            self._end(request, CommandStatus.NO_ANSWER, now)
+        else:
+            request.state = RequestState.SENT
+            self._transmit(request, now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do, infinity if never."""
+        return min((request.next_deadline() for requests in self._requests.values()
+                    for request in requests), default=math.inf)
+
+    def end_all(self, now: float, status: CommandStatus, target: Address | None = None) -> None:
+        """End all commands that were started, to one target or to all."""
+        requests = [request for one in self._requests.values() for request in one
+                    if target is None or request.command.target == target]
+        # Last the one that was sent, so that no other is sent in its place.
+        for request in reversed(requests):
+            self._end(request, status, now)
+
+    def _of_kind(self, key: tuple[Address, int, float]) -> Iterator[_Request]:
+        return (request for request in self._requests.get(key[0], ())
+                if request.command.key == key)
+
+    def _begin(self, request: _Request, now: float) -> None:
+        request.state = RequestState.SENT
+        request.first_sent = now
+        request.deadline = now + self.timeout * (self.retries + 1)
+        self._transmit(request, now)
+
+    def _transmit(self, request: _Request, now: float) -> None:
+        command = request.command
+        self.send(command.message(request.tries, request.as_int))
+        request.tries += 1
+        self.counters.sent += 1
+        self.counters.resent += request.tries > 1
+        request.last_sent = now
+        timeout = self.round_trip(command.target).timeout(self.timeout)
+        lost = request.tries - request.rejected - 1
+        if lost > 0:
+            timeout = min(timeout * 2 ** min(lost, 16), self.timeout)
+        request.due = now + timeout
+
+    def _end(
+        self, request: _Request, status: CommandStatus, now: float, result_param2: int = 0,
+    ) -> None:
+        command = request.command
+        requests = self._requests.get(command.target, [])
+        if request not in requests:
+            return
+        requests.remove(request)
+        if not requests:
+            del self._requests[command.target]
+        if request.state is RequestState.WAITING:
+            request.done(CommandResult(status), now)
+            return
+        result = CommandResult(
+            status, request.result, request.tries, now - request.first_sent, request.progress,
+            result_param2, self._earlier.get(command.key))
+        answered = status is CommandStatus.ANSWERED
+        self._earlier[command.key] = EarlierCommand(
+            command, request.result if answered else None, now)
+        if status is CommandStatus.NO_ANSWER:
+            self.counters.unanswered += 1
+            self.unanswering.add(command.target)
+        late = self._send_next(command.key, now)
+        request.done(result, now)
+        for other in late:
+            other.done(CommandResult(CommandStatus.OUT_OF_TIME), now)
+
+    def _send_next(self, key: tuple[Address, int, float], now: float) -> list[_Request]:
+        """Send the next command of a kind; return those whose limit has passed."""
+        late = []
+        for request in list(self._of_kind(key)):
+            if request.state is not RequestState.WAITING:
+                break
+            if now < request.limit:
+                self._begin(request, now)
+                break
+            self._requests[key[0]].remove(request)
+            late.append(request)
+        if not self._requests.get(key[0], True):
+            del self._requests[key[0]]
+        return late
+
+
+def _int32(value: float) -> int:
+    return INT32_UNSET if math.isnan(value) else round(value)

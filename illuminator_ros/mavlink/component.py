@@ -22,8 +22,7 @@ from collections.abc import Sequence
 import math
 from typing import Any, Protocol
 
-from .command import CommandStatus
-from .command_sender import CommandSender
+from .command import CommandSender, CommandStatus
 from .messages import Address, CommandAck, heartbeat, MavType
 
 # s between heartbeats (heartbeat protocol).

@@ -38,8 +38,7 @@ from ..illuminator.client import IlluminatorClient
 from ..illuminator.events import AnyLightEvent, LightFound
 from ..illuminator.light import Light, Settings
 from ..illuminator.operation import Result
-from ..mavlink.command import format_seconds
-from ..mavlink.command_sender import CommandSender
+from ..mavlink.command import CommandSender, format_seconds
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent

@@ -35,7 +35,7 @@ def test_both_are_asked_for_and_come(pair):
     result = pair.wait_for(refresh(pair))
     assert result.success
     assert result.message == ('ILLUMINATOR_STATUS: received, '
-                              'COMPONENT_INFORMATION_BASIC: received (8 ms)')
+                              'COMPONENT_INFORMATION_BASIC: received (4 ms)')
     asked = {message.param1 for message in pair.commands(REQUEST, since=at)}
     assert asked == {STATUS_ID, INFORMATION_ID}
 

@@ -64,7 +64,7 @@ def left_behind(pair: Pair) -> dict[str, int]:
     sender, light = pair.controller.sender, pair.light
     return {
         'lights': len(pair.controller.lights), 'deadlines': len(pair.controller._agenda._heap),
-        'commands': len(sender._active) + len(sender._waiting),
+        'commands': len(sender),
         'round trips': len(sender._round_trips), 'refreshes': len(light._refreshes),
         'wanted': len(light.agreement._wanted), 'changes': int(light.agreement.changing)}
 

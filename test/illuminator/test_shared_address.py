@@ -16,7 +16,7 @@
 
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.back_to_back import Pair

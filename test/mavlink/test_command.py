@@ -57,7 +57,7 @@ def test_ends_as_in_qgroundcontrols_table(
         frames: int) -> None:
     rig = Rig(*answers, retries=retries)
     run = rig.ended()
-    assert (run.ending, run.result) == (ending, result)
+    assert (run.status, run.result) == (ending, result)
     assert run.outcome.tries == len(rig.frames) == frames
     assert rig.idle
 
@@ -78,7 +78,7 @@ def test_every_result_and_silence_end_in_exactly_one_outcome() -> None:
 def test_result_ends_the_command_at_its_first_try(result: int) -> None:
     rig = Rig([result])
     run = rig.ended()
-    assert (run.ending, run.result, run.outcome.tries) == (ANSWERED, result, 1)
+    assert (run.status, run.result, run.outcome.tries) == (ANSWERED, result, 1)
     assert run.outcome.accepted == (result == ACCEPTED)
 
 
@@ -117,13 +117,13 @@ def test_second_refusal_of_command_long_does_not_end_the_command_int() -> None:
 def test_target_that_wants_now_the_one_and_now_the_other_form_is_believed_once() -> None:
     rig = Rig([MavResult.COMMAND_INT_ONLY], [MavResult.COMMAND_LONG_ONLY])
     run = rig.ended()
-    assert (run.ending, run.result) == (ANSWERED, MavResult.COMMAND_LONG_ONLY)
+    assert (run.status, run.result) == (ANSWERED, MavResult.COMMAND_LONG_ONLY)
     assert len(rig.frames) == 2
 
 
 def test_target_that_refuses_both_forms_the_same_way_is_given_up() -> None:
     rig = Rig(*[[MavResult.COMMAND_INT_ONLY]] * 20)
-    assert rig.ended().ending is NO_ANSWER
+    assert rig.ended().status is NO_ANSWER
 
 
 # What is sent
@@ -177,7 +177,7 @@ def test_temporary_rejection_is_tried_again_with_growing_pauses() -> None:
 def test_temporary_rejection_that_does_not_pass_is_the_answer_within_the_deadline() -> None:
     rig = Rig(*[[REJECTED]] * 100)
     run = rig.ended()
-    assert (run.ending, run.result) == (ANSWERED, REJECTED)
+    assert (run.status, run.result) == (ANSWERED, REJECTED)
     assert run.outcome.elapsed < 4 * 0.5
     assert len(rig.frames) >= 4
 
@@ -186,7 +186,7 @@ def test_rejection_is_not_the_answer_where_an_earlier_try_got_none() -> None:
     # That may be what keeps the target busy, and succeed.
     rig = Rig([], *[[REJECTED]] * 100)
     run = rig.ended()
-    assert (run.ending, run.result) == (CommandStatus.OUT_OF_TIME, REJECTED)
+    assert (run.status, run.result) == (CommandStatus.OUT_OF_TIME, REJECTED)
     assert str(run.outcome).startswith(
         'not finished in time, last answer MAV_RESULT_TEMPORARILY_REJECTED (')
 
@@ -194,7 +194,7 @@ def test_rejection_is_not_the_answer_where_an_earlier_try_got_none() -> None:
 def test_rejected_try_is_none_of_the_retries() -> None:
     rig = Rig([REJECTED], [REJECTED], retries=1)
     run = rig.ended()
-    assert (run.ending, run.result) == (NO_ANSWER, REJECTED)
+    assert (run.status, run.result) == (NO_ANSWER, REJECTED)
     assert len(rig.frames) == 4
 
 
@@ -207,7 +207,7 @@ def test_rejection_that_is_repeated_on_its_way_counts_once() -> None:
 def test_rejection_is_not_retried_beyond_the_limit() -> None:
     rig = Rig(*[[REJECTED]] * 100)
     run = rig.ended(limit=0.3)
-    assert (run.ending, run.result) == (ANSWERED, REJECTED)
+    assert (run.status, run.result) == (ANSWERED, REJECTED)
     assert run.outcome.elapsed < 0.3
     assert rig.times == [0.0, 0.12]
 
@@ -217,21 +217,21 @@ def test_rejection_is_not_retried_beyond_the_limit() -> None:
 def test_limit_ends_what_got_no_answer() -> None:
     rig = Rig()
     run = rig.ended(limit=0.9)
-    assert (run.ending, run.outcome.tries) == (NO_ANSWER, 2)
+    assert (run.status, run.outcome.tries) == (NO_ANSWER, 2)
     assert run.outcome.elapsed == pytest.approx(0.9)
 
 
 def test_limit_ends_what_is_in_progress() -> None:
     rig = Rig([IN_PROGRESS] * 250)
     run = rig.ended(limit=1.5)
-    assert (run.ending, run.result) == (CommandStatus.OUT_OF_TIME, IN_PROGRESS)
+    assert (run.status, run.result) == (CommandStatus.OUT_OF_TIME, IN_PROGRESS)
     assert run.outcome.elapsed == pytest.approx(1.5)
 
 
 def test_nothing_is_sent_after_the_limit() -> None:
     rig = Rig()
     run = rig.start(limit=0.0)
-    assert (run.ending, rig.frames) == (CommandStatus.OUT_OF_TIME, [])
+    assert (run.status, rig.frames) == (CommandStatus.OUT_OF_TIME, [])
 
 
 @pytest.mark.parametrize('ended_by', ['acknowledgement', 'poll'])
@@ -243,7 +243,7 @@ def test_command_whose_limit_passed_while_it_waited_is_never_sent(ended_by: str)
         rig.ack(ACCEPTED)
     else:
         rig.sender.poll(rig.now)
-    assert second.ending is CommandStatus.OUT_OF_TIME
+    assert second.status is CommandStatus.OUT_OF_TIME
     assert second.outcome.tries == 0
     rig.run(LONG)
     assert second.frames == []
@@ -255,5 +255,5 @@ def test_refusal_of_the_form_after_the_limit_sends_no_other() -> None:
     run = rig.start(limit=0.3)
     rig.now += 0.4
     rig.ack(MavResult.COMMAND_INT_ONLY)
-    assert (run.ending, run.result) == (ANSWERED, MavResult.COMMAND_INT_ONLY)
+    assert (run.status, run.result) == (ANSWERED, MavResult.COMMAND_INT_ONLY)
     assert len(rig.frames) == 1

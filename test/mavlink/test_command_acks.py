@@ -67,7 +67,7 @@ def test_acknowledgement_before_anything_was_sent_counts_for_nothing() -> None:
     rig.ack(ACCEPTED)
     assert rig.sender.counters.unexpected_acks == 1
     run = rig.ended()
-    assert run.ending is CommandStatus.NO_ANSWER
+    assert run.status is CommandStatus.NO_ANSWER
 
 
 def test_repeated_acknowledgement_counts_once() -> None:
@@ -91,7 +91,7 @@ def test_acknowledgement_after_the_timeout_counts_for_nothing() -> None:
     rig = Rig()
     run = rig.ended()
     rig.ack(ACCEPTED)
-    assert run.ending is CommandStatus.NO_ANSWER
+    assert run.status is CommandStatus.NO_ANSWER
     assert rig.sender.counters.unexpected_acks == 1
 
 
@@ -109,4 +109,4 @@ def test_one_component_does_not_answer_for_all() -> None:
     run = rig.start(target=Address(1, 0))
     rig.ack(ACCEPTED, source=LIGHT)
     rig.run(LONG)
-    assert run.ending is CommandStatus.NO_ANSWER
+    assert run.status is CommandStatus.NO_ANSWER

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 import math
 
-from illuminator_ros.mavlink.command import format_seconds
-from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.command import CommandSender, format_seconds
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, OURS, Rig

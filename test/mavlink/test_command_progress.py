@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.command import CommandStatus
-from illuminator_ros.mavlink.command_sender import PROGRESS_TIMEOUT
+from illuminator_ros.mavlink.command import CommandStatus, PROGRESS_TIMEOUT
 from illuminator_ros.mavlink.messages import MavResult
 import pytest
 from support.command_rig import ACCEPTED, FAILED, IN_PROGRESS, LONG, REJECTED, Rig
@@ -39,7 +38,7 @@ def test_nothing_is_resent_when_the_progress_stops() -> None:
     run = rig.start()
     rig.ack(IN_PROGRESS, progress=40)
     rig.run(LONG)
-    assert run.ending is CommandStatus.PROGRESS_STOPPED
+    assert run.status is CommandStatus.PROGRESS_STOPPED
     assert run.outcome.progress == 40
     assert len(run.frames) == 1
 
@@ -59,7 +58,7 @@ def test_each_report_of_progress_lengthens_the_wait() -> None:
 def test_progress_after_a_resend_ends_the_resending() -> None:
     rig = Rig([], [IN_PROGRESS])
     run = rig.ended()
-    assert run.ending is CommandStatus.PROGRESS_STOPPED
+    assert run.status is CommandStatus.PROGRESS_STOPPED
     assert len(run.frames) == 2
 
 
@@ -79,7 +78,7 @@ def test_progress_above_100_is_not_known(reported: int, known: int | None) -> No
 def test_every_other_result_ends_what_is_in_progress(result: int) -> None:
     rig = Rig([IN_PROGRESS, result])
     run = rig.ended()
-    assert (run.ending, run.result) == (CommandStatus.ANSWERED, result)
+    assert (run.status, run.result) == (CommandStatus.ANSWERED, result)
     assert len(run.frames) == 1
 
 
@@ -102,5 +101,5 @@ def test_progress_after_a_temporary_rejection_ends_the_resending() -> None:
     rig.ack(REJECTED)
     rig.ack(IN_PROGRESS)
     rig.run(LONG)
-    assert run.ending is CommandStatus.PROGRESS_STOPPED
+    assert run.status is CommandStatus.PROGRESS_STOPPED
     assert len(run.frames) == 1

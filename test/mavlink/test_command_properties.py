@@ -21,8 +21,7 @@ import random
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
-from illuminator_ros.mavlink.command import CommandStatus
-from illuminator_ros.mavlink.command_sender import MAX_WAITING
+from illuminator_ros.mavlink.command import CommandStatus, MAX_WAITING
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig, Run
@@ -63,7 +62,7 @@ class AnyCourseOfEvents(RuleBasedStateMachine):
     @rule(seconds=TIMES)
     def time_passes_and_the_poll_comes_late(self, seconds: float) -> None:
         self.rig.now += seconds
-        self.rig.sender.poll(self.rig.now)
+        self.rig.poll()
 
     @rule(component=st.one_of(st.none(), COMPONENTS),
           ending=st.sampled_from([CommandStatus.LINK_LOST, CommandStatus.CANCELLED]))
@@ -162,7 +161,7 @@ def test_every_outcome_over_a_bad_line_is_one_and_true(
     runs = {command: rig.start(command) for command in range(1000, 1100)}
     executor.run(LONG)
     for command, run in runs.items():
-        if run.outcome.ending is CommandStatus.ANSWERED:
+        if run.outcome.status is CommandStatus.ANSWERED:
             assert run.outcome.result == executor.results[command]
-    answered = sum(run.outcome.ending is CommandStatus.ANSWERED for run in runs.values())
+    answered = sum(run.outcome.status is CommandStatus.ANSWERED for run in runs.values())
     assert answered == 100 if not loss else answered >= {0.1: 90, 0.3: 60, 0.5: 30}[loss]

@@ -16,11 +16,18 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.command import Command, CommandResult, CommandStatus
-from illuminator_ros.mavlink.command_sender import MAX_WAITING
-from illuminator_ros.mavlink.messages import Address
+import math
+
+from illuminator_ros.mavlink.command import (
+    Command,
+    CommandResult,
+    CommandStatus,
+    MAX_WAITING,
+    Position,
+)
+from illuminator_ros.mavlink.messages import Address, CommandInt
 import pytest
-from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, Rig
+from support.command_rig import ACCEPTED, DENIED, FAILED, IN_PROGRESS, LIGHT, LONG, REJECTED, Rig
 
 OTHER = Address(1, 244)
 
@@ -55,7 +62,7 @@ def test_command_that_gets_no_answer_makes_way_for_the_next() -> None:
     rig = Rig([], [], [], [], [ACCEPTED])
     first, second = rig.start(), rig.start()
     rig.run(LONG)
-    assert first.ending is CommandStatus.NO_ANSWER
+    assert first.status is CommandStatus.NO_ANSWER
     assert second.outcome.accepted
 
 
@@ -72,7 +79,7 @@ def test_limit_of_a_command_that_waits_is_kept_to_the_moment() -> None:
     rig.start()
     second = rig.start(limit=0.2)
     rig.run(0.4)
-    assert second.ending is CommandStatus.OUT_OF_TIME
+    assert second.status is CommandStatus.OUT_OF_TIME
     assert second.ended_at - rig.frames[0][0] == pytest.approx(0.2)
 
 
@@ -80,7 +87,7 @@ def test_only_so_many_wait_and_the_next_is_told() -> None:
     rig = Rig()
     runs = [rig.start() for _ in range(MAX_WAITING + 2)]
     assert [len(run.outcomes) for run in runs] == [0] * (MAX_WAITING + 1) + [1]
-    assert runs[-1].ending is CommandStatus.REFUSED_LOCALLY
+    assert runs[-1].status is CommandStatus.REFUSED_LOCALLY
     assert str(runs[-1].outcome) == (
         'too many commands are waiting for this component (0 tries, 0 ms)')
     rig.run(MAX_WAITING * LONG)
@@ -114,7 +121,7 @@ def test_dead_light_does_not_delay_another() -> None:
     assert all(run.outcome.accepted for run in alive)
     assert dead.outcomes == []
     rig.run(LONG)
-    assert dead.ending is CommandStatus.NO_ANSWER
+    assert dead.status is CommandStatus.NO_ANSWER
 
 
 def test_fifty_targets_get_an_answer_each_in_any_order() -> None:
@@ -139,7 +146,7 @@ def test_losing_the_link_ends_all_that_is_under_way_or_waiting(ending: CommandSt
     sent = len(rig.frames)
     rig.now += 0.1
     rig.sender.end_all(rig.now, ending)
-    assert [run.ending for run in rig.runs] == [ending] * 4
+    assert [run.status for run in rig.runs] == [ending] * 4
     rig.run(LONG)
     assert len(rig.frames) == sent
     assert rig.idle
@@ -160,7 +167,7 @@ def test_ending_again_changes_nothing() -> None:
     run = rig.start()
     for ending in (CommandStatus.CANCELLED, CommandStatus.LINK_LOST):
         rig.sender.end_all(rig.now, ending)
-    assert run.ending is CommandStatus.CANCELLED
+    assert run.status is CommandStatus.CANCELLED
 
 
 def test_acknowledgement_after_the_link_was_lost_counts_for_nothing() -> None:
@@ -168,14 +175,14 @@ def test_acknowledgement_after_the_link_was_lost_counts_for_nothing() -> None:
     run = rig.start()
     rig.sender.end_all(rig.now, CommandStatus.LINK_LOST)
     rig.ack(ACCEPTED)
-    assert run.ending is CommandStatus.LINK_LOST
+    assert run.status is CommandStatus.LINK_LOST
 
 
 def test_commands_of_one_target_are_ended_without_those_of_others() -> None:
     rig = Rig()
     gone, waiting, kept = rig.start(), rig.start(), rig.start(target=OTHER)
     rig.sender.end_all(rig.now, CommandStatus.CANCELLED, LIGHT)
-    assert (gone.ending, waiting.ending, kept.outcomes) == (
+    assert (gone.status, waiting.status, kept.outcomes) == (
         CommandStatus.CANCELLED, CommandStatus.CANCELLED, [])
     rig.ack(ACCEPTED, source=OTHER)
     assert kept.outcome.accepted
@@ -220,7 +227,7 @@ def test_callback_may_end_all_the_others() -> None:
     ends: list[CommandStatus] = []
 
     def close(outcome: CommandResult, now: float) -> None:
-        ends.append(outcome.ending)
+        ends.append(outcome.status)
         rig.sender.end_all(now, CommandStatus.CANCELLED)
 
     for target in (LIGHT, OTHER):
@@ -229,3 +236,114 @@ def test_callback_may_end_all_the_others() -> None:
     rig.run(LONG)
     assert sorted(ends, key=str) == [CommandStatus.CANCELLED] * 5 + [CommandStatus.NO_ANSWER]
     assert rig.idle
+
+
+# Overtaking, cancelling, and acknowledgements that several commands may claim
+
+def test_overtaking_command_cancels_those_that_wait_or_are_unacknowledged_and_is_sent() -> None:
+    rig = Rig()
+    others = [rig.start() for _ in range(31)]
+
+    off = rig.start(overtake=True)
+
+    assert [run.status for run in others] == [CommandStatus.CANCELLED] * 31
+    assert (len(rig.frames), len(off.frames)) == (2, 1)
+    rig.ack(ACCEPTED)
+    assert off.outcome.accepted
+
+
+def test_overtaking_command_is_sent_beside_one_in_progress() -> None:
+    rig = Rig()
+    on = rig.start()
+    rig.ack(IN_PROGRESS)
+    off, waiting = rig.start(overtake=True), rig.start()
+
+    assert (len(off.frames), on.outcomes, waiting.frames) == (1, [], [])
+    for result in (ACCEPTED, DENIED, FAILED):
+        # The acknowledgements name only the command: each answers the oldest.
+        rig.ack(result)
+    assert (on.result, off.result, waiting.result) == (ACCEPTED, DENIED, FAILED)
+
+
+def test_rejection_beside_a_command_in_progress_is_that_of_the_other() -> None:
+    rig = Rig()
+    on = rig.start()
+    rig.ack(IN_PROGRESS)
+    off = rig.start(overtake=True)
+
+    rig.ack(REJECTED)
+    rig.run(0.15)
+
+    assert (len(on.frames), len(off.frames)) == (1, 2)
+
+
+@pytest.mark.parametrize('place', [0, 1])
+def test_cancelled_command_ends_and_the_other_is_sent(place: int) -> None:
+    rig = Rig()
+    runs = [rig.start(), rig.start()]
+
+    rig.sender.cancel(runs[place].command, rig.now)
+    rig.flush()
+
+    assert runs[place].status is CommandStatus.CANCELLED
+    assert (runs[1 - place].outcomes, len(runs[1 - place].frames)) == ([], 1)
+
+
+def test_requests_for_two_messages_do_not_wait_for_each_other() -> None:
+    rig = Rig()
+    first, second = (rig.start(512, params=(number,)) for number in (148.0, 259.0))
+
+    assert [message.param1 for message in rig.messages] == [148.0, 259.0]
+    rig.ack(DENIED, 512)
+    rig.ack(ACCEPTED, 512)
+    assert (first.result, second.result) == (DENIED, ACCEPTED)
+
+
+@pytest.mark.parametrize(('first', 'second', 'after', 'doubtful'), [
+    (DENIED, DENIED, 0.4, True), (DENIED, DENIED, 0.6, False), (ACCEPTED, DENIED, 0.4, False),
+    (None, DENIED, 0.4, True), (None, ACCEPTED, 0.4, True)])
+def test_result_says_whether_it_may_be_that_of_the_command_before(
+        first: int | None, second: int, after: float, doubtful: bool) -> None:
+    rig = Rig()
+    before = rig.start()
+    if first is None:
+        rig.sender.cancel(before.command, rig.now)
+    else:
+        rig.ack(first)
+    rig.now += after
+    run = rig.start()
+    rig.ack(second)
+
+    assert not before.outcome.may_answer_earlier(rig.now, 0.5)
+    assert run.outcome.may_answer_earlier(rig.now, 0.5) is doubtful
+
+
+# The fields of a command
+
+def test_params_that_are_not_given_are_nan_where_the_command_says_so() -> None:
+    command = Command(LIGHT, 1000, (1.0,), math.nan)
+
+    message = command.message(0, False)
+
+    assert (message.param1, [math.isnan(getattr(message, f'param{n}')) for n in range(2, 8)]) == (
+        1.0, [True] * 6)
+    as_int = command.message(0, True)
+    assert (as_int.x, as_int.y, math.isnan(as_int.z)) == (0x7FFFFFFF, 0x7FFFFFFF, True)
+
+
+@pytest.mark.parametrize(('position', 'fields'), [
+    (Position(0, 47.3977418, -8.5455938, 488.25), (0, 473977418, -85455938, 488.25)),
+    (Position(1, 12.5, -0.0001, -3.5), (1, 125000, -1, -3.5)),
+    (Position(5, math.nan, math.nan, math.nan), (5, 0x7FFFFFFF, 0x7FFFFFFF, math.nan))])
+def test_position_is_sent_in_a_command_int(
+        position: Position, fields: tuple[float, ...]) -> None:
+    message = Command(LIGHT, 195, (1.0,), math.nan, position).message(2, False)
+
+    assert isinstance(message, CommandInt)
+    assert (message.frame, message.x, message.y, message.z) == pytest.approx(fields, nan_ok=True)
+    assert (message.param1, math.isnan(message.param2)) == (1.0, True)
+
+
+def test_position_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(ValueError, match='position of 300, 0'):
+        Position(0, 300.0, 0.0, 0.0)

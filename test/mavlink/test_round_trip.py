@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.command import MAX_SAMPLES, MIN_SAMPLES, MIN_TIMEOUT, RttEstimator
 from illuminator_ros.mavlink.messages import Address, MavResult
-from illuminator_ros.mavlink.round_trip import ENOUGH, FLOOR, RttEstimator, WINDOW
 import pytest
 from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig
 
@@ -34,16 +34,16 @@ def of(*seconds: float) -> RttEstimator:
 
 # The time-out
 
-@pytest.mark.parametrize('known', range(ENOUGH))
+@pytest.mark.parametrize('known', range(MIN_SAMPLES))
 def test_given_timeout_holds_until_enough_is_known(known: int) -> None:
     assert of(*[0.01] * known).timeout(0.5) == 0.5
 
 
 @pytest.mark.parametrize(('round_trip', 'timeout'), [
-    (0.001, FLOOR), (0.05, 0.2), (0.06, 0.24), (0.1, 0.4), (0.125, 0.5), (0.4, 0.5)])
+    (0.001, MIN_TIMEOUT), (0.05, 0.2), (0.06, 0.24), (0.1, 0.4), (0.125, 0.5), (0.4, 0.5)])
 def test_timeout_is_four_round_trips_between_the_floor_and_the_given_one(
         round_trip: float, timeout: float) -> None:
-    assert of(*[round_trip] * ENOUGH).timeout(0.5) == pytest.approx(timeout)
+    assert of(*[round_trip] * MIN_SAMPLES).timeout(0.5) == pytest.approx(timeout)
 
 
 def test_given_timeout_below_the_floor_holds() -> None:
@@ -59,7 +59,7 @@ def test_slow_answers_that_are_no_exception_count() -> None:
 
 
 def test_old_round_trips_are_forgotten() -> None:
-    assert of(*[0.45] * WINDOW, *[0.06] * WINDOW).quantile(1.0) == 0.06
+    assert of(*[0.45] * MAX_SAMPLES, *[0.06] * MAX_SAMPLES).quantile(1.0) == 0.06
 
 
 def test_nothing_is_known_at_first() -> None:
@@ -76,7 +76,7 @@ def test_quantile_is_that_of_the_samples(share: float, value: float) -> None:
 @given(st.lists(st.floats(0, 10), min_size=1, max_size=100), st.floats(0.01, 5))
 @settings(derandomize=True, deadline=None)
 def test_timeout_is_never_outside_its_bounds(samples: list[float], longest: float) -> None:
-    assert min(FLOOR, longest) <= of(*samples).timeout(longest) <= longest
+    assert min(MIN_TIMEOUT, longest) <= of(*samples).timeout(longest) <= longest
 
 
 # In the sender
@@ -90,7 +90,7 @@ def answered(rig: Rig, after: float) -> None:
 
 def test_sender_resends_sooner_once_the_target_has_answered_fast() -> None:
     rig = Rig(timeout=1.0)
-    for _ in range(ENOUGH):
+    for _ in range(MIN_SAMPLES):
         answered(rig, 0.06)
     run = rig.ended()
     times = [time - run.frames[0][0] for time, _ in run.frames]
@@ -101,7 +101,7 @@ def test_sender_resends_sooner_once_the_target_has_answered_fast() -> None:
 
 def test_try_that_was_rejected_makes_the_next_wait_no_longer() -> None:
     rig = Rig(timeout=1.0)
-    for _ in range(ENOUGH):
+    for _ in range(MIN_SAMPLES):
         answered(rig, 0.06)
     run = rig.start()
     rig.ack(REJECTED)
@@ -112,7 +112,7 @@ def test_try_that_was_rejected_makes_the_next_wait_no_longer() -> None:
 
 def test_sender_never_waits_longer_than_the_given_timeout() -> None:
     rig = Rig(timeout=0.5)
-    for _ in range(ENOUGH):
+    for _ in range(MIN_SAMPLES):
         answered(rig, 0.4)
     assert rig.sender.round_trip(LIGHT).quantile(0.5) == pytest.approx(0.4)
     assert rig.ended().outcome.elapsed == pytest.approx(2.0)
@@ -120,7 +120,7 @@ def test_sender_never_waits_longer_than_the_given_timeout() -> None:
 
 def test_one_target_does_not_teach_about_another() -> None:
     rig = Rig()
-    for _ in range(ENOUGH):
+    for _ in range(MIN_SAMPLES):
         answered(rig, 0.01)
     assert rig.sender.round_trip(Address(1, 244)).timeout(0.5) == 0.5
 
@@ -131,7 +131,7 @@ def samples_of(rig: Rig) -> int:
     while rig.sender.round_trip(LIGHT).timeout(0.5) == 0.5:
         rig.sender.round_trip(LIGHT).add(0.01)
         known += 1
-    return ENOUGH - known
+    return MIN_SAMPLES - known
 
 
 def test_answer_to_a_first_try_is_measured() -> None:

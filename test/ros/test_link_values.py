@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.command_sender import CommandCounters
+from illuminator_ros.mavlink.command import CommandCounters
 from illuminator_ros.mavlink.frame import DecoderCounters
 from illuminator_ros.mavlink.link_state import LinkState
 from illuminator_ros.mavlink.messages import heartbeat, MavType

@@ -22,8 +22,7 @@ import heapq
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, CommandResult, CommandStatus
-from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.command import Command, CommandResult, CommandSender, CommandStatus
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, MavResult
 
 OURS = Address(1, 194)
@@ -58,9 +57,9 @@ class Run:
         return outcome
 
     @property
-    def ending(self) -> CommandStatus:
+    def status(self) -> CommandStatus:
         """How it ended."""
-        return self.outcome.ending
+        return self.outcome.status
 
     @property
     def result(self) -> int | None:
@@ -90,14 +89,16 @@ class Rig:
     # What the sender's owner does
 
     def start(self, command: int = 405, target: Address = LIGHT, *,
-              params: tuple[float, ...] | None = None, limit: float = math.inf) -> Run:
+              params: tuple[float, ...] | None = None, limit: float = math.inf,
+              overtake: bool = False) -> Run:
         """Start a command; the limit is s from now. With params its frames are not told apart."""
         number = len(self.runs) + 1.0
         run = Run(Command(
             target, command, (0.0,) * 6 + (number,) if params is None else params))
         self.runs.append(run)
-        self.sender.start(run.command, self.now, run, limit=self.now + limit)
-        self._flush()
+        self.sender.start(
+            run.command, self.now, run, limit=self.now + limit, overtake=overtake)
+        self.flush()
         return run
 
     def ended(self, command: int = 405, **arguments: Any) -> Run:
@@ -116,8 +117,13 @@ class Rig:
                 self.sender.acknowledge(source, ack, self.now)
             else:
                 self.sender.poll(self.now)
-            self._flush()
+            self.flush()
         self.now = end
+
+    def poll(self) -> None:
+        """Poll once, now."""
+        self.sender.poll(self.now)
+        self.flush()
 
     # What its target does
 
@@ -126,9 +132,10 @@ class Rig:
         """Acknowledge a command at once."""
         self.sender.acknowledge(
             source, CommandAck(command, result, progress, result_param2, *target), self.now)
-        self._flush()
+        self.flush()
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
+        """Take what was sent."""
         while self.sender.outgoing:
             self._send(self.sender.outgoing.popleft()[1])
 

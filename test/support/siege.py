@@ -27,7 +27,7 @@ from illuminator_ros.illuminator.operation import Done, Result
 from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
 from illuminator_ros.illuminator.simulated import describe, simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.command_sender import MAX_WAITING
+from illuminator_ros.mavlink.command import MAX_WAITING
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
 from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
@@ -186,9 +186,7 @@ class BridgeSiege(Siege):
         lights = controller.lights.values()
         for what, size, bound in (
                 ('lights', len(lights), MAX_LIGHTS),
-                ('commands', len(sender._active), 4 * MAX_LIGHTS),
-                ('waiting commands', _longest(sender._waiting.values()), MAX_WAITING),
-                ('queues of commands', len(sender._waiting), 4 * MAX_LIGHTS),
+                ('commands', len(sender), 4 * MAX_LIGHTS * (MAX_WAITING + 1)),
                 ('round trips', len(sender._round_trips), MAX_LIGHTS),
                 ('deadlines', len(controller._agenda._heap), 16 * MAX_LIGHTS),
                 ('operations', _longest(light._switching._operations for light in lights),
