@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Measures what DESIGN.md, section 8 and doc/performance.md promise; run.py is the program."""
+"""Measures the figures of doc/performance.md; run.py is the program."""

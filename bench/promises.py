@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The times that are promised (DESIGN.md, section 3), measured on this machine.
+The documented time limits, measured on this machine.
 
   python3 bench/promises.py                 needs ROS; takes about two minutes
   python3 bench/promises.py --quick         a few tries of each

@@ -40,4 +40,4 @@ def measure(bench: Bench) -> Iterator[Row]:
     for row in measured:
         yield Row(row.promise, 's', {'p50': row.p50, 'max': row.max},
                   targets=[at_most(row.max, row.limit, 's')],
-                  note=f'DESIGN.md, {row.section}; {row.tries} tries')
+                  note=f'{row.tries} tries')

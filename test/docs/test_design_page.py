@@ -49,7 +49,8 @@ def test_the_layout_names_each_module_once() -> None:
 
 def test_the_places_to_add_something_exist() -> None:
     code = '\n'.join(path.read_text() for path in PACKAGE.rglob('*.py'))
-    files = [*PACKAGE.rglob('*'), *(ROOT / 'test').rglob('*.py'), *ROOT.glob('*/*')]
+    files = [*PACKAGE.rglob('*'), *(ROOT / 'test').rglob('*.py'), *ROOT.glob('*'),
+             *ROOT.glob('*/*')]
     names = {name for cells in table(PAGE, 'addition') for cell in cells
              for name in re.findall('`([^`]+)`', cell)}
 

@@ -59,8 +59,9 @@ def range_of(spec: ParameterSpec) -> str:
     _, found, choices = descriptor.additional_constraints.partition('one of: ')
     if found:
         return ', '.join(f'`{choice}`' for choice in choices.split(', '))
-    return ', '.join(f'{limits.from_value:g} to {limits.to_value:g}' for limits in (
-        *descriptor.floating_point_range, *descriptor.integer_range))
+    limits = [(each.from_value, each.to_value) for each in descriptor.floating_point_range]
+    limits += [(each.from_value, each.to_value) for each in descriptor.integer_range]
+    return ', '.join(f'{low:g} to {high:g}' for low, high in limits)
 
 
 def meaning_of(spec: ParameterSpec) -> str:
@@ -141,10 +142,9 @@ def test_the_readme_names_the_topics_services_and_parameters_of_the_reference() 
 
 
 def test_the_readme_has_the_executables() -> None:
-    installed = re.findall(r"'([\w-]+) = illuminator_ros", (ROOT / 'setup.py').read_text())
+    modules = {path.stem for path in (ROOT / 'illuminator_ros').glob('[!_]*.py')}
 
-    assert {row[0].strip('`') for row in table(README, 'executable')} == {
-        name.removeprefix('illuminator-') for name in installed}
+    assert {row[0].strip('`') for row in table(README, 'executable')} == modules
 
 
 @pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],
