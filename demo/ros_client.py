@@ -19,131 +19,133 @@ from __future__ import annotations
 from collections.abc import Callable
 import functools
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-TOPICS = {'connected': Bool, 'enabled': Bool, 'brightness': Float32, 'strobe_period': Float32}
+if TYPE_CHECKING:
+    from rclpy.type_support import ServiceType
+
+Result = TypeVar('Result')
+Request = TypeVar('Request')
+Response = TypeVar('Response')
+
+STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TimedOut(Exception):
-    """What was waited for did not happen; the text says what."""
+    """Something did not happen in time; the text says what."""
 
 
 class RosClient:
-    """Calls the services and follows the topics of one illuminator node."""
+    """Calls the services and follows the topics of the node ``/illuminator``."""
 
-    def __init__(self, node_name: str = 'illuminator') -> None:
+    def __init__(self) -> None:
         rclpy.init()
         self._node = rclpy.create_node('demo')
-        self._name = node_name
         self._changed = threading.Condition()
-        self._topics: dict[str, Any] = {}
-        self._diagnostics: dict[str, Any] = {}
-        for topic, type_ in TOPICS.items():
+        self._topics: dict[str, bool | float] = {}
+        self._lamp: DiagnosticStatus | None = None
+        for topic in ('connected', 'enabled'):
             self._node.create_subscription(
-                type_, f'/{node_name}/{topic}',
-                functools.partial(self._note_topic, topic), LATCHED)
-        self._node.create_subscription(
-            DiagnosticArray, '/diagnostics', self._note_diagnostics, 10)
+                Bool, f'/illuminator/{topic}', functools.partial(self._received, topic),
+                STATE_QOS)
+        for topic in ('brightness', 'strobe_period'):
+            self._node.create_subscription(
+                Float32, f'/illuminator/{topic}', functools.partial(self._received, topic),
+                STATE_QOS)
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 10)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
 
-    def _note(self, into: dict[str, Any], key: str, value: Any) -> None:
+    def _received(self, topic: str, message: Bool | Float32) -> None:
         with self._changed:
-            into[key] = value
+            self._topics[topic] = message.data
             self._changed.notify_all()
 
-    def _note_topic(self, topic: str, message: Any) -> None:
-        self._note(self._topics, topic, message.data)
+    def _diagnosed(self, array: DiagnosticArray) -> None:
+        with self._changed:
+            for status in array.status:
+                if status.name == 'illuminator: lamp':
+                    self._lamp = status
+            self._changed.notify_all()
 
-    def _note_diagnostics(self, array: Any) -> None:
-        for status in array.status:
-            self._note(self._diagnostics, status.name, status)
-
-    def wait(self, what: str, condition: Callable[[], Any], timeout: float = 10.0) -> Any:
+    def wait(self, event: str, condition: Callable[[], Result | None],
+             timeout: float = 10.0) -> Result:
         """
-        Wait until a condition on topics and diagnostics holds and return what it gives.
+        Return the result of a condition on topics and diagnostics once it holds.
 
-        :raises TimedOut: if it does not within ``timeout`` s.
+        :raises TimedOut: if it does not hold within ``timeout`` s.
         """
         with self._changed:
-            if not self._changed.wait_for(condition, timeout):
-                raise TimedOut(f'{what} did not happen within {timeout:g} s')
-            return condition()
+            result = self._changed.wait_for(condition, timeout)
+        if not result:
+            raise TimedOut(f'no {event} within {timeout:g} s')
+        return result
 
-    def topic(self, name: str) -> Any:
+    def topic(self, name: str) -> bool | float | None:
         """Return the last value of a topic, None before the first."""
         return self._topics.get(name)
 
-    def lamp(self) -> Any:
+    def lamp(self) -> DiagnosticStatus | None:
         """Return the last diagnostic status of the lamp, None before the first."""
-        return self._diagnostics.get(f'{self._name}: lamp')
+        return self._lamp
 
-    def call(self, type_: Any, service: str, request: Any, timeout: float = 10.0) -> Any:
+    def call(self, type_: type[ServiceType[Request, Response]], service: str, request: Request,
+             timeout: float = 10.0) -> Response:
         """
         Call a service of the node.
 
         :raises TimedOut: if it is not there or does not answer.
         """
-        client = self._node.create_client(type_, f'/{self._name}/{service}')
+        client = self._node.create_client(type_, f'/illuminator/{service}')
         try:
             if not client.wait_for_service(timeout):
-                raise TimedOut(f'no service /{self._name}/{service} within {timeout:g} s')
+                raise TimedOut(f'no service /illuminator/{service} within {timeout:g} s')
             answered = threading.Event()
             future = client.call_async(request)
             future.add_done_callback(lambda _: answered.set())
             if not answered.wait(timeout):
-                raise TimedOut(f'/{self._name}/{service} did not answer within {timeout:g} s')
+                raise TimedOut(f'no answer of /illuminator/{service} within {timeout:g} s')
             return future.result()
         finally:
             self._node.destroy_client(client)
 
-    def enable(self, on: bool) -> Any:
+    def enable(self, on: bool) -> SetBool.Response:
         """Call ``~/enable``."""
         return self.call(SetBool, 'enable', SetBool.Request(data=on))
 
-    def set(self, **values: Any) -> list[Any]:  # noqa: A003
-        """Set parameters one by one, as ``ros2 param set`` does; return the results."""
-        return list(self.call(SetParameters, 'set_parameters', SetParameters.Request(
-            parameters=_parameters(values))).results)
+    def set(self, name: str, value: float) -> SetParametersResult:  # noqa: A003
+        """Set one parameter, as ``ros2 param set`` does."""
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        return self.call(SetParameters, 'set_parameters',
+                         SetParameters.Request(parameters=parameters)).results[0]
 
-    def set_atomically(self, **values: Any) -> Any:
-        """Set parameters all at once; return the result."""
-        return self.call(
-            SetParametersAtomically, 'set_parameters_atomically',
-            SetParametersAtomically.Request(parameters=_parameters(values))).result
+    def set_atomically(self, **values: float) -> SetParametersResult:
+        """Set several parameters in one call."""
+        parameters = [Parameter(name, value=value).to_parameter_msg()
+                      for name, value in values.items()]
+        return self.call(SetParametersAtomically, 'set_parameters_atomically',
+                         SetParametersAtomically.Request(parameters=parameters)).result
 
     def get(self, name: str) -> float:
-        """Return the value of a number parameter."""
+        """Return the value of a floating-point parameter."""
         response = self.call(GetParameters, 'get_parameters',
                              GetParameters.Request(names=[name]))
-        return float(response.values[0].double_value)
+        return response.values[0].double_value
 
     def close(self) -> None:
         """Leave the ROS graph."""
         self._executor.shutdown()
         self._thread.join(2.0)
         rclpy.try_shutdown()
-
-
-def _parameters(values: dict[str, Any]) -> list[Any]:
-    return [Parameter(name=name, value=_value(value)) for name, value in values.items()]
-
-
-def _value(value: Any) -> Any:
-    if isinstance(value, float):
-        return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
-    if isinstance(value, int):
-        return ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value)
-    return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)

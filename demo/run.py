@@ -13,21 +13,26 @@
 # limitations under the License.
 
 """
-The main job, shown: a simulated light and the bridge as processes, and an ordinary ROS client.
+Run a simulated light and the bridge, use them from an ordinary ROS client, and show each step.
 
-Exit status 0 if all of it happened, 1 if not, and then what did not.
+The exit status is 0 if each step succeeded, otherwise 1.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import os
 from pathlib import Path
 import random
+import shutil
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import textwrap
 import time
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -35,7 +40,7 @@ sys.path.insert(0, str(ROOT))
 os.environ['ROS_DOMAIN_ID'] = str(random.randrange(1, 101))
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from ground_station import GroundStation  # noqa: E402
+from ground_station import ADDRESS, GroundStation  # noqa: E402
 from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from ros_client import RosClient, TimedOut  # noqa: E402
 
@@ -45,132 +50,162 @@ END_TIMEOUT = 5.0
 
 
 class Failed(Exception):
-    """A step did not do what it should; the text says what happened instead."""
+    """A step had another result than it must have; the text says which."""
 
 
 def free_port() -> int:
-    """Return a UDP port that nobody uses."""
+    """Return an unused UDP port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(('127.0.0.1', 0))
         return int(probe.getsockname()[1])
 
 
 class Demo:
-    """The steps, in order; each returns what it saw, or raises."""
+    """The steps, in order; each returns what the client saw, or raises."""
 
     def __init__(self, ros: RosClient, ground_station: GroundStation) -> None:
         self.ros = ros
         self.ground_station = ground_station
 
-    def discovered(self) -> str:
-        """Wait for the light."""
-        self.ros.wait('connecting', lambda: self.ros.topic('connected'), 20.0)
-        lamp = self.ros.wait('the lamp in /diagnostics', self.ros.lamp)
-        return f'light {LIGHT}, hardware id {lamp.hardware_id}'
-
-    def switched_on(self) -> str:
-        """Switch the light on."""
-        answer = self.ros.enable(True)
+    def _switch(self, on: bool) -> str:
+        answer = self.ros.enable(on)
         if not answer.success:
             raise Failed(answer.message)
-        self.ros.wait('~/enabled true', lambda: self.ros.topic('enabled'))
-        return str(answer.message)
+        self.ros.wait(f'/illuminator/enabled {on}', lambda: self.ros.topic('enabled') is on)
+        return answer.message
 
-    def brightness_set(self) -> str:
+    def discover(self) -> str:
+        """Wait for the light."""
+        self.ros.wait('light', lambda: self.ros.topic('connected'), 20.0)
+        lamp = self.ros.wait('status of the lamp in /diagnostics', self.ros.lamp)
+        return f'found light {LIGHT} (system/component), serial number {lamp.hardware_id}'
+
+    def switch_on(self) -> str:
+        """Switch the light on."""
+        return self._switch(True)
+
+    def dim(self) -> str:
         """Set one parameter, with an integer for a double."""
-        (result,) = self.ros.set(brightness=60)
+        result = self.ros.set('brightness', 60)
         if not result.successful:
             raise Failed(result.reason)
-        self.ros.wait('~/brightness 60', lambda: self.ros.topic('brightness') == 60.0)
-        return f'accepted; ~/brightness shows {self.ros.topic("brightness"):g} %'
+        self.ros.wait('/illuminator/brightness 60', lambda: self.ros.topic('brightness') == 60)
+        return 'accepted; the topic /illuminator/brightness shows 60 %'
 
-    def strobe_set(self) -> str:
+    def strobe(self) -> str:
         """Set two parameters with one command."""
         result = self.ros.set_atomically(strobe_period=0.5, strobe_duty_cycle=25.0)
         if not result.successful:
             raise Failed(result.reason)
-        self.ros.wait('~/strobe_period 0.5', lambda: self.ros.topic('strobe_period') == 0.5)
-        return 'accepted, as one command'
+        self.ros.wait('strobe', lambda: self.ros.topic('strobe_period') == 0.5)
+        return 'accepted; the light flashes twice a second'
 
-    def refused(self) -> str:
-        """Ask for what the light cannot do; the parameter keeps its value."""
-        (result,) = self.ros.set(strobe_period=60.0)
-        if result.successful:
-            raise Failed('a strobe period of 60 s was accepted')
-        if self.ros.get('strobe_period') != 0.5:
-            raise Failed('the parameter did not keep its value')
-        return f'refused: {result.reason}'
+    def refuse(self) -> str:
+        """Ask for a period that the light does not support."""
+        result = self.ros.set('strobe_period', 60.0)
+        if result.successful or self.ros.get('strobe_period') != 0.5:
+            raise Failed('the parameter strobe_period took 60 s, which the light cannot do')
+        return f'refused, and the parameter keeps its value: {result.reason}'
 
-    def changed_outside(self) -> str:
-        """Have somebody else change the light; the parameter follows."""
-        outcome = self.ground_station.configure(LIGHT, 1, 35.0, 0.5, 25.0)
-        if not outcome.accepted:
-            raise Failed(f'the light refused the ground station: {outcome}')
-        self.ros.wait('~/brightness 35', lambda: self.ros.topic('brightness') == 35.0)
+    def follow(self) -> str:
+        """Let a ground station change the light; the parameter follows."""
+        result = self.ground_station.configure(LIGHT, 1, 35.0, 0.5, 25.0)
+        if not result.accepted:
+            raise Failed(f'the light refused the ground station: {result}')
+        self.ros.wait('/illuminator/brightness 35', lambda: self.ros.topic('brightness') == 35)
         if self.ros.get('brightness') != 35.0:
-            raise Failed(f'the parameter is {self.ros.get("brightness"):g}')
-        return f'the parameter follows: brightness is {self.ros.get("brightness"):g}'
+            raise Failed(f'the parameter brightness is {self.ros.get("brightness"):g}')
+        return 'the parameter brightness now is 35, too'
 
-    def overheating(self) -> str:
-        """Let the light get hot; diagnostics say so, the parameter stays."""
+    def overheat(self) -> str:
+        """Let the light get hot: diagnostics warn, and the parameter stays."""
         result = self.ros.set_atomically(brightness=100.0, strobe_period=0.0)
         if not result.successful:
             raise Failed(result.reason)
-        lamp = self.ros.wait('a warning in /diagnostics', lambda: (
-            self.ros.lamp() if self.ros.lamp().level == b'\1' else None), 20.0)
-        values = {pair.key: pair.value for pair in lamp.values}
+
+        def warning() -> dict[str, str] | None:
+            lamp = self.ros.lamp()
+            return ({'message': lamp.message, **{pair.key: pair.value for pair in lamp.values}}
+                    if lamp and lamp.level == b'\1' else None)
+
+        seen = self.ros.wait('warning in /diagnostics', warning, 20.0)
         if self.ros.get('brightness') != 100.0:
-            raise Failed('dimming by heat has moved the parameter')
-        return (f'WARN {lamp.message}, {float(values["temperature_c"]):.0f} degC, gives '
-                f'{values["brightness_percent"]} %; the parameter stays 100')
+            raise Failed('the parameter brightness changed')
+        return (f'/diagnostics: WARN, {seen["message"]}; {float(seen["temperature_c"]):.0f} degC '
+                f'leave {seen["brightness_percent"]} %, and the parameter stays at 100')
 
-    def switched_off(self) -> str:
+    def switch_off(self) -> str:
         """Switch the light off."""
-        answer = self.ros.enable(False)
-        if not answer.success:
-            raise Failed(answer.message)
-        self.ros.wait('~/enabled false', lambda: self.ros.topic('enabled') is False)
-        return str(answer.message)
+        return self._switch(False)
 
 
-SET_BOOL = '$ ros2 service call /illuminator/enable std_srvs/srv/SetBool'
+class Step(NamedTuple):
+    """
+    One step of the demonstration.
+
+    :param command: the ros2 command with the same effect, '' if there is none.
+    """
+
+    title: str
+    run: Callable[[Demo], str]
+    command: str = ''
+
+
+ENABLE = 'ros2 service call /illuminator/enable std_srvs/srv/SetBool'
 STEPS = (
-    ('discovered', '(a heartbeat of type MAV_TYPE_ILLUMINATOR is enough)',
-     Demo.discovered),
-    ('switched on', f'{SET_BOOL} "{{data: true}}"',
-     Demo.switched_on),
-    ('brightness set', '$ ros2 param set /illuminator brightness 60',
-     Demo.brightness_set),
-    ('strobe set', '(both in one call of set_parameters_atomically)',
-     Demo.strobe_set),
-    ('refused', '$ ros2 param set /illuminator strobe_period 60',
-     Demo.refused),
-    ('changed outside', '(a ground station, 255/190, sets 35 % over MAVLink)',
-     Demo.changed_outside),
-    ('overheating', '(full brightness in 45 degC; the heat runs 60 times faster here)',
-     Demo.overheating),
-    ('switched off', f'{SET_BOOL} "{{data: false}}"',
-     Demo.switched_off),
+    Step('The bridge finds the light by its MAVLink heartbeat', Demo.discover,
+         'ros2 topic echo --once /illuminator/connected'),
+    Step('Switch the light on; success means that the light confirmed it', Demo.switch_on,
+         f'{ENABLE} "{{data: true}}"'),
+    Step('Dim the light to 60 %', Demo.dim, 'ros2 param set /illuminator brightness 60'),
+    Step('Make it flash: a period of 0.5 s, on for 25 % of it, set in one call', Demo.strobe),
+    Step('Ask for a period of 60 s, which this light does not support', Demo.refuse,
+         'ros2 param set /illuminator strobe_period 60'),
+    Step(f'A ground station (MAVLink address {ADDRESS}) dims the light to 35 %', Demo.follow),
+    Step('Full brightness in 45 degC until the light dims itself (60 times faster than real)',
+         Demo.overheat, 'ros2 topic echo /diagnostics'),
+    Step('Switch the light off', Demo.switch_off, f'{ENABLE} "{{data: false}}"'),
 )
+INTRODUCTION = """
+This demonstration starts two programs: a simulated light that speaks MAVLink, as a searchlight
+on a drone does, and the bridge, which makes a ROS 2 node, /illuminator, of the light. A ROS
+client then uses the node as a program of yours would.
+"""
+WITH_ROS2 = 'Under each step stands the ros2 command that has the same effect.'
+WITHOUT_ROS2 = """
+The command ros2 is not installed here, so the client makes the calls itself. Under each step
+stands the command that has the same effect on a computer with ROS 2.
+"""
+NEXT = """
+Go on with these three, each in a terminal of its own:
+  {python} -m illuminator_ros.simulator   # a light on the screen; type "help"
+  {python} -m illuminator_ros.bridge      # finds that light
+  {python} -m illuminator_ros.monitor     # all lights, switched with keys
+"""
 
 
 def show(demo: Demo) -> bool:
-    """Run the steps and print the timeline; return whether all went well."""
+    """Run and print the steps; return whether all succeeded."""
     start = time.monotonic()
-    for name, caption, step in STEPS:
-        print(f'{"":10}  {caption}')
+    for step in STEPS:
+        print(f'\n{step.title}')
+        if step.command:
+            print(f'     $ {step.command}')
         try:
-            result, seen = '', step(demo)
+            success, seen = True, step.run(demo)
         except (Failed, TimedOut) as error:
-            result, seen = 'FAILED: ', str(error)
-        print(f'{time.monotonic() - start:8.2f} s  {name:15}  {result}{seen}')
-        if result:
+            success, seen = False, f'FAILED: {error}'
+        print(textwrap.fill(seen, 95, initial_indent=f'{time.monotonic() - start:6.2f} s  ',
+                            subsequent_indent=' ' * 10))
+        if not success:
             return False
     return True
 
 
 def main() -> int:
     """Run the demonstration."""
+    print(INTRODUCTION.strip(), (WITH_ROS2 if shutil.which('ros2') else WITHOUT_ROS2).strip(),
+          sep='\n')
     url = f'127.0.0.1:{free_port()}'
     commands = {
         'simulator': ['-m', 'illuminator_ros.simulator', f'udpin://{url}', '--ambient', '45',
@@ -183,28 +218,33 @@ def main() -> int:
         for name, command in commands.items():
             with open(f'{logs}/{name}', 'wb') as log:
                 processes.append(subprocess.Popen(
-                    [sys.executable, *command], cwd=ROOT, stdout=log, stderr=log))
+                    [sys.executable, *command], cwd=ROOT, stdin=subprocess.DEVNULL, stdout=log,
+                    stderr=log))
         ground_station = GroundStation(f'udpout://{url}')
         ros = RosClient()
         try:
-            happened = show(Demo(ros, ground_station))
+            success = show(Demo(ros, ground_station))
         finally:
             ros.close()
             ground_station.close()
             statuses = end(processes)
         for name, status in zip(commands, statuses, strict=True):
-            if status or not happened:
-                happened = False
-                print(f'\n{name} ended with status {status}; its log:')
+            if status or not success:
+                success = False
+                print(f'\nThe {name} ended with status {status}; its log:')
                 print(Path(logs, name).read_text())
-    print('\nAll of it happened.' if happened else '\nNot all of it happened.')
-    return 0 if happened else 1
+    print('\nEach step succeeded.' if success else '\nThe demonstration failed.')
+    if success:
+        python = Path(sys.executable)
+        print(NEXT.format(python=python.relative_to(Path.cwd())
+                          if python.is_relative_to(Path.cwd()) else python).rstrip())
+    return 0 if success else 1
 
 
 def end(processes: list[subprocess.Popen[bytes]]) -> list[int]:
     """End the processes as Ctrl-C would and return their exit statuses."""
     for process in processes:
-        process.send_signal(2)
+        process.send_signal(signal.SIGINT)
     statuses = []
     for process in processes:
         try:

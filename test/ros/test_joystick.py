@@ -51,4 +51,8 @@ def test_on_needs_two_buttons_and_off_one() -> None:
     assert values == {'switch_on': True, 'switch_off': False}
     assert len(COMMANDS['switch_on']['deadman_buttons']) == 2
     assert len(COMMANDS['switch_off']['deadman_buttons']) == 1
-    assert COMMANDS['dim']['deadman_buttons'][0] in COMMANDS['switch_on']['deadman_buttons']
+
+
+def test_switching_on_does_not_publish_a_brightness() -> None:
+    pressed = set(COMMANDS['switch_on']['deadman_buttons'])
+    assert not pressed & set(COMMANDS['dim']['deadman_buttons'])
