@@ -13,10 +13,9 @@
 # limitations under the License.
 
 """
-Connection URLs: the notations of MAVROS, MAVSDK and pymavlink, each meaning what it means there.
+Connection URLs in the notations of MAVROS, MAVSDK and pymavlink, with the meaning they have there.
 
-An empty host to listen on means all interfaces, as it does in all three. IPv6 addresses stand in
-brackets.
+An empty host to listen on means all interfaces, as in all three. IPv6 addresses are in brackets.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ EXAMPLES = (
 
 
 class UrlError(ValueError):
-    """A connection URL that is wrong; the message quotes the URL and the offending part."""
+    """A wrong connection URL; the message quotes the URL and its wrong part."""
 
 
 class HostPort(NamedTuple):
@@ -57,8 +56,8 @@ class UdpUrl:
     """
     A UDP socket.
 
-    :param bind: what it listens on; port 0 means any free one.
-    :param remote: where it sends, and only there; None means to the peers that it hears.
+    :param bind: the local address; port 0 means any free one.
+    :param remote: the only address it sends to; None means the peers that it hears.
     :param broadcast: the remote is a broadcast address: '' no, 'until_peer' or 'always'.
     """
 
@@ -96,15 +95,15 @@ Url = UdpUrl | TcpUrl | SerialUrl | MemoryUrl
 
 def parse_url(text: str) -> Url:
     """
-    Return what a connection URL means.
+    Parse a connection URL.
 
-    :raises UrlError: if it is not one; the message quotes the offending part.
+    :raises UrlError: if it is wrong; the message quotes the wrong part.
     """
     return _Parser(text).parse()
 
 
 class _Parser:
-    """One URL, kept for the error messages."""
+    """Parses one URL; keeps it for the error messages."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -114,13 +113,13 @@ class _Parser:
         if not text:
             self.fail('it is empty')
         if bad := re.search(r'[\s\x00-\x1f\x7f]', text):
-            self.fail(f'{bad.group()!r} does not belong in a URL')
+            self.fail(f'{bad.group()!r} is not allowed in a URL')
         if text.startswith('/'):
             return self.device(text)
         if '?' in text:
             query = text[text.index('?'):]
-            self.fail(f'{query!r}: no options here; ids are the parameters system_id and '
-                      'component_id')
+            self.fail(f'{query!r}: options are not supported; set the parameters system_id '
+                      'and component_id')
         scheme, separator, rest = text.partition('://')
         if separator:
             reader = _WITH_SLASHES.get(scheme.lower())
@@ -134,7 +133,7 @@ class _Parser:
         if separator and scheme in _NOT_HERE:
             self.fail(f'{scheme + separator!r} of pymavlink is not supported here')
         if separator and scheme in _WITH_SLASHES:
-            self.fail(f'{scheme + separator!r} lacks "//" behind it')
+            self.fail(f'{scheme + separator!r} needs "//" after it')
         if separator:
             # pymavlink takes a bare host:port as an address to listen on with UDP.
             return UdpUrl(self.address(text))
@@ -149,20 +148,20 @@ class _Parser:
     def address(
         self, text: str, *, default_host: str | None = '', default_port: int | None = None,
     ) -> HostPort:
-        """Return host and port of ``[host][:port]``; a part without default must be there."""
+        """Return host and port of ``[host][:port]``; a part without a default is required."""
         if match := re.fullmatch(r'\[([^\[\]]*)\](?::(.*))?', text):
             host, port = match.groups()
             if not _is_ip(host, 6):
-                self.fail(f'{host!r} in brackets is no IPv6 address')
+                self.fail(f'{host!r} in brackets is not an IPv6 address')
         else:
             host, colon, port = text.partition(':')
             port = port if colon else None
             if ':' in (port or ''):
-                self.fail(f'{text!r}: an IPv6 address stands in brackets, as in [::1]:14550')
+                self.fail(f'{text!r}: an IPv6 address must be in brackets, as in [::1]:14550')
             if not re.fullmatch(r'[A-Za-z0-9._-]*', host):
-                self.fail(f'{host!r} is no host name')
+                self.fail(f'{host!r} is not a valid host name')
             if re.fullmatch(r'[0-9.]+', host) and not _is_ip(host, 4):
-                self.fail(f'{host!r} is no IPv4 address')
+                self.fail(f'{host!r} is not an IPv4 address')
         if not host:
             if default_host is None:
                 self.fail(f'no host in {text!r}')
@@ -174,16 +173,16 @@ class _Parser:
         return HostPort(host, self.port(port))
 
     def remote(self, text: str, *, default_port: int | None = None) -> HostPort:
-        """Return an address to send to: it needs a host, and not the one that means "any"."""
+        """Return an address to send to: its host is required and must not mean "any"."""
         address = self.address(text, default_host=None, default_port=default_port)
         if _means_any(address.host):
-            self.fail(f'{address.host!r} is no address to send to')
+            self.fail(f'{address.host!r} is not an address to send to')
         return address
 
     def port(self, text: str) -> int:
         if not re.fullmatch(r'[0-9]+', text):
             self.fail(f'port {text!r} is not a number')
-        # The length goes first: int() refuses a number of thousands of digits.
+        # Check the length first: int() refuses numbers of thousands of digits.
         if len(text) > 5 or not 1 <= int(text) <= 65535:
             self.fail(f'port {text} is outside 1..65535')
         return int(text)
@@ -194,8 +193,8 @@ class _Parser:
         """
         Read MAVROS's ``udp://[bind]@[remote]`` or, without ``@``, MAVSDK's ``udp://host:port``.
 
-        MAVROS has no use for a remote port without a host. MAVSDK listens where the host means
-        "any", and sends to every other.
+        MAVROS ignores a remote port without a host. MAVSDK listens if the host means "any" and
+        sends otherwise.
         """
         bind, at, remote = self.no_path(rest).partition('@')
         if not at:
@@ -226,10 +225,10 @@ class _Parser:
                       'always')
 
     def tcp(self, rest: str) -> Url:
-        """Read ``tcp://``: a client, with MAVROS's defaults; MAVSDK's listens without a host."""
+        """Read ``tcp://``: a client with MAVROS's defaults; MAVSDK listens without a host."""
         address = self.address(self.no_path(rest) or 'localhost', default_port=MAVROS_TCP_PORT)
         if _means_any(address.host):
-            self.fail(f'{rest!r} connects to this machine in MAVROS and listens in MAVSDK: say '
+            self.fail(f'{rest!r} connects to this machine in MAVROS and listens in MAVSDK: use '
                       f'tcpout://localhost:{address.port} or tcpin://0.0.0.0:{address.port}')
         return TcpUrl(address)
 
@@ -244,7 +243,7 @@ class _Parser:
 
     def serial(self, rest: str, hardware_flow_control: bool = False) -> Url:
         if not rest.startswith('/'):
-            self.fail(f'{rest!r} is no absolute device path, as in serial:///dev/ttyACM0:57600')
+            self.fail(f'{rest!r} is not an absolute device path, as in serial:///dev/ttyACM0:57600')
         device, colon, baud = rest.rpartition(':')
         if not colon:
             return SerialUrl(rest, MAVROS_BAUD, hardware_flow_control)
@@ -257,31 +256,31 @@ class _Parser:
         """
         Read a bare path: ``/dev/x:baud`` of MAVROS or ``/dev/x,baud`` of pymavlink.
 
-        The path itself may have colons, as those in /dev/serial/by-path do.
+        The path may contain colons, as in /dev/serial/by-path.
         """
         if '://' in text:
-            self.fail(f'{text!r} is no device path')
+            self.fail(f'{text!r} is not a device path')
         match = re.fullmatch(r'(.+)[,:]([^,:]*)', text)
         if not match:
-            self.fail(f'no baud rate behind {text!r}: MAVROS would take 57600 and pymavlink '
+            self.fail(f'no baud rate after {text!r}: MAVROS would take 57600 and pymavlink '
                       '115200')
         return SerialUrl(match.group(1), self.baud(match.group(2)))
 
     def memory(self, rest: str) -> Url:
         if not rest:
-            self.fail('no name behind "memory://"')
+            self.fail('no name after "memory://"')
         return MemoryUrl(rest)
 
     def baud(self, text: str) -> int:
         if not re.fullmatch(r'[0-9]{1,8}', text) or not 1 <= int(text) <= MAX_BAUD:
-            self.fail(f'{text!r} is no baud rate')
+            self.fail(f'{text!r} is not a baud rate')
         return int(text)
 
     def no_path(self, rest: str) -> str:
-        """Return what is before the path; its slash alone may stand, as in MAVROS's examples."""
+        """Return the part before the path; a single slash may follow, as in MAVROS's examples."""
         rest, slash, path = rest.partition('/')
         if path:
-            self.fail(f'{slash + path!r} has no meaning here')
+            self.fail(f'{slash + path!r} is not supported here')
         return rest
 
 
@@ -293,7 +292,7 @@ def _is_ip(host: str, version: int) -> bool:
 
 
 def _means_any(host: str) -> bool:
-    """Return whether a host stands for all interfaces."""
+    """Return whether a host means all interfaces."""
     try:
         return not host or ipaddress.ip_address(host).is_unspecified
     except ValueError:
@@ -327,5 +326,5 @@ _WITHOUT_SLASHES: dict[str, _Reader] = {
     'tcpin': _Parser.tcp_in,
 }
 
-# What else pymavlink has and would here be taken for a host name before a port.
+# Other schemes of pymavlink, which would be taken for a host name before a port.
 _NOT_HERE = ('mcast', 'uds', 'unix', 'ws', 'wss', 'wsserver', 'csv')

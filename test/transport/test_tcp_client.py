@@ -158,5 +158,5 @@ def test_a_connection_with_itself_is_none(monkeypatch: pytest.MonkeyPatch) -> No
             super().connect(address)
 
     monkeypatch.setattr(tcp.socket, 'socket', Selfish)
-    with pytest.raises(OSError, match='nobody listens'):
+    with pytest.raises(OSError, match='no program listens'):
         open_channel(parse_url(f'tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'))

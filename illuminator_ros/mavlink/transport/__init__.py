@@ -28,7 +28,7 @@ __all__ = ['Channel', 'ChannelLost', 'open_channel', 'Peer']
 
 def open_channel(url: Url) -> Channel:
     """
-    Open what a connection URL names. May block for about a second: name lookup and connecting.
+    Open a connection URL. May block for about a second, for name lookup and connecting.
 
     :raises OSError: if it cannot be opened; the text says why.
     """

@@ -22,25 +22,25 @@ from collections.abc import Hashable, Iterator, Sequence
 import selectors
 from typing import Any
 
-# Where bytes came from, and where they can be sent back to.
+# The origin of received bytes, to which an answer can be sent.
 Peer = Hashable
 
-# Bytes that wait for a slow line. What does not fit is dropped, whole frames, oldest first: a
-# command that has waited longer than its time-out has been sent again anyway.
+# Bytes that wait for a slow line. Whole frames beyond that are dropped, the oldest first: a
+# command that has waited longer than its time-out has been sent again.
 MAX_QUEUED = 16 * 1024
 
 
 class ChannelLost(OSError):
-    """The other side or the device is gone; the channel is of no use any more."""
+    """The other side or the device has gone; the channel must be closed."""
 
 
 class Channel(ABC):
     """
     An open transport, used from one thread and never blocking.
 
-    :ivar name: what it is, for people.
+    :ivar name: how logs and errors name it.
     :ivar dropped: frames that were not sent because the line or the kernel was full.
-    :ivar more: whether there may be more than was read last.
+    :ivar more: whether the last read may have left bytes.
     """
 
     name: str = ''
@@ -49,49 +49,49 @@ class Channel(ABC):
 
     @abstractmethod
     def register(self, selector: selectors.BaseSelector) -> None:
-        """Register what can be read with the selector."""
+        """Register its descriptors with the selector."""
 
     @abstractmethod
     def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
         """
-        Return what is there to read on a registered handle, with its origin.
+        Read from a registered handle; return bytes with their origin.
 
-        :raises ChannelLost: if nothing will come any more.
+        :raises ChannelLost: if the channel is closed.
         """
 
     @abstractmethod
     def peers(self, now: float) -> Sequence[Peer]:
-        """Return everybody that a broadcast goes to."""
+        """Return all peers, the receivers of a broadcast."""
 
     def heard(self, peer: Peer, now: float) -> bool:
         """
         Note that a checked frame came from a peer.
 
-        Return whether the peer is new. Only what has been checked may be reported here: it is
-        from now on sent to.
+        Return whether the peer is new. Only checked frames may be reported, since the channel then
+        sends to the peer.
         """
         return False
 
     @abstractmethod
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """
-        Send frames to some of the peers, dropping them where there is no room.
+        Send frames to some of the peers; drop those that do not fit.
 
-        Frames that are given together go out together, in one datagram where there are datagrams.
+        Frames of one call share a datagram where the transport has datagrams.
 
-        :raises ChannelLost: if the channel is gone.
+        :raises ChannelLost: if the channel is closed.
         """
 
     def writable(self, handle: Any) -> None:  # noqa: B027 - only queues have something to do
-        """Go on sending, now that a registered handle has room."""
+        """Continue sending on a registered handle that is writable."""
 
     @abstractmethod
     def close(self) -> None:
-        """Close it; harmless a second time."""
+        """Close it; a second call has no effect."""
 
 
 class FrameQueue:
-    """Whole frames that wait for a stream with room, at most :data:`MAX_QUEUED` bytes of them."""
+    """Whole frames that wait until a stream is writable, at most :data:`MAX_QUEUED` bytes."""
 
     def __init__(self) -> None:
         self._frames: deque[bytes] = deque()
@@ -102,7 +102,7 @@ class FrameQueue:
         return bool(self._frames)
 
     def put(self, frame: bytes) -> int:
-        """Append a frame and return how many were dropped for it."""
+        """Append a frame and return how many older ones were dropped."""
         self._frames.append(frame)
         self._size += len(frame)
         dropped = 0
@@ -115,11 +115,11 @@ class FrameQueue:
         return dropped
 
     def head(self) -> bytes:
-        """Return what is to be written next."""
+        """Return the bytes to write next."""
         return self._frames[0]
 
     def written(self, count: int) -> None:
-        """Note that ``count`` bytes of the head have gone out."""
+        """Note that ``count`` bytes of the head were written."""
         frame = self._frames.popleft()
         self._size -= count
         self._begun = count < len(frame)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An in-process link: everybody who opens the same name hears everybody else."""
+"""An in-process link: each channel hears all others of the same name."""
 
 from __future__ import annotations
 

@@ -24,15 +24,15 @@ from ..url import HostPort
 
 def resolve(address: HostPort, kind: socket.SocketKind) -> list[tuple[int, Any]]:
     """
-    Return families and socket addresses; IPv4 goes first, as most MAVLink programs know no other.
+    Return families and socket addresses; IPv4 first, since most MAVLink programs know only that.
 
-    :param address: an empty host stands for all IPv4 interfaces.
-    :raises OSError: if the name is not known; the text says so.
+    :param address: an empty host means all IPv4 interfaces.
+    :raises OSError: if the name cannot be resolved.
     """
     try:
         found = socket.getaddrinfo(address.host or '0.0.0.0', address.port, type=kind)
     except (socket.gaierror, UnicodeError) as error:
-        reason = getattr(error, 'strerror', None) or 'no host name'
+        reason = getattr(error, 'strerror', None) or 'not a host name'
         raise OSError(f'cannot resolve {address.host!r}: {reason}') from None
     found.sort(key=lambda entry: entry[0] != socket.AF_INET)
     return [(family, sockaddr) for family, _, _, _, sockaddr in found]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Serial ports, opened and set up by pyserial, read and written without blocking."""
+"""Serial ports: opened by pyserial, read and written without blocking."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ..url import SerialUrl
 if TYPE_CHECKING:
     from serial import Serial
 
-# The kernel keeps no more of what has come.
+# Size of the kernel's receive buffer.
 READ_SIZE = 4095
 
 
@@ -38,7 +38,7 @@ def open_serial(url: SerialUrl) -> Channel:
     """
     Open a serial port, exclusively: a second reader would steal bytes.
 
-    :raises OSError: if it is not there, not ours, or in use.
+    :raises OSError: if it is missing, in use, or not accessible.
     """
     try:
         import serial
@@ -56,7 +56,7 @@ def open_serial(url: SerialUrl) -> Channel:
         raise OSError(error.errno, f'cannot open {url.device}: {reason}') from None
     except (ValueError, OSError) as error:
         raise OSError(f'cannot open {url.device} at {url.baud} baud: {error}') from None
-    # FTDI adapters hold bytes back for 16 ms unless told not to; not every driver knows how.
+    # FTDI adapters delay bytes by 16 ms otherwise; not every driver supports this.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         port.set_low_latency_mode(True)
     return _SerialChannel(port, url)
@@ -82,7 +82,7 @@ class _SerialChannel(Channel):
         except OSError as error:
             raise ChannelLost(error.errno, error.strerror) from None
         if not data:
-            raise ChannelLost('the device is gone')
+            raise ChannelLost('the device has gone')
         self.more = len(data) == READ_SIZE
         yield None, data
 
@@ -106,7 +106,7 @@ class _SerialChannel(Channel):
             self._selector.modify(self._fd, events)
 
     def close(self) -> None:
-        # Closing would wait for what flow control holds back, up to 30 s.
+        # Closing would otherwise wait up to 30 s for bytes that flow control holds back.
         with contextlib.suppress(OSError, termios.error):
             termios.tcflush(self._fd, termios.TCOFLUSH)
         with contextlib.suppress(OSError):

@@ -28,15 +28,15 @@ from .base import Channel, ChannelLost, FrameQueue, MAX_QUEUED, Peer
 from .resolve import resolve
 from ..url import HostPort
 
-# s over all addresses of a name; the link must be back within 1 s of the other side.
+# s for all addresses of a name together; the link must return within 1 s of the other side.
 CONNECT_TIMEOUT = 0.8
-# ms without an acknowledgement after which a connection is lost. TCP itself would repeat ever
-# more rarely: after a longer silence a cable plugged in again would go unnoticed for seconds.
+# ms without an acknowledgement until a connection is lost. TCP itself resends at growing
+# intervals, so a cable that is plugged in again would go unnoticed for seconds.
 USER_TIMEOUT = 2000
 MAX_CLIENTS = 16
-# s without a good frame, after which a client gives way to a new one.
+# s without a valid frame until a new client may replace an old one.
 EXPIRY = 10.0
-# We have no descriptors or memory left to accept with.
+# Our process or the system lacks descriptors or memory for another connection.
 NO_ROOM = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
 # Bytes read before other work gets its turn.
 READ_SIZE = 16 * 1024
@@ -50,17 +50,17 @@ class _Stream:
         self.queue = FrameQueue()
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        # The kernel would queue megabytes: minutes of commands that nobody waits for any more.
+        # The kernel would queue megabytes: minutes of commands that have timed out.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        # A peer that vanished without a word is noticed in seconds, not in hours.
+        # Detect a vanished peer in seconds, not in hours.
         for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
                               ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
             if hasattr(socket, option):
                 connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
 
     def receive(self) -> bytes | None:
-        """Return what is there, None if there is nothing yet, b'' at the end."""
+        """Return available bytes, None if there are none yet, b'' at the end."""
         try:
             return self.socket.recv(READ_SIZE)
         except BlockingIOError:
@@ -144,7 +144,7 @@ def _connect(address: HostPort) -> socket.socket:
             if connection.getsockname() != connection.getpeername():
                 return connection
             # A connection to a free local port may be made with itself (RFC 793, 3.4).
-            reason = OSError(f'cannot connect to {address}: nobody listens')
+            reason = OSError(f'cannot connect to {address}: no program listens there')
         except TimeoutError:
             reason = OSError(f'no answer from {address}')
         except OSError as error:
@@ -155,10 +155,10 @@ def _connect(address: HostPort) -> socket.socket:
 
 class TcpServer(Channel):
     """
-    A listening socket and its clients, each a peer. A client that goes is no loss.
+    A listening socket and its clients, each a peer. The link survives the loss of a client.
 
-    Where there are :data:`MAX_CLIENTS`, a new one takes the place of the one that has been silent
-    for longest; it is turned away where all have sent something good within :data:`EXPIRY`.
+    Beyond :data:`MAX_CLIENTS`, a new client replaces the one that was silent for longest; it is
+    rejected if each has sent a valid frame within :data:`EXPIRY`.
     """
 
     def __init__(self, address: HostPort) -> None:
@@ -173,7 +173,7 @@ class TcpServer(Channel):
             self._listener.close()
             raise OSError(error.errno, f'cannot listen on {address}: {error.strerror}') from None
         self._clients: dict[socket.socket, _Stream] = {}
-        # When something good last came, s.
+        # Time of the last valid frame, s.
         self._heard: dict[socket.socket, float] = {}
         self._now = -math.inf
         self.name = f'tcp server {HostPort(*self._listener.getsockname()[:2])}'
@@ -207,7 +207,7 @@ class TcpServer(Channel):
         except OSError as error:
             if error.errno in NO_ROOM:
                 raise ChannelLost(error.errno, error.strerror) from None
-            # Nobody there any more, or a fault of the connection and not of the listener.
+            # The client has gone, or the fault is the connection's and not the listener's.
             return
         if len(self._clients) >= MAX_CLIENTS:
             silent = min(self._clients, key=lambda c: self._heard.get(c, -math.inf))

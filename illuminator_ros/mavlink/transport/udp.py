@@ -28,19 +28,19 @@ from .base import Channel, ChannelLost, Peer
 from .resolve import resolve
 from ..url import HostPort, UdpUrl
 
-# Peers that a listening socket sends to. A new one is not let in over a live one.
+# Peers that a listening socket sends to. A new peer never replaces a live one.
 MAX_PEERS = 32
-# s without a checked frame, after which a peer is forgotten. MAVSDK takes 10 s too.
+# s without a checked frame until a peer is dropped; MAVSDK has 10 s too.
 PEER_EXPIRY = 10.0
-# Datagrams, and bytes of them, read before other work gets its turn. Bytes of the worst kind take
-# a microsecond each to look at: without a bound, garbage would hold up all else for seconds.
+# Datagrams and bytes read before other work is done. The worst bytes take a microsecond each, so
+# that unbounded garbage would delay everything else for seconds.
 BATCH = 128
 BATCH_SIZE = 64 * 1024
-# Bytes of frames in one datagram: what passes an Ethernet in one piece.
+# Bytes of frames in one datagram, so that Ethernet does not fragment it.
 MAX_DATAGRAM = 1400
-# What a flight controller sends at once must fit; the kernel may allow less.
+# Bytes; a burst of a flight controller must fit. The kernel may grant less.
 RECEIVE_BUFFER = 4 * 1024 * 1024
-# The kernel or the network device has no room just now.
+# The buffers of the kernel or the network device are full.
 NO_ROOM = {errno.ENOBUFS, errno.ENOMEM}
 
 
@@ -48,9 +48,9 @@ class UdpChannel(Channel):
     """
     A UDP socket.
 
-    With a remote it sends there and only there, and hears only that host, on whatever port it
-    sends from: the reference emulator sends from another than it listens on. Without one it
-    sends to every peer that a checked frame has come from.
+    With a remote it sends to that address only, and accepts frames from any port of that host: the
+    reference emulator sends from another port than it listens on. Without a remote it sends to
+    every peer from which it received a checked frame.
     """
 
     def __init__(self, url: UdpUrl) -> None:
@@ -90,8 +90,8 @@ class UdpChannel(Channel):
     def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         receive = self._socket.recvfrom
-        # What one peer has sent is looked at together: that costs a third of each by itself. Not
-        # so the first, which is most often alone, and may be waited for.
+        # Datagrams of one peer are decoded together, at a third of the cost. The first is decoded
+        # alone: it is mostly the only one, and an answer may wait for it.
         sender: Any = None
         datagrams: list[bytes] = []
         lost = None
@@ -156,7 +156,7 @@ class UdpChannel(Channel):
             begin = end
 
     def _sent(self, datagram: bytes, peer: Any) -> bool:
-        """Send to one peer; return whether there was room."""
+        """Send to one peer; return False if the datagram was dropped."""
         try:
             self._socket.sendto(datagram, peer)
         except (BlockingIOError, ConnectionError):
@@ -166,7 +166,7 @@ class UdpChannel(Channel):
                 return False
             if peer == self._remote:
                 raise ChannelLost(error.errno, error.strerror) from None
-            # One learnt peer out of reach is no loss of the link.
+            # The link survives the loss of a learnt peer.
             self._peers.pop(peer, None)
             return False
         return True
@@ -177,7 +177,7 @@ class UdpChannel(Channel):
 
 
 def _ends(frames: Sequence[bytes]) -> Iterator[int]:
-    """Return behind which of the frames each datagram ends."""
+    """Return the index after the last frame of each datagram."""
     size = 0
     for index, frame in enumerate(frames):
         if size and size + len(frame) > MAX_DATAGRAM:
@@ -190,6 +190,6 @@ def _ends(frames: Sequence[bytes]) -> Iterator[int]:
 def _same_host(peer: Any, remote: Any) -> bool:
     if peer[0] == remote[0]:
         return True
-    # 127.0.0.2 and the like: a loopback remote means this machine.
+    # Any loopback address, such as 127.0.0.2, is this machine.
     return (ipaddress.ip_address(peer[0].partition('%')[0]).is_loopback
             and ipaddress.ip_address(remote[0].partition('%')[0]).is_loopback)
