@@ -12,27 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lights of the field, simulated, with the real node over real UDP (doc/lights.md)."""
+"""Simulated lights of each kind that is in use, with the real node over real UDP."""
 
-from collections.abc import Callable, Iterator
-import contextlib
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float64
-from std_srvs.srv import SetBool, Trigger
 from support.ports import free_port
 from support.processes import Program
 from support.ros import own_domain, Parameters, Ros, running_bridge, running_simulator, STREAM
 from support.slow import CLOCK
 
-ENABLED = 'confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'
-
 
 class Kind(NamedTuple):
-    """A kind of light: how it is simulated, and what it is like."""
+    """A kind of light: the simulator's options, and its properties."""
 
     options: tuple[str, ...]
     address: str
@@ -41,9 +37,12 @@ class Kind(NamedTuple):
     vendor: str | None = 'illuminator_ros'
 
 
+# Once a second would be each 20 s on the slow clock.
+OFTEN = ('--status-interval', '0.01')
 KINDS = {
-    'reference': Kind(('--profile', 'reference'), '255/0', vendor='Illuminator Vendor'),
-    'ardusub': Kind(('--profile', 'ardusub'), '1/1', strobes=False, measures=False, vendor=None),
+    'reference': Kind(('--profile', 'reference', *OFTEN), '255/0', vendor='Illuminator Vendor'),
+    'ardusub': Kind(('--profile', 'ardusub', *OFTEN), '1/1', strobes=False, measures=False,
+                    vendor=None),
     'extended': Kind(('--profile', 'extended'), '1/243'),
     'bitmask of enum values': Kind(('--mode-bitmask', '3'), '1/243'),
     'bitmask of shifted bits': Kind(('--mode-bitmask', '6'), '1/243'),
@@ -53,126 +52,91 @@ KINDS = {
 
 
 @pytest.fixture(scope='module', params=KINDS)
-def kind_name(request: pytest.FixtureRequest) -> str:
-    """Return the name of each kind in turn."""
-    return str(request.param)
+def kind(request: pytest.FixtureRequest) -> Kind:
+    """Return each kind in turn."""
+    return KINDS[request.param]
 
 
 @pytest.fixture(scope='module')
-def domain(kind_name: str) -> Iterator[int]:
-    """Claim a ROS domain for each kind: a bridge is not to be mixed up with the one before."""
+def domain(kind: Kind) -> Iterator[int]:
+    """Claim a ROS domain for each kind: its bridge must not meet the one before."""
     with own_domain() as domain:
         yield domain
 
 
 @pytest.fixture(scope='module')
-def kind(kind_name: str, domain: int) -> Iterator[tuple[Kind, Program]]:
-    """Run a bridge and a simulated light of each kind."""
-    kind, port = KINDS[kind_name], free_port()
-    url = f'udpout://127.0.0.1:{port}'
-    with contextlib.ExitStack() as stack:
-        bridge = stack.enter_context(running_bridge(domain, port))
-        stack.enter_context(running_simulator(url, '--plain', *kind.options))
+def kind_bridge(kind: Kind, domain: int, ros: Ros) -> Iterator[Program]:
+    """Run a bridge and a simulated light, and wait until its parameters are there."""
+    port = free_port()
+    with (running_bridge(domain, port) as bridge,
+          running_simulator(f'udpout://127.0.0.1:{port}', '--plain', *kind.options)):
         bridge.wait_for(f'light {kind.address} connected')
-        yield kind, bridge
-
-
-@pytest.fixture
-def parameters(ros: Ros, kind: tuple[Kind, Program]) -> Parameters:
-    """Return the parameters of the bridge, which the light has reported."""
-    parameters = Parameters(ros)
-    parameters.wait(mode='internal_control')
-    return parameters
-
-
-@pytest.fixture
-def refresh(ros: Ros) -> Callable[[], Any]:
-    """Return a function that has the light report again."""
-    return lambda: ros.call(Trigger, '/illuminator/refresh', Trigger.Request())
-
-
-def enable(ros: Ros, on: bool) -> SetBool.Response:
-    return ros.call(SetBool, '/illuminator/enable', SetBool.Request(data=on))
+        Parameters(ros).wait(mode='internal_control')
+        yield bridge
 
 
 def lamp(ros: Ros) -> dict[str, str]:
     """Return the values of the lamp's status."""
     recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
     CLOCK.forward(1.0)
-    array = recorder.wait(
-        lambda array: any(status.name == 'illuminator: lamp' for status in array.status))
+    array = recorder.wait(lambda array: len(array.status) == 2)
     return {value.key: value.value for value in array.status[1].values}
 
 
-@pytest.mark.parametrize('on', [True, False])
-def test_it_is_switched_and_that_is_verified(
-    ros: Ros, parameters: Parameters, on: bool,
+def test_light_is_switched_and_that_is_confirmed(ros: Ros, kind_bridge: Program) -> None:
+    for on in (True, False):
+        response = ros.enable(on)
+        assert response.success
+        assert 'confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED' in response.message
+        ros.subscribe(Bool, '/illuminator/enabled').wait_value(on)
+
+
+def test_light_is_configured_and_refuses_only_what_it_cannot_do(
+    ros: Ros, kind: Kind, kind_bridge: Program,
 ) -> None:
-    response = enable(ros, on)
-    assert (response.success, ENABLED in response.message) == (True, True)
-    ros.subscribe(Bool, '/illuminator/enabled').wait_value(on)
-
-
-def test_it_is_configured_and_that_is_verified(ros: Ros, parameters: Parameters) -> None:
+    parameters = Parameters(ros)
     assert parameters.set(brightness=55.0)[0].successful
+    for name, value, before in (('strobe_period', 1.0, 0.0),
+                                ('mode', 'external_sync', 'internal_control')):
+        # A mode is never refused for the bitmask: ArduSub has no other, and says so itself.
+        (result,) = parameters.set(**{name: value})
+        assert result.successful is kind.strobes
+        assert kind.strobes or 'MAV_RESULT_DENIED' in result.reason
+        assert parameters.get(name) == [value if kind.strobes else before]
+        assert parameters.set(mode='internal_control')[0].successful
     assert parameters.get('brightness') == [55.0]
 
 
-def test_what_it_cannot_do_is_refused_by_the_light_and_the_parameter_keeps_its_value(
-    parameters: Parameters, kind: tuple[Kind, Program],
-) -> None:
-    (result,) = parameters.set(strobe_period=1.0)
-    assert result.successful is kind[0].strobes
-    assert kind[0].strobes or 'MAV_RESULT_DENIED' in result.reason
-    assert parameters.get('strobe_period') == [1.0 if kind[0].strobes else 0.0]
-
-
-def test_no_mode_is_refused_for_the_bitmask(
-    parameters: Parameters, kind: tuple[Kind, Program],
-) -> None:
-    (result,) = parameters.set(mode='external_sync')
-    # ArduSub has no other mode, and says so itself.
-    assert result.successful or 'MAV_RESULT_DENIED' in result.reason
-    assert result.successful is (kind[0].address != '1/1')
-    assert parameters.set(mode='internal_control')[0].successful
-
-
-def test_a_temperature_is_published_only_where_it_is_measured(
-    ros: Ros, parameters: Parameters, kind: tuple[Kind, Program], refresh: Callable[[], Any],
+def test_temperature_and_strobe_limits_of_zero_are_not_taken_for_measured_values(
+    ros: Ros, kind: Kind, kind_bridge: Program,
 ) -> None:
     temperatures = ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
     uptimes = ros.subscribe(Float64, '/illuminator/uptime', STREAM)
     uptimes.clear()
     for count in (1, 2, 3):
-        assert refresh().success
+        assert ros.refresh().success
         uptimes.wait(count=count)
-    if kind[0].measures:
+    if kind.measures:
         temperatures.wait(lambda message: message.temperature > 0)
-    assert bool(temperatures.messages) is kind[0].measures
-    assert ('temperature_c' in lamp(ros)) is kind[0].measures
 
-
-def test_strobe_limits_of_0_are_no_limits(
-    parameters: Parameters, kind: tuple[Kind, Program],
-) -> None:
-    (descriptor,) = parameters.describe('strobe_period')
+    assert bool(temperatures.messages) is kind.measures
+    assert ('temperature_c' in lamp(ros)) is kind.measures
+    (descriptor,) = Parameters(ros).describe('strobe_period')
     (span,) = descriptor.floating_point_range
-    assert span.to_value == (10.0 if kind[0].measures else 3600.0)
+    assert span.to_value == (10.0 if kind.measures else 3600.0)
 
 
-def test_who_it_is_comes_as_it_tells_it(
-    ros: Ros, parameters: Parameters, kind: tuple[Kind, Program],
+def test_identity_is_shown_as_the_light_reports_it(
+    ros: Ros, kind: Kind, kind_bridge: Program,
 ) -> None:
     values = lamp(ros)
-    assert values['address'] == kind[0].address
-    assert values.get('vendor') == kind[0].vendor
+    assert (values['address'], values.get('vendor')) == (kind.address, kind.vendor)
     # 28 characters in a field of 24, so it has no terminator.
-    if kind[0].address == '255/0':
+    if kind.address == '255/0':
         assert values['software_version'] == 'Illuminator Software Ver'
 
 
-def test_it_is_neither_lost_nor_taken_for_restarted_or_for_several(
-    ros: Ros, parameters: Parameters, kind: tuple[Kind, Program],
+def test_light_is_neither_lost_nor_taken_for_restarted_or_for_several(
+    kind_bridge: Program,
 ) -> None:
-    assert [text for text in ('lost', 'restarted', 'several')
-            if kind[1].count(text)] == []
+    assert [text for text in ('lost', 'restarted', 'several') if kind_bridge.count(text)] == []
