@@ -21,5 +21,6 @@ from collections.abc import Mapping
 from ..payload.registry import PayloadType
 
 PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
-    PayloadType('illuminator'),
+    PayloadType(
+        'illuminator', simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED'),
 )}

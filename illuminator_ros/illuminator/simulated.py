@@ -21,6 +21,7 @@ https://mavlink.io/en/services/illuminator.html
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 import math
 from typing import Any
 
@@ -38,9 +39,11 @@ from ..mavlink.messages import (
     STATUS_ID,
 )
 from ..payload.faults import Behaviour
+from ..payload.settings import number
 from ..payload.simulated import (
     Change,
     CommandReply,
+    ConsoleCommand,
     Description,
     SimulatedComponents,
     SimulatedDevice,
@@ -49,6 +52,42 @@ from ..payload.simulated import (
 
 # K by which the temperature must change to deserve a line of its own.
 TEMPERATURE_STEP = 5.0
+# % of a strobe that is started by hand while the duty cycle is 0 %.
+DEFAULT_DUTY_CYCLE = 50.0
+
+
+_number = number(-math.inf, math.inf)
+_celsius = number(-273.15, 1000.0)
+
+
+def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Change:
+    # 0 % is dark, so that a period alone would end the light.
+    duty_cycle = (_number(words[1]) if len(words) > 1
+                  else light.lamp.configuration.strobe_duty_cycle or DEFAULT_DUTY_CYCLE)
+    return light.press(now, strobe_period=_number(words[0]), strobe_duty_cycle=duty_cycle)
+
+
+COMMANDS: dict[str, ConsoleCommand[SimulatedIlluminator]] = {
+    'on': ConsoleCommand('on', 'switch on, as by a button on the light',
+                         lambda light, words, now: light.press(now, enabled=True)),
+    'off': ConsoleCommand('off', 'switch off, likewise',
+                          lambda light, words, now: light.press(now, enabled=False)),
+    'brightness': ConsoleCommand(
+        'brightness PERCENT', 'set it, likewise',
+        lambda light, words, now: light.press(now, brightness=_number(words[0])), (1,)),
+    'mode': ConsoleCommand(
+        'mode MODE', 'internal_control or external_sync, likewise',
+        lambda light, words, now: light.press(now, mode=words[0]), (1,)),
+    'strobe': ConsoleCommand(
+        'strobe S [PERCENT]', 'period and duty cycle, likewise; 0 ends it', _strobe, (1, 2)),
+    'ambient': ConsoleCommand(
+        'ambient DEG_C', 'change the ambient temperature',
+        lambda light, words, now: partial(light.lamp.set_ambient, _celsius(words[0]), now),
+        (1,)),
+    'temperature': ConsoleCommand(
+        'temperature DEG_C', "change the light's own temperature",
+        lambda light, words, now: partial(light.lamp.heat_to, _celsius(words[0]), now), (1,)),
+}
 
 
 class SimulatedIlluminator(SimulatedDevice):
@@ -56,11 +95,12 @@ class SimulatedIlluminator(SimulatedDevice):
 
     changes = frozenset({MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE})
     faults = FAULTS
+    commands = COMMANDS
     behaviour: IlluminatorBehaviour
-    normal: IlluminatorBehaviour
+    lamp: SimulatedLamp
 
     def __init__(self, properties: IlluminatorProperties) -> None:
-        super().__init__(properties.behaviour, properties.normal)
+        super().__init__(properties.behaviour)
         self.properties = properties
         self.lamp = SimulatedLamp(properties)
         self.lamp.thermal.sensor_failed = self.behaviour.thermistor_failed

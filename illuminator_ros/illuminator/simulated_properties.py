@@ -88,8 +88,7 @@ class IlluminatorProperties:
     :param modes: the modes that it can be configured to.
     :param status_interval: s between statuses by default; 0 sends none.
     :param time_scale: factor by which it heats and cools faster than real time.
-    :param behaviour: how it behaves at first.
-    :param normal: how it behaves without faults.
+    :param behaviour: how it behaves at first, and without faults.
     :param seed: of its random numbers.
     """
 
@@ -104,7 +103,6 @@ class IlluminatorProperties:
     name: str = ''
     modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
     behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
-    normal: IlluminatorBehaviour = IlluminatorBehaviour()
     seed: int = 0
 
 

@@ -199,9 +199,9 @@ class FaultTable(dict[str, Fault]):
             raise FaultError(f'no fault {name!r}; there are {", ".join(self)}')
         return self[name]
 
-    def add(self, behaviour: B, text: str) -> B:
+    def value(self, text: str) -> Any:
         """
-        Return a behaviour with one more fault.
+        Return the value that a fault sets.
 
         :param text: ``NAME`` or ``NAME=VALUE``.
         :raises FaultError: if there is no such fault, or it cannot have that value.
@@ -209,14 +209,19 @@ class FaultTable(dict[str, Fault]):
         name, equals, value = text.strip().partition('=')
         fault = self.find(name)
         if not equals:
-            return replace(behaviour, **{fault.field: fault.default})
+            return fault.default
         if fault.read is None:
             raise FaultError(f'fault {text!r}: {name} takes no value')
         try:
-            return replace(behaviour, **{fault.field: fault.read(value.strip())})
+            return fault.read(value.strip())
         except ValueError as error:
             raise FaultError(
                 f'fault {text!r}: {value!r} is not a {fault.metavar}: {error}') from error
+
+    def add(self, behaviour: B, text: str) -> B:
+        """Return a behaviour with one more fault, see :meth:`value`."""
+        value = self.value(text)
+        return replace(behaviour, **{self.find(text.strip().partition('=')[0]).field: value})
 
     def remove(self, behaviour: B, normal: B, name: str) -> B:
         """

@@ -19,15 +19,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import functools
+from functools import cached_property
 import heapq
 import itertools
 import math
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
+from .events import Listeners
 from .fault_injector import FaultInjector
 from .faults import Behaviour, FAULTS, FaultTable
+from .settings import common_settings, Setting
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (
@@ -43,10 +46,13 @@ from ..mavlink.messages import (
 
 # s; the shortest interval of a stream, which also serves requests for shorter ones.
 SHORTEST_INTERVAL = 0.01
+# Addresses that are reported as peers.
+MAX_PEERS = 100
 # s between reports of progress.
 PROGRESS_INTERVAL = 0.5
 
 Change = Callable[[], None]
+D_contra = TypeVar('D_contra', contravariant=True)
 
 
 class CommandReply(NamedTuple):
@@ -70,24 +76,40 @@ class Snapshot(NamedTuple):
     drift: float = 0.0
 
 
+@dataclass(frozen=True)
+class ConsoleCommand(Generic[D_contra]):
+    """
+    A command that a person gives to a simulated device, as with a button on it.
+
+    :param usage: the command and its arguments.
+    :param do: returns the change that the arguments ask for; ValueError if there is none.
+    :param counts: how many arguments it takes.
+    """
+
+    usage: str
+    help: str  # noqa: A003
+    do: Callable[[D_contra, list[str], float], Change]
+    counts: tuple[int, ...] = (0,)
+
+
 class SimulatedDevice(ABC):
     """
     The part of a simulated component that is its payload's: state, commands and messages.
 
     No I/O; ``now`` is s on the link's clock.
 
-    :param behaviour: how it behaves at first.
-    :param normal: how it behaves without faults; None is the same.
+    :param behaviour: how it behaves at first, and without faults.
     :cvar changes: the MAV_CMDs that change its state.
     :cvar faults: the faults that it can have.
+    :cvar commands: what a person can do with it on the console.
     """
 
     changes: ClassVar[frozenset[int]]
     faults: ClassVar[FaultTable] = FAULTS
+    commands: ClassVar[Mapping[str, ConsoleCommand[Any]]] = {}
 
-    def __init__(self, behaviour: Behaviour, normal: Behaviour | None = None) -> None:
-        self.behaviour = behaviour
-        self.normal = behaviour if normal is None else normal
+    def __init__(self, behaviour: Behaviour) -> None:
+        self.behaviour = self.normal = behaviour
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
@@ -115,6 +137,36 @@ class SimulatedDevice(ABC):
 
 
 D = TypeVar('D', bound=SimulatedDevice)
+
+
+@dataclass(frozen=True)
+class SimulatedType(Generic[D]):
+    """
+    The simulated side of a payload, as the simulator offers it.
+
+    :param noun: names one device; the option ``--light`` and messages have it.
+    :param plural: the key of the YAML file.
+    :param device: the class, for its faults and its console.
+    :param make: makes a device from settings, its address, and whether there are several;
+        ValueError if the settings contradict each other.
+    :param address: the address by default, from settings.
+    :param profiles: descriptions of the values of the setting ``profile``.
+    :param notes: further paragraphs of ``--help``.
+    """
+
+    noun: str
+    plural: str
+    device: type[D]
+    make: Callable[[Mapping[str, Any], Address, bool], D]
+    address: Callable[[Mapping[str, Any]], Address]
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+    profiles: Mapping[str, str] = field(default_factory=dict)
+    notes: str = ''
+
+    @cached_property
+    def all_settings(self) -> Mapping[str, Setting]:
+        """The settings of the payload, and those of every payload."""
+        return {**self.settings, **common_settings(self.noun, self.device.faults)}
 
 
 @dataclass(frozen=True)
@@ -407,10 +459,13 @@ class SimulatedComponents(Endpoint, Generic[D]):
     Any number of simulated components on one link, of one payload or of several.
 
     :ivar components: in the order of their descriptions.
+    :ivar new_peers: the address of each other component, with the first message from it.
     """
 
     def __init__(self, described: Iterable[Description[D]], now: float) -> None:
         super().__init__()
+        self.new_peers: Listeners[Address] = Listeners()
+        self._peers: set[Address] = set()
         self._deadlines: DeadlineQueue[int] = DeadlineQueue()
         # Indexes of the components whose deadline is entered when the next one is asked for.
         self._changed: set[int] = set()
@@ -426,6 +481,9 @@ class SimulatedComponents(Endpoint, Generic[D]):
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
+        if source not in self._peers and len(self._peers) < MAX_PEERS:
+            self._peers.add(source)
+            self.new_peers.emit(source)
         if isinstance(message, CommandLong | CommandInt):
             for component in self.components:
                 component.receive(source, message, now)

@@ -16,12 +16,12 @@
 
 from dataclasses import replace
 
-from illuminator_ros.cli.simulator.settings import properties
 from illuminator_ros.illuminator.checks.requirement import Verdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
+from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload.simulated import CommandReply
 import pytest

@@ -18,11 +18,12 @@ from pathlib import Path
 import re
 
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
-from illuminator_ros.cli.simulator.lights import scenario
-from illuminator_ros.cli.simulator.settings import SETTINGS
+from illuminator_ros.cli.simulator.scenario import scenario
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
+from illuminator_ros.illuminator.simulated_settings import SIMULATED
 import pytest
 from support.tables import table
 
@@ -59,8 +60,9 @@ def test_the_sample_report_has_known_requirements() -> None:
                 fault.description, fault.default_text] for name, fault in FAULTS.items()]),
     ('profile', [[f'`{name}`', profile.description] for name, profile in PROFILES.items()]),
     ('setting', [[f'`{name}`', setting.metavar, setting.help]
-                 for name, setting in SETTINGS.items()]),
-    ('command', [*([f'`{one.usage}`', one.help] for one in COMMANDS.values()),
+                 for name, setting in SIMULATED.all_settings.items()]),
+    ('command', [*([f'`{one.usage}`', one.help]
+                   for one in {**LIGHT_COMMANDS, **COMMANDS}.values()),
                  *([f'`{name}`', text] for name, text in OTHERS.items())]),
 ])
 def test_a_table_of_the_simulator_has_every_row(heading: str, rows: list[list[str]]) -> None:
@@ -71,6 +73,6 @@ def test_the_sample_file_of_the_simulator_is_valid() -> None:
     yaml = pytest.importorskip('yaml')
     text = SIMULATOR.partition('```yaml\n')[2].partition('```')[0]
 
-    lights = scenario(yaml.safe_load(text), 'the sample').lights
+    lights = scenario(yaml.safe_load(text), 'the sample', [SIMULATED]).listed['light']
 
-    assert [name for _, name, _ in lights] == ['bow', 'stern']
+    assert [one.name for one in lights] == ['bow', 'stern']

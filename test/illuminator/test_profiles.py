@@ -14,10 +14,10 @@
 
 """Lights as they are seen in the field."""
 
-from illuminator_ros.cli.simulator.settings import properties
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated import describe
 from illuminator_ros.illuminator.simulated_properties import PROFILES
+from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,

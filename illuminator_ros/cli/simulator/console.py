@@ -12,173 +12,114 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The console of the simulator: commands to simulated lights while they run. No I/O."""
+"""The console of the simulator: commands to simulated components while they run. No I/O."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from .view import look
-from ...illuminator.faults import FAULTS
-from ...illuminator.model import InvalidValue
-from ...illuminator.simulated import SimulatedIlluminator
-from ...payload.faults import FaultError
-from ...payload.simulated import SimulatedComponent
+from ...payload.simulated import ConsoleCommand, SimulatedComponent
 
-Light = SimulatedComponent[SimulatedIlluminator]
-
-
-class _Wrong(ValueError):
-    """A line that cannot be executed; the message says why."""
+Component = SimulatedComponent[Any]
 
 
 @dataclass(frozen=True)
 class _Command:
     usage: str
     help: str  # noqa: A003
-    do: Callable[[Light, list[str], float], str]
-    counts: tuple[int, ...]
+    do: Callable[[Component, list[str], float], str | None]
+    counts: tuple[int, ...] = (0,)
 
 
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise _Wrong(f'{text!r} is not a number') from None
-
-
-def _fault(light: Light, words: list[str], now: float) -> str:
+def _fault(component: Component, words: list[str], now: float) -> None:
     # Without an interval, a restart is an event.
     if words == ['reboot']:
-        light.restart(now)
+        component.restart(now)
     else:
-        light.behave(FAULTS.add(light.behaviour, words[0]), now)
-    return ''
+        component.behave(component.device.faults.add(component.behaviour, words[0]), now)
 
 
-def _clear(light: Light, words: list[str], now: float) -> str:
-    normal = light.device.normal
-    behaviour = FAULTS.remove(light.behaviour, normal, words[0]) if words else normal
-    light.behave(behaviour, now)
-    return ''
+def _clear(component: Component, words: list[str], now: float) -> None:
+    device = component.device
+    component.behave(
+        device.faults.remove(device.behaviour, device.normal, words[0]) if words
+        else device.normal, now)
 
 
-def _reboot(light: Light, words: list[str], now: float) -> str:
-    light.restart(now)
-    return ''
+def _faults(component: Component, words: list[str], now: float) -> str:
+    device = component.device
+    texts = device.faults.as_typed(device.behaviour, device.normal)
+    return f'{component.address}: {", ".join(texts) or "no fault"}'
 
 
-def _celsius(text: str) -> float:
-    value = _number(text)
-    if not -273.15 <= value <= 1000:
-        raise _Wrong(f'{text} degC is not possible')
-    return value
-
-
-def _ambient(light: Light, words: list[str], now: float) -> str:
-    light.device.lamp.set_ambient(_celsius(words[0]), now)
-    return ''
-
-
-def _temperature(light: Light, words: list[str], now: float) -> str:
-    light.device.lamp.heat_to(_celsius(words[0]), now)
-    return ''
-
-
-def _on(light: Light, words: list[str], now: float) -> str:
-    light.apply(light.device.press(now, enabled=True), now)
-    return ''
-
-
-def _off(light: Light, words: list[str], now: float) -> str:
-    light.apply(light.device.press(now, enabled=False), now)
-    return ''
-
-
-def _brightness(light: Light, words: list[str], now: float) -> str:
-    light.apply(light.device.press(now, brightness=_number(words[0])), now)
-    return ''
-
-
-def _mode(light: Light, words: list[str], now: float) -> str:
-    light.apply(light.device.press(now, mode=words[0]), now)
-    return ''
-
-
-def _strobe(light: Light, words: list[str], now: float) -> str:
-    duty = (_number(words[1]) if len(words) > 1
-            else light.device.lamp.configuration.strobe_duty_cycle)
-    light.apply(light.device.press(
-        now, strobe_period=_number(words[0]), strobe_duty_cycle=duty), now)
-    return ''
-
-
-def _status(light: Light, words: list[str], now: float) -> str:
-    return str(look(light, now))
-
-
-def _faults(light: Light, words: list[str], now: float) -> str:
-    texts = FAULTS.as_typed(light.behaviour, light.device.normal)
-    return f'{light.address}: {", ".join(texts) or "no fault"}'
-
-
-COMMANDS = {
-    'on': _Command('on', 'switch on, as by a button on the light', _on, (0,)),
-    'off': _Command('off', 'switch off, likewise', _off, (0,)),
-    'brightness': _Command('brightness PERCENT', 'set it, likewise', _brightness, (1,)),
-    'mode': _Command('mode MODE', 'internal_control or external_sync, likewise', _mode, (1,)),
-    'strobe': _Command('strobe S [PERCENT]', 'period and duty cycle, likewise; 0 ends it',
-                       _strobe, (1, 2)),
-    'ambient': _Command('ambient DEG_C', 'change the ambient temperature', _ambient, (1,)),
-    'temperature': _Command('temperature DEG_C', "change the light's own temperature",
-                            _temperature, (1,)),
-    'reboot': _Command('reboot', 'restart, as after a power cycle', _reboot, (0,)),
-    'fault': _Command('fault NAME[=VALUE]', 'have something go wrong', _fault, (1,)),
+# The commands of every component.
+COMMANDS: Mapping[str, _Command] = {
+    'reboot': _Command('reboot', 'restart, as after a power cycle',
+                       lambda component, words, now: component.restart(now)),
+    'fault': _Command('fault NAME[=VALUE]', 'start a fault', _fault, (1,)),
     'clear': _Command('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
-    'faults': _Command('faults', 'show which faults there are now', _faults, (0,)),
-    'status': _Command('status', 'show what each light does', _status, (0,)),
+    'faults': _Command('faults', 'show the present faults', _faults),
+    'status': _Command('status', 'show the state of each component',
+                       lambda component, words, now: str(look(component, now))),
 }
 OTHERS = {'help': 'show this', 'quit': 'end'}
 
 
-def describe_commands() -> str:
-    """Return what can be typed, a line each."""
-    rows = [(command.usage, command.help) for command in COMMANDS.values()]
-    return '\n'.join(f'  {usage:20} {text}' for usage, text in [*rows, *OTHERS.items()])
+def describe_commands(tables: Iterable[Mapping[str, _Command | ConsoleCommand[Any]]]) -> str:
+    """Return the commands of the console, a line each; those of every component come last."""
+    common, *own = tables
+    rows = {one.usage: one.help for table in (*own, common) for one in table.values()}
+    return '\n'.join(f'  {usage:20} {text}' for usage, text in {**rows, **OTHERS}.items())
 
 
-def execute(line: str, lights: Sequence[Light], now: float) -> str:
+def execute(line: str, components: Sequence[Component], now: float) -> str:
     """
-    Do what a line says, and return the answer.
+    Execute a line, and return the answer.
 
-    :param line: a command, or the id or name of a light and a command.
+    :param line: a command, or the id or name of a component and a command.
     """
     words = line.split()
     if not words:
         return ''
-    selected = [one for one in lights if words[0] in (str(one.address), one.name)]
-    if words[0] in ('all', '*') or (selected and words[0] not in COMMANDS):
+    devices = {type(one.device): one.device for one in components}.values()
+    own = {name: command for device in devices for name, command in device.commands.items()}
+    selected = [one for one in components if words[0] in (str(one.address), one.name)]
+    if words[0] in ('all', '*') or (selected and words[0] not in {**own, **COMMANDS}):
         words = words[1:] or ['status']
     else:
         selected = []
     name, *rest = words
     if name == 'help':
-        return f'{describe_commands()}\nfaults:\n{FAULTS.describe()}'
-    # The option's way to name a light, which has a place of its own here.
-    light, colon, fault = words[-1].rpartition(':')
+        commands = describe_commands([COMMANDS, *(device.commands for device in devices)])
+        faults = '\n'.join(device.faults.describe() for device in devices)
+        return f'{commands}\nfaults:\n{faults}'
+    # The option --fault names a component in another way than the console.
+    component, colon, fault = words[-1].rpartition(':')
     if colon and words[:-1] in ([], ['fault'], ['--fault']):
-        return f'for one light: {light} fault {fault}'
-    # So that a fault that was seen in --help works as it stands there.
-    if name.partition('=')[0] in FAULTS and name not in COMMANDS:
+        return f'for one component: {component} fault {fault}'
+    # A fault works as --help shows it, too.
+    if name not in own and any(name.partition('=')[0] in device.faults for device in devices
+                               ) and name not in COMMANDS:
         name, rest = 'fault', [name, *rest]
-    command = COMMANDS.get(name)
-    if command is None:
-        return f'no command or light {name!r}; help lists the commands'
+    command = COMMANDS.get(name) or own.get(name)
+    targets = [one for one in selected or components
+               if name in COMMANDS or name in one.device.commands]
+    if command is None or not targets:
+        return f'no command or component {name!r}; help lists the commands'
     if len(rest) not in command.counts:
         return f'usage: {command.usage}'
     try:
-        answers = [command.do(one, rest, now) for one in selected or lights]
-    except (_Wrong, FaultError, InvalidValue) as error:
+        answers = [_execute(name, one, rest, now) for one in targets]
+    except ValueError as error:
         return str(error)
     return '\n'.join(filter(None, answers)) or 'done'
+
+
+def _execute(name: str, component: Component, words: list[str], now: float) -> str | None:
+    if name in COMMANDS:
+        return COMMANDS[name].do(component, words, now)
+    component.apply(component.device.commands[name].do(component.device, words, now), now)
+    return None

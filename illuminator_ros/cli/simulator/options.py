@@ -17,21 +17,41 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable, Mapping
+from typing import Any
 
-from .console import describe_commands
-from .settings import read, SettingError, SETTINGS, THERMAL
+from .console import COMMANDS, describe_commands
+from .scenario import Types
+from .settings import read, SettingError
 from ..options import add_signing, integer, Parser
+from ..payloads import PAYLOADS
 from ... import __version__
-from ...illuminator.faults import FAULTS
-from ...illuminator.simulated_properties import PROFILES
+from ...payload.registry import PayloadType
 
 DEFAULT_URL = 'udpout://127.0.0.1:14590'
+DEFAULT_PAYLOAD = 'illuminator'
 
 
-def _epilog() -> str:
-    profiles = '\n'.join(f'  {name:10} {profile.description}'
-                         for name, profile in PROFILES.items())
-    thermal = ', '.join(f'{name}={value:g}' for name, value in THERMAL.items())
+def payload_types(args: Iterable[str] | None, payloads: Mapping[str, PayloadType]) -> Types:
+    """Return the simulated sides that ``--payload`` names; the other options depend on them."""
+    names = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    names.add_argument('--payload', default=DEFAULT_PAYLOAD)
+    listed = names.parse_known_args(None if args is None else list(args))[0].payload.split(',')
+    for name in listed:
+        if name not in payloads:
+            raise SettingError(f'--payload {name}: it is not one of {", ".join(payloads)}')
+    return [payloads[name].load('simulated') for name in dict.fromkeys(listed)]
+
+
+def _epilog(types: Types) -> str:
+    profiles = '\n'.join(f'  {name:10} {description}' for one in types
+                         for name, description in one.profiles.items())
+    paragraphs = [
+        *([f'profiles:\n{profiles}'] if profiles else []),
+        *(one.notes for one in types if one.notes),
+        *(f'faults of a {one.noun}, for --fault, the file and the console; several are separated '
+          f'by commas:\n{one.device.faults.describe()}' for one in types)]
+    details = '\n\n'.join(paragraphs)
     return f"""\
 examples:
   simulator
@@ -40,50 +60,54 @@ examples:
   simulator --ambient 60 --time-scale 60      gets hot in seconds
   simulator --file lights.yaml                the same settings, for each light
 
-profiles:
-{profiles}
+{details}
 
-thermal, with defaults (degC, K and s; throttle_to is a share of the brightness):
-  {thermal}
-
-faults, for --fault, the file and the console; several are separated by commas:
-{FAULTS.describe()}
-
-console: lines on standard input, for all lights or, behind its id or name, for one
-{describe_commands()}
+console: lines on standard input, for all components or, after its id or name, for one
+{describe_commands([COMMANDS, *(one.device.commands for one in types)])}
 
 exit status: 0 after a signal (SIGINT, SIGTERM, SIGHUP) or quit, 1 if a package is missing, 2 if an
 argument is wrong."""
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
+def parser(
+    types: Types | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> argparse.ArgumentParser:
+    """Return the parser of the command line for some payloads, by default the default one."""
+    types = types or payload_types([], payloads)
+    plurals, nouns = ([getattr(one, name) for one in types] for name in ('plural', 'noun'))
     result = Parser(
         prog='simulator', formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='One or more MAVLink illuminators without hardware.\n'
+        description=f'MAVLink {" and ".join(plurals)} without hardware.\n'
                     'Without arguments it finds a bridge that was started without arguments.',
-        epilog=_epilog())
+        epilog=_epilog(types))
     result.add_argument('url', nargs='?',
                         help='the link to a bridge, router or autopilot: UDP, TCP or serial '
                              f'(default: {DEFAULT_URL})')
     result.add_argument('--version', action='version', version=__version__)
-    result.add_argument('--file', metavar='FILE', help='read url, settings and lights from YAML')
+    result.add_argument('--payload', metavar='NAME,...',
+                        help=f'what is simulated: {", ".join(payloads)} '
+                             f'(default: {DEFAULT_PAYLOAD})')
+    result.add_argument('--file', metavar='FILE',
+                        help=f'read url, settings and {", ".join(plurals)} from YAML')
     result.add_argument('--count', type=integer(1, 200), metavar='N',
-                        help='number of lights, with component ids counted up (default: 1)')
+                        help=f'number of {", ".join(plurals)}, with component ids counted up '
+                             '(default: 1)')
     result.add_argument('--system-id', type=integer(1, 255), metavar='ID',
                         help="MAVLink system id (default: the profile's, mostly 1)")
     result.add_argument('--component-id', type=integer(0, 255), metavar='ID',
-                        help="component id of the first light (default: the profile's, mostly "
-                             '243)')
-    result.add_argument('--light', action='append', metavar='SYS/COMP[=NAME]',
-                        help='a light, instead of --count; may be repeated')
-    for name, setting in SETTINGS.items():
+                        help=f"component id of the first {' or '.join(nouns)} (default: the "
+                             "profile's, mostly 243)")
+    for noun in nouns:
+        result.add_argument(f'--{noun}', action='append', metavar='SYS/COMP[=NAME]',
+                            help=f'a {noun}, instead of --count; may be repeated')
+    for name, setting in {name: setting for one in types
+                          for name, setting in one.all_settings.items()}.items():
         option = f'--{name.replace("_", "-")}'
         if name == 'fault':
             result.add_argument(option, action='append', metavar=setting.metavar,
                                 help=setting.help)
         else:
-            result.add_argument(option, type=_Reader(name), metavar=setting.metavar,
+            result.add_argument(option, type=_Reader(name, types), metavar=setting.metavar,
                                 help=setting.help)
     result.add_argument('--plain', action='store_true',
                         help='plain lines on a terminal, too, instead of the live view')
@@ -92,13 +116,15 @@ def parser() -> argparse.ArgumentParser:
 
 
 class _Reader:
-    """Reads a setting for argparse, whose own messages leave out the reason."""
+    """Reads a setting for each type that has it; argparse's own messages lack the reason."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, types: Types) -> None:
         self._name = name
+        self._types = [one for one in types if name in one.all_settings]
 
-    def __call__(self, text: str) -> object:
+    def __call__(self, text: str) -> dict[str, Any]:
         try:
-            return read(self._name, text, text)
+            return {one.noun: read(one.all_settings, self._name, text, text)
+                    for one in self._types}
         except SettingError as error:
             raise argparse.ArgumentTypeError(str(error).partition(': ')[2]) from error

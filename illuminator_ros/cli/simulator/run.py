@@ -17,86 +17,93 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
+from collections.abc import Iterable, Mapping
+import contextlib
 import functools
 import logging
 import queue
 import signal
 import sys
 import threading
+from typing import Any
 
 from .console import execute
-from .lights import lights, load, Scenario
-from .options import DEFAULT_URL, parser
+from .options import DEFAULT_URL, parser, payload_types
+from .scenario import components, load, Scenario, Types
 from .settings import SettingError
 from .view import LiveView, Look, look, PlainView
 from ..options import signing
+from ..payloads import PAYLOADS
 from ..termination import Termination
-from ...illuminator.simulated import simulated_lights
-from ...illuminator.simulated_properties import IlluminatorProperties
 from ...mavlink.link import Link
-from ...mavlink.link_state import LinkEvent
+from ...mavlink.messages import Address
 from ...mavlink.signing_files import KeyFileError
 from ...mavlink.url import parse_url, Url, UrlError
+from ...payload.registry import PayloadType
+from ...payload.simulated import Description, SimulatedComponents
 
-# s between looks at the lights.
+# s between updates of the view.
 VIEW_INTERVAL = 0.2
+# Lines that wait for a terminal that is stopped with ctrl-s; later ones are dropped.
+MAX_TEXTS = 1000
 
 
 class _Simulation:
-    """The lights on their link, and who looks at them."""
+    """The simulated components on their link, and their view."""
 
     def __init__(
         self, options: argparse.Namespace, url: Url, label: str,
-        described: list[IlluminatorProperties],
+        described: list[Description[Any]], types: Types,
     ) -> None:
+        names = [str(one.address) for one in described]
+        counts = Counter(type(one.device) for one in described)
+        kinds = ', '.join(f'{count} {one.noun if count == 1 else one.plural}' for one in types
+                          if (count := counts[one.device]))
+        self._headline = f'{kinds}: {", ".join(names[:8])}{" ..." if len(names) > 8 else ""}'
         signs, store = signing(options, f'simulator {described[0].address}')
-        # What is to be written, with the line that it answers; None ends it all.
-        self._texts: queue.SimpleQueue[tuple[str, str | None] | None] = queue.SimpleQueue()
+        # Text to write, with the line that it answers; None ends the process.
+        self._texts: queue.Queue[tuple[str, str | None] | None] = queue.Queue(MAX_TEXTS)
+        self._ended = threading.Event()
         self._looks: list[Look] = []
         live = sys.stdout is not None and sys.stdout.isatty() and not options.plain
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
-        self._endpoint = simulated_lights(described, 0.0)
-        self._link = Link(url, self._endpoint, label=label, on_event=self._note,
+        self._endpoint: SimulatedComponents[Any] = SimulatedComponents(described, 0.0)
+        self._endpoint.new_peers.subscribe(self._found)
+        self._link = Link(url, self._endpoint, label=label, on_event=self._say,
                           signing=signs, store=store)
         for component in self._endpoint.components:
             component.power_on(self._link.clock())
 
     def run(self, termination: Termination) -> None:
         """Run until a signal or ``quit``."""
-        names = [str(component.address) for component in self._endpoint.components]
-        self._view.say(f'{len(names)} light{"s"[:len(names) > 1]}: ' + ', '.join(names[:8])
-                       + (' ...' if len(names) > 8 else ''))
+        self._view.say(self._headline)
         termination.calls(self._end)
         self._link.start()
         # A background job that reads from its terminal is stopped, if it does not ignore this.
         signal.signal(signal.SIGTTIN, signal.SIG_IGN)
         threading.Thread(target=self._listen, name='console', daemon=True).start()
-        while True:
+        while not self._ended.is_set():
             self._link.call(self._look)
-            try:
-                text = self._texts.get(timeout=VIEW_INTERVAL)
-            except queue.Empty:
-                pass
-            else:
-                if text is None:
-                    break
-                self._view.say(text[0], typed=text[1])
+            with contextlib.suppress(queue.Empty):
+                if (text := self._texts.get(timeout=VIEW_INTERVAL)) is not None:
+                    self._view.say(text[0], typed=text[1])
             self._view.show(self._looks)
         self._link.stop()
 
     def _end(self) -> None:
-        self._texts.put(None)
+        self._ended.set()
+        self._put(None)
 
     def _look(self, now: float) -> None:
         self._looks = [look(component, now) for component in self._endpoint.components]
 
     def _listen(self) -> None:
-        """Do what is typed; without anybody to type there is nothing to do."""
-        while True:
+        """Execute the lines of standard input, until its end."""
+        while sys.stdin:
             try:
-                line = sys.stdin.readline() if sys.stdin else ''
+                line = sys.stdin.readline()
             except UnicodeDecodeError:
-                # What is no text is no command.
                 continue
             except (OSError, ValueError):
                 return
@@ -108,24 +115,37 @@ class _Simulation:
         if line.strip() == 'quit':
             self._end()
         else:
-            self._texts.put((execute(line, self._endpoint.components, now), line))
+            self._put((execute(line, self._endpoint.components, now), line))
 
-    def _note(self, event: LinkEvent) -> None:
-        self._texts.put((str(event), None))
+    def _found(self, address: Address) -> None:
+        self._say(f'peer {address}: first message')
+
+    def _say(self, event: object) -> None:
+        self._put((str(event), None))
+
+    def _put(self, text: tuple[str, str | None] | None) -> None:
+        with contextlib.suppress(queue.Full):
+            self._texts.put_nowait(text)
 
 
-def run(args: list[str] | None, termination: Termination) -> int:
+def run(
+    args: Iterable[str] | None, termination: Termination,
+    payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> int:
     """
     Run the simulator until a signal or ``quit``, and return the exit status.
 
     :param args: the command line without the program's name; None takes the process's.
+    :param payloads: the payloads that it offers.
     """
-    options = parser().parse_args(args)
     logging.basicConfig(format='%(message)s')
     try:
-        file = load(options.file) if options.file else Scenario()
+        types = payload_types(args, payloads)
+        options = parser(types, payloads).parse_args(None if args is None else list(args))
+        file = load(options.file, types) if options.file else Scenario()
         label = options.url or file.url or DEFAULT_URL
-        simulation = _Simulation(options, parse_url(label), label, lights(options, file))
+        simulation = _Simulation(
+            options, parse_url(label), label, components(options, file, types), types)
     except (UrlError, SettingError, KeyFileError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return 2

@@ -1,0 +1,211 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The components to simulate, from the command line and a YAML file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .settings import merged, read, SettingError
+from ..options import address
+from ...mavlink.messages import Address
+from ...payload.simulated import Description, SimulatedType
+
+MAX_COMPONENTS = 200
+
+Types = Sequence[SimulatedType[Any]]
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One component that the command line or a file lists."""
+
+    address: Address
+    name: str = ''
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """
+    The content of a file.
+
+    :param common: the settings of all components, by the noun of their type.
+    :param listed: the components; none leaves them to the command line.
+    """
+
+    url: str = ''
+    common: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    listed: Mapping[str, list[Listed]] = field(default_factory=dict)
+
+
+def load(path: str, types: Types) -> Scenario:
+    """
+    Read a YAML file.
+
+    :raises SettingError: if it cannot be read, or a setting in it is wrong.
+    """
+    try:
+        import yaml
+    except ModuleNotFoundError as error:
+        raise SettingError(
+            f'{path}: YAML files need PyYAML: pip install pyyaml, or apt install python3-yaml'
+        ) from error
+    try:
+        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except OSError as error:
+        raise SettingError(f'{path}: {error.strerror}') from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise SettingError(f'{path}: not YAML: {" ".join(str(error).split())}') from error
+    return scenario(content, path, types)
+
+
+def scenario(content: Any, path: str, types: Types) -> Scenario:
+    """Return the content of a file, checked; SettingError if a setting in it is wrong."""
+    if not isinstance(content, Mapping):
+        raise SettingError(f'{path}: it has no keys such as {types[0].plural}')
+    others = ('url', *(one.plural for one in types))
+    common = _settings(content, others, path, types)
+    listed = {one.noun: list(_listed(content.get(one.plural) or [], path, one))
+              for one in types}
+    return Scenario(str(content.get('url') or ''), common, listed)
+
+
+def _listed(entries: Any, path: str, kind: SimulatedType[Any]) -> Iterator[Listed]:
+    if not isinstance(entries, list) or not all(isinstance(one, Mapping) for one in entries):
+        raise SettingError(f'{path}: {kind.plural} is not a list of {kind.plural}')
+    for number, one in enumerate(entries, 1):
+        place = f'{path}: {kind.noun} {number}'
+        try:
+            where = address(str(one.get('id', '')))
+        except ValueError as error:
+            raise SettingError(f'{place}: id: {error}') from error
+        settings = _settings(one, ('id', 'name'), place, [kind])
+        yield Listed(where, str(one.get('name', '')), settings[kind.noun])
+
+
+def _settings(
+    content: Mapping[Any, Any], others: tuple[str, ...], place: str, types: Types,
+) -> dict[str, dict[str, Any]]:
+    """Return the settings for each type that has them; the key ``faults`` is a setting, too."""
+    result: dict[str, dict[str, Any]] = {one.noun: {} for one in types}
+    for key, value in content.items():
+        name = 'fault' if key == 'faults' else key
+        having = [one for one in types if name in one.all_settings and key != 'fault']
+        if not having and key not in others:
+            known = dict.fromkeys(name for one in types for name in one.all_settings)
+            raise SettingError(f'{place}: no setting {key!r}; there are '
+                               + ', '.join([*others, *known]))
+        for one in having:
+            result[one.noun][name] = read(one.all_settings, name, value, f'{place}: {key}')
+    return result
+
+
+def components(
+    options: argparse.Namespace, file: Scenario, types: Types,
+) -> list[Description[Any]]:
+    """
+    Return the components that command line and file describe.
+
+    :raises SettingError: if they contradict each other.
+    """
+    listed = {one.noun: _of_type(options, file, one) for one in types}
+    everyone = [one for some in listed.values() for one in some]
+    if len(everyone) > MAX_COMPONENTS:
+        raise SettingError(f'{len(everyone)} {types[0].plural} are more than {MAX_COMPONENTS}')
+    addresses = [one.address for one in everyone]
+    if twice := {str(one) for one in addresses if addresses.count(one) > 1}:
+        raise SettingError(
+            f'two {types[0].plural} have the address {", ".join(sorted(twice))}')
+    faults = _faults(options.fault or (), everyone, types)
+    return [_described(one, kind, _common(options, file, kind), faults[one.address],
+                       several=len(listed[kind.noun]) > 1)
+            for kind in types for one in listed[kind.noun]]
+
+
+def _common(
+    options: argparse.Namespace, file: Scenario, kind: SimulatedType[Any],
+) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Return the settings of all components of a type: those of the file, those of the options."""
+    given = {name: value[kind.noun] for name in kind.all_settings
+             if name != 'fault' and (value := getattr(options, name)) is not None}
+    return file.common.get(kind.noun, {}), given
+
+
+def _of_type(
+    options: argparse.Namespace, file: Scenario, kind: SimulatedType[Any],
+) -> list[Listed]:
+    listed = ([_named(kind, text) for text in getattr(options, kind.noun) or ()]
+              or file.listed.get(kind.noun, []))
+    counted = [f'--{name.replace("_", "-")}' for name in ('count', 'system_id', 'component_id')
+               if getattr(options, name) is not None]
+    if listed and counted:
+        raise SettingError(f'{counted[0]} is for {kind.plural} that neither --{kind.noun} nor a '
+                           'file lists')
+    if listed:
+        return listed
+    default = kind.address(merged(kind.all_settings, *_common(options, file, kind)))
+    system = options.system_id or default.system
+    first = default.component if options.component_id is None else options.component_id
+    count = options.count or 1
+    last = first + count - 1
+    if last > 255:
+        raise SettingError(f'--count {count} from component id {first} reaches {last}; '
+                           'component ids end at 255')
+    return [Listed(Address(system, component)) for component in range(first, last + 1)]
+
+
+def _named(kind: SimulatedType[Any], text: str) -> Listed:
+    where, _, name = text.partition('=')
+    try:
+        return Listed(address(where), name)
+    except ValueError as error:
+        raise SettingError(f'--{kind.noun} {text}: {error}') from error
+
+
+def _faults(
+    texts: Sequence[str], listed: Sequence[Listed], types: Types,
+) -> dict[Address, tuple[str, ...]]:
+    """Return the faults of each component; ``NAME:`` in front of a fault selects one."""
+    result: dict[Address, tuple[str, ...]] = {one.address: () for one in listed}
+    for text in texts:
+        selected, colon, fault = text.rpartition(':')
+        found = [one.address for one in listed
+                 if not colon or selected in (str(one.address), one.name)]
+        if not found:
+            raise SettingError(f'--fault {text}: there is no {types[0].noun} {selected!r}')
+        for where in found:
+            result[where] += (fault,)
+    return result
+
+
+def _described(
+    one: Listed, kind: SimulatedType[Any],
+    common: tuple[Mapping[str, Any], Mapping[str, Any]], faults: Sequence[str], *, several: bool,
+) -> Description[Any]:
+    of_file, given = common
+    settings = merged(kind.all_settings, of_file, one.settings, given, *(
+        {'fault': read(kind.all_settings, 'fault', fault, '--fault')} for fault in faults))
+    try:
+        device = kind.make(settings, one.address, several and 'serial_number' not in one.settings)
+    except ValueError as error:
+        raise SettingError(f'{kind.noun} {one.address}: {error}') from error
+    for fault in settings.get('fault', ()):
+        device.behave(device.faults.add(device.behaviour, fault), 0.0)
+    return Description(one.address, device, one.name, settings.get('seed', 0))

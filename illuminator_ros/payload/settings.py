@@ -1,0 +1,98 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Settings of simulated components, for the command line and the YAML file of the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from .faults import FaultTable
+
+
+@dataclass(frozen=True)
+class Setting:
+    """
+    One setting: ``status_interval`` of the file is the option ``--status-interval``.
+
+    :param read: makes a value from text; raises ValueError, whose message gives the reason.
+    :param adds: whether a second value is added to the first, which it otherwise replaces.
+    """
+
+    metavar: str
+    help: str  # noqa: A003
+    read: Callable[[str], Any]
+    adds: bool = False
+
+
+def number(low: float, high: float) -> Callable[[str], float]:
+    """Return a reader of numbers within a range."""
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise ValueError(f'{text!r} is not a number') from None
+        if not low <= value <= high:
+            raise ValueError(f'{text} is outside {low:g} to {high:g}')
+        return value
+    return read
+
+
+def integer(low: int, high: int) -> Callable[[str], int]:
+    """Return a reader of integers within a range; hexadecimal is ``0x...``."""
+    def read(text: str) -> int:
+        try:
+            value = int(text, 0)
+        except ValueError:
+            raise ValueError(f'{text!r} is not an integer') from None
+        if not low <= value <= high:
+            raise ValueError(f'{text} is outside {low} to {high}')
+        return value
+    return read
+
+
+def text(value: str) -> str:
+    """Read a text of at most 200 bytes."""
+    if len(value.encode()) > 200:
+        raise ValueError(f'{value[:20]!r}... is too long')
+    return value
+
+
+def one_of(names: Any) -> Callable[[str], str]:
+    """Return a reader of one name of several."""
+    def read(text: str) -> str:
+        if text not in names:
+            raise ValueError(f'{text!r} is not one of {", ".join(names)}')
+        return text
+    return read
+
+
+def common_settings(noun: str, faults: FaultTable) -> dict[str, Setting]:
+    """
+    Return the settings that every payload has.
+
+    :param noun: names one component, such as ``light``.
+    """
+    def read(text: str) -> tuple[str, ...]:
+        names = tuple(part.strip() for part in text.split(',') if part.strip())
+        for name in names:
+            faults.value(name)
+        return names
+
+    return {
+        'fault': Setting(f'[{noun.upper()}:]NAME[=VALUE]', 'a fault, see below', read, True),
+        'seed': Setting('N', 'seed of the random faults (default: 0)', integer(0, 1 << 32)),
+    }

@@ -1,0 +1,187 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The components that the command line and a file describe."""
+
+import sys
+
+from illuminator_ros.cli.simulator.options import parser
+from illuminator_ros.cli.simulator.scenario import components, Listed, load, Scenario, scenario
+from illuminator_ros.cli.simulator.settings import SettingError
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.model import Limits, Mode
+from illuminator_ros.illuminator.simulated_settings import SIMULATED
+from illuminator_ros.mavlink.messages import Address
+import pytest
+
+TYPES = [SIMULATED]
+FILE = {
+    'url': 'udpin://127.0.0.1:1', 'ambient': 60, 'faults': ['lie'],
+    'lights': [
+        {'id': '1/243', 'name': 'bow', 'profile': 'extended', 'serial_number': 815,
+         'thermal': {'rise': 70, 'time_constant': 60}},
+        {'id': '1/250', 'modes': ['internal_control'], 'status_interval': 0.2,
+         'faults': {'drop': 0.2, 'thermistor': True}}]}
+
+
+def described(*arguments, file=None):
+    return components(parser().parse_args(list(arguments)),
+                      scenario(file, 'f.yaml', TYPES) if file else Scenario(), TYPES)
+
+
+def properties(*arguments, file=None):
+    return [one.device.properties for one in described(*arguments, file=file)]
+
+
+def faults(light):
+    return FAULTS.active(light.device.behaviour, light.device.normal)
+
+
+@pytest.mark.parametrize(('arguments', 'addresses'), [
+    ([], ['1/243']),
+    (['--count', '3', '--system-id', '7', '--component-id', '50'], ['7/50', '7/51', '7/52']),
+    (['--light', '1/243=bow', '--light', '2/10'], ['1/243 bow', '2/10']),
+    (['--profile', 'reference'], ['255/0']),
+    (['--profile', 'ardusub', '--count', '2'], ['1/1', '1/2']),
+    (['--profile', 'reference', '--system-id', '9'], ['9/0'])])
+def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(arguments, addresses):
+    assert [f'{one.address} {one.name}'.rstrip() for one in described(*arguments)] == addresses
+
+
+def test_without_arguments_a_light_follows_the_protocol():
+    (light,), (one,) = described(), properties()
+    assert (one.limits, one.mode_bitmask, one.identity.serial_number) == (
+        Limits(0.05, 10.0), 3, 'SIM-1-243')
+    assert faults(light) == []
+
+
+def test_each_option_sets_its_property():
+    (light,) = properties(
+        '--vendor', 'ACME', '--model', 'Sun', '--software-version', '2.0', '--hardware-version',
+        'B', '--serial-number', '0815', '--min-strobe-period', '0.2', '--max-strobe-period',
+        '5', '--modes', 'internal_control', '--status-interval', '0.5', '--ambient', '40',
+        '--thermal', 'rise=80,time_constant=30', '--time-scale', '10')
+    identity, thermal = light.identity, light.thermal
+    assert (identity.vendor, identity.model, identity.serial_number) == ('ACME', 'Sun', '0815')
+    assert (identity.software_version, identity.hardware_version) == ('2.0', 'B')
+    assert light.limits == Limits(0.2, 5.0)
+    assert (light.modes, light.mode_bitmask) == ((Mode.INTERNAL_CONTROL,), 1)
+    assert (light.status_interval, light.time_scale) == (0.5, 10.0)
+    assert (thermal.ambient, thermal.rise, thermal.time_constant) == (40, 80, 30)
+    assert [one.mode_bitmask for one in properties('--mode-bitmask', '0x6')] == [6]
+    assert [one.seed for one in described('--seed', '3')] == [3]
+
+
+def test_several_lights_have_different_serial_numbers():
+    assert [one.identity.serial_number for one in properties(
+        '--count', '2', '--serial-number', 'X')] == ['X-243', 'X-244']
+
+
+def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names():
+    first, second = described(
+        '--light', '1/243', '--light', '1/244=stern', '--fault', 'lie', '--fault',
+        '1/243:drop=0.1,nan', '--fault', 'stern:slow')
+    assert (faults(first), faults(second)) == (['drop', 'lie', 'nan'], ['slow', 'lie'])
+    assert first.device.behaviour.drop == 0.1
+
+
+def test_a_file_has_settings_for_all_lights_and_for_each():
+    bow, other = described(file=FILE)
+    first, second = properties(file=FILE)
+    assert (str(bow.address), bow.name, first.identity.serial_number) == ('1/243', 'bow', '815')
+    assert bow.device.behaviour.extension is not None
+    assert (first.thermal.ambient, first.thermal.rise, first.thermal.time_constant) == (60, 70, 60)
+    assert (second.modes, second.status_interval) == ((Mode.INTERNAL_CONTROL,), 0.2)
+    assert (faults(bow), faults(other)) == (['lie'], ['drop', 'lie', 'thermistor'])
+
+
+def test_the_command_line_takes_precedence_over_the_file():
+    lights = described('--ambient', '10', '--fault', 'bow:nan', file=FILE)
+    assert [one.device.properties.thermal.ambient for one in lights] == [10, 10]
+    assert faults(lights[0]) == ['lie', 'nan']
+
+
+def test_a_file_without_lights_leaves_their_number_to_the_command_line():
+    assert len(described('--count', '2', file={'profile': 'ardusub'})) == 2
+
+
+@pytest.mark.parametrize(('content', 'reason'), [
+    ('text', 'has no keys'),
+    ({'lights': 3}, 'lights is not a list of lights'),
+    ({'lights': [3]}, 'lights is not a list of lights'),
+    ({'lights': [{}]}, "light 1: id: '' is "),
+    ({'lights': [{'id': '1/2', 'colour': 'red'}]}, "light 1: no setting 'colour'"),
+    ({'lights': [{'id': '1/2', 'ambient': 'hot'}]}, "light 1: ambient: 'hot' is not a number"),
+    ({'lights': [{'id': '1/2', 'faults': ['nope']}]}, "light 1: faults: no fault 'nope'"),
+    ({'lights': [{'id': '1/2'}, {'id': '1/2'}]}, 'two lights have the address 1/2'),
+    ({'lights': [{'id': f'1/{n}'} for n in range(1, 203)]}, '202 lights are more than 200'),
+    ({'profile': 'x'}, "profile: 'x' is not one of default, reference"),
+    ({'profiel': 'x'}, "no setting 'profiel'")])
+def test_an_error_in_a_file_names_its_place_and_the_reason(content, reason):
+    with pytest.raises(SettingError) as caught:
+        described(file=content)
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize(('arguments', 'reason'), [
+    (['--count', '20', '--component-id', '250'], 'reaches 269; component ids end at 255'),
+    (['--light', '1'], "--light 1: '1' is "), (['--light', '0/1'], "--light 0/1: '0/1' is "),
+    (['--light', '1/2', '--light', '1/2'], 'two lights have the address 1/2'),
+    *(([option, '3', '--light', '1/2'], f'{option} is for lights that neither')
+      for option in ('--count', '--system-id', '--component-id')),
+    (['--fault', '1/9:drop'], "there is no light '1/9'"),
+    (['--fault', 'nope'], "no fault 'nope'"),
+    (['--min-strobe-period', '5', '--max-strobe-period', '1'],
+     'min_strobe_period is above max_strobe_period'),
+    (['--thermal', 'throttle_until=90'], 'throttling thresholds are not in order')])
+def test_options_that_contradict_each_other_are_refused_with_the_reason(arguments, reason):
+    with pytest.raises(SettingError) as caught:
+        described(*arguments)
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize(('arguments', 'reason'), [
+    (['--modes', 'a'], "argument --modes: 'a' is not one of internal_control, external_sync"),
+    (['--thermal', 'rise'], "argument --thermal: 'rise' is not one of ambient=VALUE"),
+    (['--profile', 'x'], "argument --profile: 'x' is not one of default"),
+    (['--ambient', 'x'], "argument --ambient: 'x' is not a number"),
+    (['--count', '0'], '0 is outside 1 to 200'),
+    (['--nope'], 'unrecognized arguments')])
+def test_a_wrong_option_is_one_line_with_exit_status_2(arguments, reason, capsys):
+    with pytest.raises(SystemExit) as caught:
+        described(*arguments)
+    printed = capsys.readouterr().err
+    assert (caught.value.code, reason in printed, printed.count('\n')) == (2, True, 1)
+
+
+def test_the_help_has_an_option_for_each_setting():
+    text = parser().format_help()
+    assert [name for name in SIMULATED.all_settings
+            if f'--{name.replace("_", "-")}' not in text] == []
+
+
+def test_a_yaml_file_is_read_or_refused_with_the_reason(tmp_path, monkeypatch):
+    path = tmp_path / 'lights.yaml'
+    path.write_text('url: udpin://127.0.0.1:1\nlights:\n  - {id: 1/9, ambient: 3}\n')
+    found = load(str(path), TYPES)
+    assert (found.url, found.listed['light']) == (
+        'udpin://127.0.0.1:1', [Listed(Address(1, 9), '', {'ambient': 3.0})])
+    path.write_text('a: [')
+    with pytest.raises(SettingError, match='not YAML'):
+        load(str(path), TYPES)
+    with pytest.raises(SettingError, match='No such file'):
+        load(str(tmp_path / 'nowhere'), TYPES)
+    monkeypatch.setitem(sys.modules, 'yaml', None)
+    with pytest.raises(SettingError, match='need PyYAML: pip install pyyaml'):
+        load(str(path), TYPES)
