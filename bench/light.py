@@ -59,7 +59,7 @@ class Sender:
         self._socket.close()
 
     def status(self) -> None:
-        """Send a status, whose uptime nobody has had before, and a heartbeat if it is due."""
+        """Send a status with a new uptime, and a heartbeat if it is due."""
         now = time.monotonic()
         uptime = int((now - self._began) * 1000)
         if now >= self._heartbeat_due:

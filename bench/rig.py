@@ -47,11 +47,11 @@ _ports: Iterator[int] = iter(())
 @dataclass
 class Bench:
     """
-    What is asked of a run.
+    The options of a run.
 
-    :param quick: measure next to nothing, to see that it works.
+    :param quick: take as few samples as possible, to test the benchmark.
     :param soak: s.
-    :param lights: numbers of lights that get a node each.
+    :param lights: numbers of lights with a node each.
     :param domain: the ROS domain of its own.
     """
 
@@ -61,17 +61,17 @@ class Bench:
     domain: int = 0
 
     def amount(self, full: Any, quick: Any) -> Any:
-        """Return how much to do."""
+        """Return the number of samples to take."""
         return quick if self.quick else full
 
     def say(self, text: str) -> None:
-        """Tell how far it is."""
+        """Print the progress."""
         print(f'  {text}', file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Yield a ROS domain that no test and no other benchmark on this machine uses meanwhile."""
+    """Yield a ROS domain that no other test or benchmark on this machine uses."""
     global _ports
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with socket.socket(socket.AF_UNIX) as claim:
@@ -81,15 +81,15 @@ def own_domain() -> Iterator[int]:
                 claim.bind(f'\0illuminator_ros_test_domain_{domain}')
                 break
         os.environ['ROS_DOMAIN_ID'] = str(domain)
-        # Ports of the domain (DDSI-RTPS, 9.6.1.1), which nobody else claims; they are those of
-        # its participants 70 and up, whom nobody has seen.
+        # Ports of the participants 70 and up of the claimed domain (DDSI-RTPS, 9.6.1.1), which are
+        # never used.
         first = 7400 + 250 * domain
         _ports = itertools.cycle(range(first + 150, first + 250))
         yield domain
 
 
 def free_port() -> int:
-    """Return a UDP port that nobody uses, nor will be given by the system."""
+    """Return a free UDP port that the system does not assign to others."""
     for port in itertools.islice(_ports, 100):
         with contextlib.suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
             probe.bind(('127.0.0.1', port))
@@ -212,10 +212,10 @@ def udp_queue(port: int) -> tuple[int, int]:
         fields = line.split()
         if fields[1].endswith(f':{port:04X}'):
             return int(fields[4].partition(':')[2], 16), int(fields[-1])
-    raise RuntimeError(f'nobody has UDP port {port}')
+    raise RuntimeError(f'no socket has UDP port {port}')
 
 
 def interleaved(names: Sequence[str], rounds: int) -> Iterator[str]:
-    """Yield each name once a round, in alternate order: what drifts is then shared."""
+    """Yield each name once a round, in alternating order, so that drift affects all."""
     for number in range(rounds):
         yield from names if number % 2 == 0 else reversed(names)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a measurement comes to: figures of ours, figures of peers, and targets."""
+"""Rows: figures of the bridge, figures of peers, and targets."""
 
 from __future__ import annotations
 

@@ -16,14 +16,14 @@
 """
 Measures the bridge beside its peers, and prints each figure with its target.
 
-    make bench                                  all of it, 5 minutes; needs ROS (rclpy)
+    make bench                                  everything, 5 minutes; needs ROS (rclpy)
     python3 bench/run.py --only enable status   these subjects
-    python3 bench/run.py --json run.json        and keep every figure
-    python3 bench/run.py --from run.json --markdown --plot DIR    show a run that was kept
+    python3 bench/run.py --json run.json        keep every figure
+    python3 bench/run.py --from run.json --markdown --plot DIR    show a kept run
 
 Exit status: 0; 1 if a measurement fails, or with --check if a target is missed; 2 if an argument
-is wrong. Figures are worth something on a machine that does nothing else: so a missed target is
-told but is no failure unless that is asked for.
+is wrong. Other load on the machine distorts figures, so a missed target is
+reported, but is a failure only with --check.
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ def measure(
     """
     Return the rows of some subjects, the s that each took, and those that failed.
 
-    :param to: where they are shown as they come.
+    :param to: where each row is printed at once.
     :param wanted: see :class:`bench.rig.Bench`.
     """
-    # Slow, and not needed to show a run that was kept.
+    # Slow, and not needed to show a kept run.
     from bench.rig import Bench, own_domain
 
     rows: list[Row] = []
@@ -74,7 +74,7 @@ def measure(
                     rows.append(row)
                     print('\n'.join(lines(row)), file=to, flush=True)
             except Exception as error:
-                # The others are worth having all the same.
+                # Measure the other subjects all the same.
                 failed.append(name)
                 print(f'{name} FAILED: {error!r}', file=sys.stderr, flush=True)
                 if bench.quick:
@@ -90,9 +90,9 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog=f'subjects:\n{subjects}')
     result.add_argument('--only', nargs='+', choices=SUBJECTS, metavar='SUBJECT',
-                        help='measure these only')
+                        help='measure only these')
     result.add_argument('--quick', action='store_true',
-                        help='measure next to nothing: it shows that the benchmark works')
+                        help='take as few samples as possible, to test the benchmark')
     result.add_argument('--soak', type=float, default=15.0, metavar='SECONDS',
                         help='length of the soak (default: %(default)g)')
     result.add_argument('--lights', type=int, nargs='+', default=[1, 10, 100], metavar='N',
@@ -103,7 +103,7 @@ def parser() -> argparse.ArgumentParser:
     result.add_argument('--markdown', action='store_true',
                         help='print the table of doc/performance.md')
     result.add_argument('--from', dest='stored', type=Path, metavar='FILE',
-                        help='measure nothing, show what --json has written')
+                        help='show a file of --json instead of measuring')
     result.add_argument('--check', action='store_true',
                         help='exit with 1 if a target is missed')
     return result
@@ -112,9 +112,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run it; return the exit status."""
     options = parser().parse_args(arguments)
-    # A shell that runs it in the background has it ignored, also by all that is started here.
+    # A background shell has SIGINT ignored, which child processes would inherit.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    # What is printed with --markdown is the table and nothing else.
+    # With --markdown only the table goes to stdout.
     to = sys.stderr if options.markdown else sys.stdout
     about: dict[str, Any]
     failed: list[str] = []

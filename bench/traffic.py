@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What an autopilot sends, and lines to send it over at some rate."""
+"""Messages of an autopilot, and lines that send them at a given rate."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _message(name: str, draw: random.Random) -> Any:
     if name == 'HEARTBEAT':
         return kind(2, 3, 81, 4, 4, 3)
     values: list[Any] = []
-    # Lengths are in the order of the wire, types in that of the definition.
+    # Lengths are in wire order, types in the order of the definition.
     lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
     for field, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True):
         length = lengths[field]
@@ -125,33 +125,33 @@ def udp_line(port: int) -> Line:
 
 
 class TcpListener:
-    """Waits for the receivers that are to be fed."""
+    """Waits for the receivers."""
 
     def __init__(self) -> None:
         self._listener = socket.create_server(('127.0.0.1', 0))
         self.port: int = self._listener.getsockname()[1]
 
     def line(self) -> Line:
-        """Return a line to whoever comes."""
+        """Return a line to the next client."""
         self._listener.settimeout(20.0)
         connection, _ = self._listener.accept()
         self._listener.close()
         connection.settimeout(20.0)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        # TCP itself holds back who is too fast.
+        # TCP itself limits the rate.
         return Line(lambda part: connection.sendall(b''.join(part)), lambda: False,
                     connection.close)
 
 
 class SerialPort:
-    """A pseudo-terminal, without a limit to its speed."""
+    """A pseudo-terminal without a speed limit."""
 
     def __init__(self) -> None:
         self._far, self._near = os.openpty()
         self.path = os.ttyname(self._near)
 
     def line(self) -> Line:
-        """Return a line to whoever has opened it."""
+        """Return a line to the program that has opened it."""
         os.close(self._near)
 
         def send(part: Sequence[bytes]) -> None:

@@ -42,7 +42,7 @@ class GroundStation:
         Send MAV_CMD_DO_ILLUMINATOR_CONFIGURE and return its result.
 
         :param brightness: %, 0..100.
-        :param strobe_period: s; 0 is no strobe.
+        :param strobe_period: s; 0 means no strobe.
         :param duty_cycle: %, 0..100.
         :param timeout: s.
         """

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Make ``.venv`` with all that the demonstration and the tests need, and show the progress.
+Make ``.venv`` with the packages of the demonstration and the tests, and show the progress.
 
-Runs with any Python from 3.7 and looks for one that there are ROS 2 Jazzy wheels for. Where ROS
+Runs with any Python from 3.7 and looks for a Python that has ROS 2 Jazzy wheels. Where ROS
 is sourced (ROS_DISTRO is set), its own rclpy is used, and only the other packages are installed.
 """
 
@@ -128,7 +128,7 @@ def requirements() -> list[str]:
 
 
 def reason_for_new_venv() -> str:
-    """Return why ``.venv`` has to be made anew, '' if it can be kept, whatever its Python is."""
+    """Return why ``.venv`` must be replaced, '' if it can be kept, whatever its Python is."""
     if not VENV.exists():
         return 'there is none'
     old = Interpreter(VENV_PYTHON)

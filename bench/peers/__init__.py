@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What we are measured against: each file is a program of its own."""
+"""The peers of the benchmark; each file is a program."""

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A bare publisher, told by datagrams what to do.
+A bare publisher that datagrams control.
 
 ``publish COUNT INTERVAL``: publish so many times, so many s apart, the time of publishing.
 ``relay TIME``: publish this, at once.

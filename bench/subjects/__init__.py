@@ -18,26 +18,26 @@ from __future__ import annotations
 
 from pathlib import Path
 
-# In the order in which they are run.
+# In the order of the runs.
 SUBJECTS = {
-    'enable': 'how long ~/enable takes',
-    'status': 'how long a status takes to a subscriber',
-    'foreign': 'CPU for the frames of others on the link',
-    'busy': '~/enable beside the frames of others',
-    'burst': 'frames lost of a burst',
+    'enable': 'time of a call of ~/enable',
+    'status': 'time from a status to a subscriber',
+    'foreign': 'CPU for frames of others on the link',
+    'busy': '~/enable beside frames of others',
+    'burst': 'frames lost from a burst',
     'noise': 'frames recovered from noise',
-    'memory': 'what the bridge takes above an empty node',
+    'memory': 'memory above that of an empty node',
     'soak': 'whether memory stays flat',
-    'startup': 'how long it takes from the start of the process to service',
-    'overhead': 'the bytes that the bridge adds to a link',
+    'startup': 'time from the start of the process to an answer',
+    'overhead': 'bytes that the bridge adds to a link',
     'lights': 'CPU for a status with many lights on one link',
     'nodes': 'many nodes in one process',
     'rates': 'CPU with a status at 1, 10 and 50 Hz',
     'serial_line': 'a slow and a fast serial line, used by others too',
-    'reconnection': 'how soon the link is up again',
+    'reconnection': 'time until a link is open again',
     'loss': 'commands through loss',
-    'parallel': 'what a silent light costs the others',
+    'parallel': 'effect of a silent light on others',
 }
-# What is not there is left out.
+# Without promises.py its subject is left out.
 if Path(__file__).parents[1].joinpath('promises.py').exists():
-    SUBJECTS['promises'] = 'whether what is promised in time is done in time'
+    SUBJECTS['promises'] = 'documented time limits'

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Frames lost of a burst over loopback UDP, with the buffers that each asks the system for.
+Frames lost from a burst over loopback UDP, with the buffers that each program requests.
 
-Of the bridge, which tells in its diagnostics how many came, and of pymavlink's ``recv_match``.
+The bridge reports its count in the diagnostics; the peer is pymavlink's ``recv_match``.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ def measure(bench: Bench) -> Iterator[Row]:
 
 
 def link_values(arrays: list[DiagnosticArray]) -> dict[str, str]:
-    """Return what is told of the link in the first diagnostics that come from now on."""
+    """Return the values of the link in the next diagnostics."""
     known, until = len(arrays), time.monotonic() + PATIENCE
-    # The second one from now: the first may be under way.
+    # Take the second one: the first may have been sent before.
     while len(arrays) < known + 2 and time.monotonic() < until:
         time.sleep(0.01)
     stamp = arrays[-1].header.stamp

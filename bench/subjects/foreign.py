@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-CPU time for a frame that is none of ours, on a line that an autopilot uses too.
+CPU time for a foreign frame, on a line that an autopilot uses too.
 
-Of the bridge, of pymavlink's ``recv_match``, and of a loop that only reads; each without what it
-takes when nothing comes.
+The peers are pymavlink's ``recv_match`` and a loop that only reads; the idle CPU time of each is
+subtracted.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from ..traffic import frames, Line, SerialPort, TcpListener, udp_line
 
 OURS, RECV_MATCH, BARE = 'bridge', 'recv_match', 'bare receive loop'
 BAUD = 921_600
-# Frames a second, 0 for as many as are taken; and for how many it is measured, in a block.
+# Frames a second (0: saturated), and frames in a block.
 RATES = {500: 350, 5000: 2500, 0: 6000}
-# Those that the targets are for: at 500 a second it is waking up that costs, not the frame.
+# The rates with a target; at 500 a second waking up costs most.
 BUSY = (5000, 0)
 TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 8, 'serial': 1 / 8}
 
 
 class Receiver:
-    """Somebody who is fed, and what it takes."""
+    """A receiving program and its CPU times."""
 
     def __init__(self, program: Program, line: Line) -> None:
         self.program, self.line = program, line

@@ -121,7 +121,7 @@ def cpu_per_status(lights: int, warm_up: float, measured: float) -> float:
     """Return the CPU time of the link's thread for a status and a heartbeat, s."""
     port = free_port()
     sending = frames(lights, warm_up + measured)
-    # Nobody answers here: what a light is asked when it is found is soon given up.
+    # No light answers here, so the requests on discovery must end soon.
     with (listening(port, command_timeout=0.05, command_retries=0) as (link, watcher),
           socket.socket(type=socket.SOCK_DGRAM) as sender):
         sender.connect(('127.0.0.1', port))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the bridge takes in memory above an empty node, each with a service that was used."""
+"""Memory of the bridge above an empty node, each after a service call."""
 
 from __future__ import annotations
 

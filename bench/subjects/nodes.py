@@ -38,7 +38,7 @@ def seen(client: Client, names: list[str]) -> float:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Start the bridge anew for each number of lights."""
+    """Start a bridge for each number of lights."""
     for count in bench.amount(bench.lights, (2,)):
         port = free_port()
         names = ['illuminator', *(f'illuminator_2_{n}' for n in range(2, count + 1))]

@@ -49,7 +49,7 @@ def measure(bench: Bench) -> Iterator[Row]:
                      for message in parser.parse_buffer(piece) or [])
     wanted = Counter((frame[7] | frame[8] << 8 | frame[9] << 16, frame[4], frame[10:-2])
                      for frame in good)
-    # Not more of one than were sent: what noise happens to look like is no frame recovered.
+    # A frame that noise happens to form must not count as recovered.
     missing, theirs_missing = (wanted - ours).total(), (Counter(good) - theirs).total()
     yield Row('good frames recovered from noise', '%',
               one(100 * (1 - missing / len(good))),

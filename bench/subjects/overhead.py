@@ -72,7 +72,7 @@ class Meter:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Count for a light with a status a second, and at once for one that has to be asked."""
+    """Count for a light with a status a second, and for a light that sends status on request."""
     kinds = {'a light with a status a second': '1', 'a light that has to be asked': '0'}
     with contextlib.ExitStack() as stack:
         meters = []

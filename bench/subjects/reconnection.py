@@ -93,7 +93,7 @@ def serial(absences: tuple[float, ...], lasting: float) -> list[float]:
 
 
 def udp(absences: tuple[float, ...], lasting: float) -> list[float]:
-    """Have a UDP light come back on another port."""
+    """Move a UDP light to another port."""
     took = []
     port = free_port()
     with bridge(f'udpin://127.0.0.1:{port}'):

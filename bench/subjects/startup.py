@@ -57,7 +57,7 @@ def measure(bench: Bench) -> Iterator[Row]:
     status: list[float] = []
     with simulator(f'udpout://127.0.0.1:{port}', '--status-interval', str(STATUS_PERIOD)):
         for number, name in enumerate(interleaved([OURS, EMPTY], bench.amount(8, 1))):
-            # Each start has names of its own, so that nobody answers who has been seen before.
+            # Each start has its own names, so that no earlier process answers.
             answering, publishing = start(bench, name, f'started_{number}', port)
             service[name].append(answering * 1e3)
             if name == OURS:

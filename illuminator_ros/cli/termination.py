@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ending a process in order, and in time, on SIGINT, SIGTERM and SIGHUP."""
+"""The orderly end of a process within a time limit, on SIGINT, SIGTERM and SIGHUP."""
 
 from __future__ import annotations
 
@@ -29,21 +29,20 @@ from typing import NoReturn
 from .output import OutputQueue
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-# s from the signal to the exit, whatever hangs.
+# s from the signal to the exit, even if something hangs.
 LIMIT = 0.95
-# s in which queued output must be written: at an exit in order, and at one that is overdue.
+# s in which queued output must be written, at an orderly and at an overdue exit.
 OUTPUT_LIMIT = 0.1
 OVERDUE_OUTPUT_LIMIT = 0.02
 
 
 class Termination:
     """
-    Takes signals from its construction on: make it before anything slow is imported.
+    Takes signals from its construction on: construct it before any slow import.
 
-    A handler would run in the main thread between any two instructions, where an exception ends
-    half-done imports and is printed by destructors, and a flag is not seen while C code waits.
-    So the signals are blocked, in this thread and all that it starts, and one thread waits for
-    them.
+    A handler would run in the main thread between any two instructions: an exception there breaks
+    imports and is printed by destructors, and C code that waits sees no flag. So the signals are
+    blocked in this thread and in the threads that it starts, and one thread waits for them.
 
     :param more: signals beside SIGINT, SIGTERM and SIGHUP. Under nohup SIGHUP is left ignored.
     :param queued: descriptors that are written to through an :class:`OutputQueue`.
@@ -52,7 +51,7 @@ class Termination:
     def __init__(
         self, more: Iterable[signal.Signals] = (), queued: Iterable[int] = (),
     ) -> None:
-        # sigwait() would return it, blocked, although it is ignored.
+        # sigwait() would return a blocked signal although it is ignored.
         ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
         self._signals = {*SIGNALS, *more} - ignored
         signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
@@ -66,11 +65,11 @@ class Termination:
 
     def calls(self, end: Callable[[], None], last: Callable[[], None] | None = None) -> None:
         """
-        Have ``end()`` called on a signal, once; until now one would have ended the process.
+        Call ``end()`` on the first signal; without it a signal ends the process at once.
 
-        It is called in another thread, and the process ends soon after it even if it hangs.
+        It is called in another thread; the process ends within the limit even if it hangs.
 
-        :param last: called before that if it hangs; must be quick.
+        :param last: called before the exit if ``end`` hangs; must be quick.
         """
         with self._lock:
             self._end, self._last = end, last
@@ -80,10 +79,10 @@ class Termination:
 
     def finish(self) -> None:
         """
-        Exit if a signal has asked for it; everything that must be ended has ended.
+        Exit if a signal has requested it; all parts have ended.
 
-        The interpreter and the middleware take 0.1 s for an exit or, on a busy machine, much
-        longer, and no thread runs any more that could cut it short.
+        An exit by the interpreter and the middleware takes 0.1 s, on a busy machine much longer,
+        and no thread could then enforce the limit.
         """
         if self._signalled:
             self._exit(OUTPUT_LIMIT)
@@ -94,7 +93,7 @@ class Termination:
         with self._lock:
             self._signalled = True
             end = self._end
-        # Before that nothing has been begun that would have to be ended.
+        # Without ``end`` nothing has been started.
         if end is not None:
             # In another thread, so that the deadline applies whatever it waits for.
             _run_in_thread(end)
@@ -109,7 +108,7 @@ class Termination:
         os._exit(0)
 
     def _write_output(self, limit: float) -> None:
-        # In another thread: one that is blocked in a write holds the lock of the stream.
+        # In another thread: a thread that is blocked in a write holds the lock of the stream.
         flushing = _run_in_thread(_flush)
         if flushing is not None:
             flushing.join(limit)
