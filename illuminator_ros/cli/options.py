@@ -18,9 +18,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import sys
 import time
 from typing import NoReturn
 
+from .program import discard_output
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, TimestampStore
@@ -32,6 +34,16 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """See :meth:`argparse.ArgumentParser.error`."""
         self.exit(2, f'{self.prog}: {message}; see {self.prog} --help\n')
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:  # noqa: A003
+        """See :meth:`argparse.ArgumentParser.exit`; output that cannot be written is an error."""
+        try:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except OSError as error:
+            discard_output()
+            status, message = 1, f'{self.prog}: standard output: {error.strerror}\n'
+        super().exit(status, message)
 
 
 def number(low: float, high: float) -> Callable[[str], float]:

@@ -22,5 +22,6 @@ from ..payload.registry import PayloadType
 
 PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
-        'illuminator', simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED'),
+        'illuminator', simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
+        checks='illuminator_ros.illuminator.checks.catalogue:CHECKS'),
 )}

@@ -16,13 +16,13 @@
 
 from dataclasses import replace
 
-from illuminator_ros.illuminator.checks.requirement import Verdict
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
 from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.simulated import CommandReply
 import pytest
 from support.conformance_run import Run
@@ -36,7 +36,7 @@ BRIGHT = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
 # What may switch a light on that takes what it must not.
 SWITCHING = ('other-target', 'repeated', 'on', 'on-off-values', 'mode-internal', 'mode-external',
              'brightness-values', 'not-a-number')
-DAZZLING = {one.name for one in REQUIREMENTS if one.dazzles}
+DAZZLING = {one.name for one in REQUIREMENTS if one.needs_consent}
 
 
 def watched(run):

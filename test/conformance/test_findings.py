@@ -17,8 +17,7 @@
 from dataclasses import replace
 import math
 
-from illuminator_ros.illuminator.checks.requirement import Verdict
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.model import Limits, Mode
@@ -27,6 +26,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address, MavCmd
+from illuminator_ros.payload.checks.requirement import Verdict
 import pytest
 from support.conformance_run import Run
 
@@ -131,22 +131,22 @@ def test_a_light_that_falls_silent_in_the_middle_is_found_and_the_rest_is_skippe
     run.light.behave(replace(run.light.behaviour, silence=math.inf), run.link.now)
     run.finish()
     assert {'heartbeat-rate', 'acknowledged'} < run.failed
-    assert run.result('thermal-flags').detail == 'the light has fallen silent'
+    assert run.result('thermal-flags').detail == 'the light has stopped sending'
 
 
 def test_a_light_that_has_accepted_what_it_must_not_is_set_right_before_the_next_try():
     run = Run(faults=('anything',)).finish()
-    configured = [one for one in run.bench.transactions if one.command == 406]
+    configured = [one for one in run.session.transactions if one.command == 406]
     brightness = next(i for i, one in enumerate(configured) if one.text.endswith('1 -1 0 0'))
     assert configured[brightness + 1].text.endswith(' 1 10 0 0')
 
 
 def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
     run = Run(faults=('duplicate=1',)).finish()
-    for one in run.bench.transactions:
+    for one in run.session.transactions:
         assert len(one.finals) <= 2
     assert 'on-off-values' not in run.failed
-    assert all(len(one.finals) == 2 for one in run.bench.transactions if one.expected)
+    assert all(len(one.finals) == 2 for one in run.session.transactions if one.expected)
 
 
 @pytest.mark.parametrize(('name', 'contradiction'), [
@@ -200,13 +200,13 @@ def test_one_requirement_alone_is_met_by_a_light_that_meets_it(name):
 
 def test_what_a_light_accepts_counts_as_done_where_it_reports_no_status():
     run = Run(IlluminatorProperties(status_interval=0.0), faults=('lie',), only=('on',))
-    asked = run.bench.command
+    asked = run.session.command
 
     async def last_status_before(command, *params, **options):
         if command == MavCmd.ILLUMINATOR_ON_OFF and params == (1.0,):
             run.fault('no-request')
         return await asked(command, *params, **options)
-    run.bench.command = last_status_before
+    run.session.command = last_status_before
     assert run.finish().result('on').verdict is Verdict.PASS
 
 

@@ -14,10 +14,10 @@
 
 """The profiles against the suite: what is known of the lights in the field, and nothing else."""
 
-from illuminator_ros.illuminator.checks.requirement import Verdict
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.illuminator.simulated_settings import properties
+from illuminator_ros.payload.checks.requirement import Verdict
 import pytest
 from support.conformance_run import Run
 

@@ -17,7 +17,11 @@
 import json
 from xml.etree import ElementTree
 
-from illuminator_ros.illuminator.checks.report import (
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.identity import Identity
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.checks.report import (
     as_json,
     as_junit,
     catalogue,
@@ -25,10 +29,6 @@ from illuminator_ros.illuminator.checks.report import (
     Report,
     Table,
 )
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.conformance_run import Run
 
@@ -41,8 +41,8 @@ def run():
 
 @pytest.fixture(scope='module')
 def report(run):
-    return Report('udpin://127.0.0.1:1', 'light 1/243: x&<y>', tuple(run.suite.results),
-                  run.suite.restored, 12.5, run.suite.passed)
+    return Report('illuminator', 'light', 'udpin://127.0.0.1:1', 'light 1/243: x&<y>',
+                  tuple(run.suite.results), run.suite.restored, 12.5, run.suite.passed)
 
 
 def test_the_json_report_has_every_requirement_with_all_that_was_said(report):
@@ -72,19 +72,19 @@ def test_the_junit_report_says_what_is_wrong_and_where_it_is_written(report):
     (case,) = [one for one in suite.findall('testcase')
                if one.get('name').startswith('other-target: ')]
     assert case.get('classname') == 'routing'
-    assert 'switched on by what was for 1/200' in case.find('failure').get('message')
+    assert 'switched on by a command for 1/200' in case.find('failure').get('message')
     assert 'guide/routing.html' in case.find('failure').text
     assert 'COMMAND_LONG to 1/200' in case.find('system-out').text
 
 
 def test_the_table_has_a_line_for_what_is_met(run):
-    assert lines(run.result('off')) == ['PASS    off                    is switched off']
+    assert lines(run.result('off')) == ['PASS    off                    can be switched off']
 
 
 def test_the_table_says_of_what_is_not_met_what_is_wrong_what_was_said_and_the_section(run):
     first, reason, section, *said = lines(run.result('other-target'))
     assert first.startswith('FAIL    other-target')
-    assert 'switched on by what was for 1/200' in reason
+    assert 'switched on by a command for 1/200' in reason
     assert section.strip() == ('see routing, "Routing Detail": '
                                'https://mavlink.io/en/guide/routing.html')
     assert '> COMMAND_LONG to 1/200: MAV_CMD_ILLUMINATOR_ON_OFF 1' in said[0]
@@ -103,7 +103,7 @@ def shown(run):
 def test_without_a_light_the_table_has_one_line_for_all_that_was_not_checked():
     run = Run(target=Address(9, 9)).finish()
     assert shown(run)[:2] == lines(run.result('heartbeat'))[:2]
-    assert shown(run)[-1] == 'SKIPPED 47 requirements: 9/9 was not heard'
+    assert shown(run)[-1] == 'SKIPPED 47 requirements: 9/9 was not heard within 10 s'
     assert len(shown(run)) == 4
     assert len(run.suite.results) == len(REQUIREMENTS)
 
@@ -111,7 +111,7 @@ def test_without_a_light_the_table_has_one_line_for_all_that_was_not_checked():
 def test_after_an_interruption_the_table_has_one_line_for_the_rest():
     run = Run(consent=False)
     run.link.run_until(lambda: len(run.suite.results) == 10, within=100.0)
-    run.bench.interrupt(run.link.now)
+    run.interrupt()
     run.finish()
     assert len(shown(run)) == 11
     assert shown(run)[-1] == 'SKIPPED 38 requirements: interrupted'
@@ -123,7 +123,7 @@ def test_a_light_that_falls_silent_leaves_one_line_for_what_was_not_checked():
     run.fault('silence')
     run.finish()
     (line,) = [line for line in shown(run) if 'requirements: ' in line]
-    assert line.endswith('the light has fallen silent')
+    assert line.endswith('the light has stopped sending')
     assert any('FAIL    acknowledged ' in line for line in shown(run))
 
 
@@ -142,7 +142,7 @@ def test_the_summary_counts(report):
 
 
 def test_the_catalogue_has_every_requirement_with_its_section():
-    text = catalogue()
+    text = catalogue(REQUIREMENTS, 'light')
     assert len(text) == len(REQUIREMENTS)
     for one, row in zip(REQUIREMENTS, text, strict=True):
         assert row.startswith(one.name)

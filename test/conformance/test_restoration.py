@@ -16,12 +16,12 @@
 
 from dataclasses import replace
 
-from illuminator_ros.illuminator.checks.requirement import Verdict
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import STATUS_ID
+from illuminator_ros.payload.checks.requirement import Verdict
 import pytest
 from support.conformance_run import Run
 
@@ -77,7 +77,7 @@ def test_a_stream_that_somebody_has_stopped_stays_so():
 def test_an_interrupted_run_brings_it_back(after):
     run = prepared()
     run.link.run(after)
-    run.bench.interrupt(run.link.now)
+    run.interrupt()
     run.finish()
     assert state(run) == (True, BEFORE)
     assert len(run.suite.results) == len(REQUIREMENTS)
@@ -85,9 +85,9 @@ def test_an_interrupted_run_brings_it_back(after):
 
 def test_bringing_it_back_is_not_interrupted():
     run = prepared()
-    run.link.run_until(lambda: run.bench.tidying, within=100.0)
+    run.link.run_until(lambda: run.session.runner.restoring, within=100.0)
     assert state(run) != (True, BEFORE)
-    run.bench.interrupt(run.link.now)
+    run.interrupt()
     run.finish()
     assert state(run) == (True, BEFORE)
 
@@ -95,7 +95,7 @@ def test_bringing_it_back_is_not_interrupted():
 def test_an_interrupted_run_checks_nothing_more():
     run = Run()
     run.link.run(8.0)
-    run.bench.interrupt(run.link.now)
+    run.interrupt()
     assert run.finish().result('uptime').detail == 'interrupted'
     assert not run.suite.passed
     assert run.link.now < 1000.0 + 8.0 + 5.0
@@ -103,20 +103,19 @@ def test_an_interrupted_run_checks_nothing_more():
 
 def test_a_run_that_is_interrupted_before_it_begins_ends():
     run = Run()
-    run.bench.interrupt(run.link.now)
+    run.interrupt()
     run.finish()
-    assert run.suite.interrupted
+    assert run.session.runner.interrupted
     assert {one.detail for one in run.suite.results} == {'interrupted'}
 
 
-def test_a_check_with_an_error_in_it_fails_and_the_light_is_brought_back(monkeypatch):
-    async def broken(bench):
-        await bench.switch(False)
+def test_a_check_with_an_error_in_it_fails_and_the_light_is_brought_back():
+    async def broken(tester):
+        await tester.switch(False)
         raise ZeroDivisionError('oops')
 
-    monkeypatch.setattr('illuminator_ros.illuminator.checks.suite.REQUIREMENTS', [
-        replace(one, check=broken) if one.name == 'on' else one for one in REQUIREMENTS])
-    run = prepared().finish()
+    run = prepared(requirements=[
+        replace(one, check=broken) if one.name == 'on' else one for one in REQUIREMENTS]).finish()
     assert run.failed == {'on'}
     assert 'ZeroDivisionError' in run.result('on').detail
     assert state(run) == (True, BEFORE)

@@ -19,7 +19,7 @@ import re
 
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
 from illuminator_ros.cli.simulator.scenario import scenario
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
@@ -38,7 +38,7 @@ def test_the_requirements_are_listed_in_order_with_their_sections() -> None:
     assert table(CONFORMANCE, 'requirement') == [
         [f'`{one.name}`', one.title,
          f'[{one.specification.title}]({one.specification.url}), {one.section}',
-         CONSENT[one.changes, one.dazzles]] for one in REQUIREMENTS]
+         CONSENT[one.changes, one.needs_consent]] for one in REQUIREMENTS]
 
 
 def test_the_requirements_are_counted() -> None:

@@ -16,38 +16,70 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import contextlib
 from dataclasses import replace
 from typing import Any
 
-from illuminator_ros.illuminator.checks.bench import Bench
-from illuminator_ros.illuminator.checks.requirement import Verdict
-from illuminator_ros.illuminator.checks.suite import Suite
+from illuminator_ros.cli.conformance.run import LISTEN_TIME
+from illuminator_ros.illuminator.checks.catalogue import CHECKS, REQUIREMENTS
+from illuminator_ros.illuminator.checks.tester import LightTester
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd, STATUS_ID
+from illuminator_ros.payload.checks.coroutine import Interrupted
+from illuminator_ros.payload.checks.requirement import Conditions, Requirement, Result, Verdict
+from illuminator_ros.payload.checks.suite import absence, Suite
 from support.virtual_link import START, VirtualLink
 
 TESTER = Address(255, 190)
+FIND_TIMEOUT = 10.0
 # s for which the lights have been on when a run begins.
 UPTIME = 100.0
 
 
 class Run:
-    """A suite, a light, and the line between them."""
+    """
+    A session and a suite, a light, and the line between them.
 
-    def __init__(self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (), **options):
-        only = options.pop('only', ())
+    :param lights: the first is checked; default properties if there is none.
+    :param faults: of the first light.
+    :param only: names of requirements, all if empty.
+    :param heat: s at 100 %.
+    """
+
+    def __init__(
+        self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (),
+        only: tuple[str, ...] = (), target: Address | None = None, consent: bool = True,
+        heat: float = 5.0, requirements: Sequence[Requirement[Any]] = REQUIREMENTS,
+    ) -> None:
         first, *others = lights or [IlluminatorProperties()]
         for fault in faults:
             first = replace(first, behaviour=FAULTS.add(first.behaviour, fault))
         self.lights = simulated_lights([first, *others], START - UPTIME)
         self.light = self.lights.components[0]
-        self.bench = Bench(TESTER, checksum_errors=lambda: (
-            self.link.decoders[0].counters.crc_errors), **options)
-        self.suite = Suite(self.bench, only=only)
-        self.link = VirtualLink(self.bench, self.lights)
+        self.session = CHECKS.session(TESTER, target)
+        self.link = VirtualLink(self.session, self.lights)
+        self.tester = LightTester(self.session, Conditions(
+            consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat}))
+        self._requirements = [one for one in requirements if not only or one.name in only]
+        self.suite = self._suite('')
+        self.session.runner.run(self._main())
+
+    def _suite(self, missing: str) -> Suite[LightTester]:
+        return Suite(self.tester, self._requirements, device='light', missing=missing,
+                     no_consent=CHECKS.no_consent)
+
+    async def _main(self) -> None:
+        with contextlib.suppress(Interrupted):
+            await self.session.find(FIND_TIMEOUT, LISTEN_TIME)
+            if self.session.found is None:
+                self.suite = self._suite(
+                    absence(self.session, 'light', CHECKS.evidence, FIND_TIMEOUT))
+        await self.suite.run()
 
     @property
     def lamp(self) -> SimulatedLamp:
@@ -70,9 +102,25 @@ class Run:
         for name in names:
             self.light.behave(FAULTS.add(self.light.behaviour, name), self.link.now)
 
+    def interrupt(self) -> None:
+        """Interrupt the run."""
+        self.session.interrupt(self.link.now)
+
+    def watch(self) -> list[Configuration]:
+        """Return a list that gets the configuration after each change that leaves it on."""
+        seen: list[Configuration] = []
+        apply = self.light.apply
+
+        def noted(change: Any, now: float) -> None:
+            apply(change, now)
+            if self.lamp.enabled:
+                seen.append(self.lamp.configuration)
+        self.light.apply = noted  # type: ignore[method-assign]
+        return seen
+
     def finish(self) -> Run:
-        """Let the suite run to its end."""
-        self.link.run_until(lambda: not self.bench.running, within=3600.0)
+        """Let the run end."""
+        self.link.run_until(lambda: not self.session.runner.running, within=3600.0)
         return self
 
     def names(self, verdict: Verdict) -> set[str]:
@@ -84,7 +132,7 @@ class Run:
         """Return the names of the requirements that the light does not meet."""
         return self.names(Verdict.FAIL)
 
-    def result(self, name: str):
-        """Return what became of a requirement."""
+    def result(self, name: str) -> Result:
+        """Return the result of a requirement."""
         (result,) = [one for one in self.suite.results if one.requirement.name == name]
         return result

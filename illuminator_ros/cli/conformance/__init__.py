@@ -12,12 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-The executable ``conformance``: checks any light against the illuminator protocol, without ROS.
-
-``bench`` talks to the light, ``requirements`` has the checks, ``suite`` runs them: all without
-I/O. ``run`` is the command line.
-"""
+"""The executable ``conformance``: checks a device against its MAVLink protocols, without ROS."""
 
 from __future__ import annotations
 
@@ -28,11 +23,11 @@ from ..program import explained
 
 def main(args: list[str] | None = None) -> int:
     """
-    Check a light; see :mod:`~.run`.
+    Check a device, and return the exit status.
 
-    :param args: the command line without the program's name.
+    :param args: the command line without the program's name; None takes that of the process.
     """
-    # Until something has been changed there is nothing to bring back, nor to say.
+    # End without a traceback until the run handles signals.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def start() -> int:

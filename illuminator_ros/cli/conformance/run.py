@@ -12,151 +12,239 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The command line of ``conformance``."""
+"""``conformance`` as a process: link, question, output, signals and reports."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Sequence
 import contextlib
-import functools
+import errno
 import logging
 import os
 from pathlib import Path
 import queue
+import select
 import signal
 import sys
+import threading
 from types import FrameType
-from typing import Any
+from typing import Any, TextIO
 
-from ..options import add_signing, address, integer, number, Parser, signing
+from .options import parse
+from ..options import signing
 from ..program import discard_output
-from ... import __version__
-from ...illuminator.checks.bench import Bench
-from ...illuminator.checks.report import as_json, as_junit, catalogue, Report, Table
-from ...illuminator.checks.requirement import REQUIREMENTS
-from ...illuminator.checks.suite import FIND_TIMEOUT, Suite
-from ...illuminator.identity import Identity
+from ..termination import SIGNALS
 from ...mavlink.link import Link
-from ...mavlink.link_state import LinkEvent
+from ...mavlink.link_state import LinkEvent, LinkState
 from ...mavlink.messages import Address
-from ...mavlink.signing_files import KeyFileError
-from ...mavlink.url import parse_url, UrlError
+from ...mavlink.signing import Signing
+from ...mavlink.signing_files import KeyFileError, TimestampStore
+from ...mavlink.url import parse_url, Url, UrlError
+from ...payload.checks.coroutine import Main
+from ...payload.checks.payload_checks import PayloadChecks
+from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
+from ...payload.checks.requirement import Conditions, Requirement, Result
+from ...payload.checks.suite import absence, names, Suite
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-_Texts = queue.SimpleQueue['str | None']
-
-QUESTION = (
-    'Some checks make the light strobe, and shine at 100 % for {heat:g} s. Strobing can trigger\n'
-    'seizures, and nobody should look into the light. The rest is checked without them.\n'
-    'May the light do that? [y/N] ')
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    result = Parser(
-        prog='conformance', formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Checks whether a light follows the MAVLink illuminator protocol, and the\n'
-                    'heartbeat and command protocols that it builds on.',
-        epilog='examples:\n'
-               '  conformance serial:///dev/ttyACM0:57600\n'
-               '  conformance udpin://0.0.0.0:14550 --target 1/243 --junit report.xml\n'
-               '  conformance udpin://127.0.0.1:14590 --yes   the simulator, as it starts without '
-               'arguments\n'
-               "  conformance udp://:14541@127.0.0.1:14540    the guide's emulator\n"
-               '\nThe light is switched and configured, and afterwards as it was before.\n'
-               'exit status: 0 if nothing is wrong, 1 if something is or nothing could be '
-               'checked,\n2 if an argument is wrong.')
-    result.add_argument('url', nargs='?', help='where the light is: UDP, TCP or serial')
-    result.add_argument('--version', action='version', version=__version__)
-    result.add_argument('--list', action='store_true', help='list the requirements, and end')
-    result.add_argument('--yes', action='store_true',
-                        help='let the light strobe, and shine at 100 %%, without asking')
-    result.add_argument('--target', type=_address, metavar='SYS/COMP',
-                        help='the light (default: the first that is heard)')
-    result.add_argument('--only', action='append', default=[], metavar='NAME',
-                        choices=[one.name for one in REQUIREMENTS],
-                        help='check this requirement only; may be repeated')
-    result.add_argument('--heat', type=number(0, 36000), default=5.0, metavar='S',
-                        help='how long it shines at 100 %% to get hot, and then cools down '
-                             '(default: 5)')
-    result.add_argument('--wait', type=number(0.1, 3600), default=FIND_TIMEOUT, metavar='S',
-                        help='how long to wait for the light (default: %(default)g)')
-    result.add_argument('--system-id', type=integer(1, 255), default=255, metavar='ID',
-                        help='our MAVLink system id (default: 255)')
-    result.add_argument('--component-id', type=integer(1, 255), default=190, metavar='ID',
-                        help='our component id (default: 190)')
-    result.add_argument('--junit', metavar='FILE', help='write a JUnit report too')
-    result.add_argument('--json', metavar='FILE', help='write a report with all that was said')
-    result.add_argument('-v', '--verbose', action='store_true',
-                        help='show what was said for requirements that are met, too')
-    add_signing(result)
-    return result
+# s to listen before the first command.
+LISTEN_TIME = 4.5
+NOT_OPEN = 'link not open: '
+# Why a link is not open although this computer has done its part; any other reason is its own.
+PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOSTUNREACH,
+               errno.ENETUNREACH, errno.EPIPE)
 
 
-def _address(text: str) -> Address:
-    try:
-        return address(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _consent(options: argparse.Namespace) -> bool:
-    """Ask whether the light may dazzle; nobody there to answer means no."""
-    if options.yes:
-        return True
-    if options.only and not any(one.dazzles for one in REQUIREMENTS if one.name in options.only):
-        return False
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        return False
-    try:
-        answer = input(QUESTION.format(heat=options.heat)).strip()
-    except EOFError:
-        return False
-    if answer.lower() not in ('y', 'yes', '', 'n', 'no'):
-        _print(f'{answer!r} is neither y nor n: taken as no')
-    return answer.lower() in ('y', 'yes')
-
-
-class _Signals:
+def run(args: Sequence[str] | None = None) -> int:
     """
-    SIGINT, SIGTERM and, but for nohup, SIGHUP end a run in order.
+    Check a device, and return the exit status.
 
-    A second one ends it at once, but for SIGHUP: of a terminal that goes, kernel and shell tell.
+    :param args: the command line without the program's name; None takes that of the process.
     """
+    options, checks = parse(args)
+    logging.basicConfig(format='%(message)s')
+    if options.list:
+        return 0 if _print(*catalogue(checks.requirements, checks.device)) else 1
+    address = Address(options.system_id, options.component_id)
+    try:
+        url = parse_url(options.url)
+        signs, store = signing(options, f'conformance {address}')
+    except (UrlError, KeyFileError, ValueError) as error:
+        _complain(str(error))
+        return 2
+    return Conformance(options, checks, address, url, signs, store).run()
 
-    def __init__(self, interrupt: Callable[[], None]) -> None:
-        self._interrupt = interrupt
-        self._count = 0
+
+class Conformance:
+    """One run against one device."""
+
+    def __init__(
+        self, options: argparse.Namespace, checks: PayloadChecks[Any], address: Address,
+        url: Url, signs: Signing, store: TimestampStore | None,
+    ) -> None:
+        self._options = options
+        self._checks = checks
+        self._requirements: list[Requirement[Any]] = [
+            one for one in checks.requirements
+            if not options.only or one.name in options.only]
+        # Written by the main thread: a blocked terminal must not delay the link's thread.
+        self._texts: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._table = Table(verbose=options.verbose)
+        self._session = checks.session(address, options.target)
+        self._link = Link(url, self._session, label=options.url, on_event=self._link_event,
+                          signing=signs, store=store)
+        self._suite: Suite[Any] | None = None
+        self._signals = 0
+        self._written = True
+
+    def run(self) -> int:
+        """Find the device, ask for consent, check the device, and write the reports."""
+        checks, options = self._checks, self._options
         for one in SIGNALS:
             if signal.getsignal(one) != signal.SIG_IGN:
                 signal.signal(one, self._handle)
+        begun = self._link.clock()
+        self._link.start()
+        self._write_line(f'checking the {checks.device} on {options.url} ...')
+        self._finish(self._session.find(options.wait, LISTEN_TIME))
+        missing = self._why_missing(self._link.state())
+        if missing.startswith(NOT_OPEN) and not any(
+                os.strerror(number) in missing for number in PEER_ERRORS):
+            self._link.stop()
+            _complain(f'{missing}; nothing was checked')
+            return 2
+        conditions = Conditions(
+            self._session.found is not None and self._announce_and_ask(),
+            lambda: self._link.state().decoding.crc_errors, self._own_options())
+        suite = self._suite = Suite(
+            checks.tester(self._session, conditions), self._requirements, device=checks.device,
+            missing=missing, no_consent=checks.no_consent, on_result=self._show)
+        self._finish(suite.run())
+        self._link.stop()
+        self._write_line(*self._table.end())
+        report = Report(
+            checks.payload, checks.device, options.url, self._describe_device(missing),
+            tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
+        self._write_line('', report.device, report.summary)
+        for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
+            self._written &= _write(path, text)
+        return 0 if suite.passed and self._written else 1
+
+    def _write_line(self, *texts: str) -> None:
+        if texts:
+            self._written &= _print(*texts)
+
+    def _own_options(self) -> dict[str, float]:
+        return {one.name: getattr(self._options, one.name) for one in self._checks.options}
+
+    def _finish(self, main: Main) -> None:
+        """Run a coroutine of the session to its end, and print what comes meanwhile."""
+        ended = threading.Event()
+
+        def begin(now: float) -> None:
+            self._session.runner.run(main)
+
+        def check(now: float) -> None:
+            if not self._session.runner.running:
+                ended.set()
+
+        self._link.call(begin)
+        while not ended.is_set() or not self._texts.empty():
+            self._link.call(check)
+            with contextlib.suppress(queue.Empty):
+                self._write_line(self._texts.get(timeout=0.1))
+
+    def _link_event(self, event: LinkEvent) -> None:
+        if not event.is_open:
+            self._texts.put(str(event))
+
+    def _show(self, result: Result) -> None:
+        if lines := self._table.add(result):
+            self._texts.put('\n'.join(lines))
+
+    def _why_missing(self, state: LinkState) -> str:
+        """Return why there is no device to check, '' if there is one."""
+        if self._session.found or self._session.runner.interrupted:
+            return ''
+        if state.is_open:
+            checks = self._checks
+            return absence(self._session, checks.device, checks.evidence, self._options.wait)
+        return f'{NOT_OPEN}{state.name}: {state.reason}'
+
+    def _announce_and_ask(self) -> bool:
+        """Name the device and the others on the link; return whether there is consent."""
+        session, device = self._session, self._checks.device
+        changed = any(one.changes for one in self._requirements)
+        texts = [f'found {device} {session.device}, which '
+                 + ('the checks will change and then restore' if changed else 'stays unchanged')]
+        if others := sorted(session.devices - {session.device}):
+            texts.append(f'not checked: {device} {names(others)}; --target selects another')
+        if others := sorted(session.heard - session.devices - {session.device}):
+            texts.append(f'also on this link: {names(others)}')
+        _print(*texts)
+        if self._options.yes:
+            return True
+        if not any(one.needs_consent for one in self._requirements):
+            return False
+        return _is_terminal(sys.stdin) and _is_terminal(sys.stdout) and self._ask()
+
+    def _ask(self) -> bool:
+        _print(self._checks.ask(self._session.device, self._own_options()), end='')
+        # Not input(), which a signal does not end.
+        while not self._session.runner.interrupted:
+            if select.select([sys.stdin], [], [], 0.1)[0]:
+                break
+        else:
+            return False
+        try:
+            answer = sys.stdin.readline().strip()
+        except (OSError, ValueError):
+            return False
+        if answer.lower() not in ('y', 'yes', '', 'n', 'no'):
+            _print(f'{answer!r} is neither y nor n: taken as no')
+        return answer.lower() in ('y', 'yes')
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if self._count and number == signal.SIGHUP:
+        # A closing terminal sends SIGHUP twice.
+        if self._signals and number == signal.SIGHUP:
             return
-        self._count += 1
-        if self._count > 1:
-            _complain('ended; the light is not as it was')
+        self._signals += 1
+        changed = self._suite is not None and self._suite.changed
+        device = self._checks.device
+        if self._signals > 1:
+            _complain(f'ended; the {device} is not as it was' if changed else 'ended')
             os._exit(1)
-        _complain('bringing the light back to where it was; once more to end without')
-        self._interrupt()
+        self._link.call(self._session.interrupt)
+        _complain(f'interrupted; restoring the {device}; a second signal ends without it'
+                  if changed else 'interrupted')
+
+    def _describe_device(self, missing: str) -> str:
+        session, device = self._session, self._checks.device
+        if session.found is None:
+            return f'no {device}: {missing}' if missing else f'no {device}'
+        identity = self._checks.identity(session)
+        return f'{device} {session.found}' + (f': {identity}' if identity else '')
+
+
+def _is_terminal(stream: TextIO | None) -> bool:
+    # A stream whose descriptor was closed before the start is None.
+    return stream is not None and stream.isatty()
 
 
 def _complain(text: str) -> None:
-    # Not through sys.stderr, which a signal may interrupt; and the terminal may be gone.
+    # Not through sys.stderr, which a signal may interrupt, and never blocked by its reader.
     with contextlib.suppress(OSError):
-        os.write(2, f'conformance: {text}\n'.encode())
+        if select.select([], [2], [], 0.0)[1]:
+            os.write(2, f'conformance: {text}\n'.encode())
 
 
-def _print(*texts: str) -> bool:
-    """Print; say so once if that fails, and go on: the light is to be brought back."""
+def _print(*texts: str, end: str = '\n') -> bool:
+    """Print and return True; if that fails, report it once and go on, to restore the device."""
     try:
-        # Whoever reads it through a pipe wants to have it now; who does not, does not.
-        print(*texts, sep='\n', flush=True)
+        # Flushed, so that a reader at the other end of a pipe sees it immediately.
+        print(*texts, sep='\n', end=end, flush=True)
     except BrokenPipeError:
-        pass
+        discard_output()
     except OSError as error:
         _complain(f'standard output: {error.strerror}')
         discard_output()
@@ -164,104 +252,13 @@ def _print(*texts: str) -> bool:
     return True
 
 
-def _put(texts: _Texts, lines: list[str]) -> None:
-    if lines:
-        texts.put('\n'.join(lines))
-
-
-def _link_fault(link: Link) -> str:
-    state = link.state()
-    return '' if state.is_open else f'{state.name}: {state.reason}'
-
-
-def _show(texts: _Texts, event: LinkEvent) -> None:
-    if not event.is_open:
-        texts.put(str(event))
-
-
 def _write(path: str | None, text: str) -> bool:
-    """Write a report; say so if it cannot be."""
+    """Write a report if one is wanted; return whether that succeeded."""
     if path is None:
         return True
     try:
-        Path(path).write_text(text)
+        Path(path).write_text(text, encoding='utf-8')
     except OSError as error:
-        print(f'conformance: {path}: {error.strerror}', file=sys.stderr)
+        _complain(f'{path}: {error.strerror}')
         return False
     return True
-
-
-def run(args: list[str] | None = None) -> int:
-    """
-    Check a light, and return the exit status.
-
-    :param args: the command line without the program's name; None takes the process's.
-    """
-    parsing = parser()
-    options = parsing.parse_args(args)
-    logging.basicConfig(format='%(message)s')
-    if options.list:
-        return 0 if _print(*catalogue()) else 1
-    if options.url is None:
-        parsing.error('the connection URL is missing')
-    for path in filter(None, (options.junit, options.json)):
-        if not Path(path).absolute().parent.is_dir():
-            parsing.error(f'{path}: there is no such directory')
-    identity = Address(options.system_id, options.component_id)
-    try:
-        url = parse_url(options.url)
-        signs, store = signing(options, f'conformance {identity}')
-    except (UrlError, KeyFileError, ValueError) as error:
-        print(f'conformance: {error}', file=sys.stderr)
-        return 2
-    consent = _consent(options)
-    bench = Bench(identity, target=options.target, consent=consent, heat=options.heat,
-                  checksum_errors=lambda: link.state().decoding.crc_errors,
-                  link_fault=lambda: _link_fault(link))
-    # Whoever does not read what is written must not hold up the link, which has times to keep.
-    texts: _Texts = queue.SimpleQueue()
-    link = Link(url, bench, label=options.url, on_event=functools.partial(_show, texts),
-                signing=signs, store=store)
-    table = Table(verbose=options.verbose)
-    suite = Suite(bench, only=options.only, find_timeout=options.wait,
-                  on_result=lambda result: _put(texts, table.add(result)))
-    return _conduct(options, link, bench, suite, table, texts)
-
-
-def _conduct(
-    options: argparse.Namespace, link: Link, bench: Bench, suite: Suite, table: Table,
-    texts: _Texts,
-) -> int:
-    def look(now: float) -> None:
-        if not bench.running:
-            _put(texts, table.end())
-            texts.put(None)
-
-    _Signals(lambda: link.call(bench.interrupt))
-    begun = link.clock()
-    link.start()
-    written = [_print(f'checking the light on {options.url} ...')]
-    while True:
-        link.call(look)
-        try:
-            text = texts.get(timeout=0.1)
-        except queue.Empty:
-            continue
-        if text is None:
-            break
-        written.append(_print(text))
-    link.stop()
-    report = Report(options.url, _light(bench, suite), tuple(suite.results), suite.restored,
-                    link.clock() - begun, suite.passed)
-    written += [_print('', report.light, report.summary),
-                _write(options.junit, as_junit(report)), _write(options.json, as_json(report))]
-    return 0 if suite.passed and all(written) else 1
-
-
-def _light(bench: Bench, suite: Suite) -> str:
-    if bench.found is None:
-        return f'no light: {suite.missing}' if suite.missing else 'no light'
-    identity: Any = Identity.from_message(bench.informations[-1]) if bench.informations else None
-    names = [] if identity is None else [identity.vendor, identity.model, identity.serial_number]
-    told = ', '.join(filter(None, names))
-    return f'light {bench.found}' + (f': {told}' if told else '')

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The checks of ``conformance`` for lights: what is said to one, and what it must answer."""
+"""Conformance checks of a light; no I/O."""

@@ -12,72 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages in words, for what was sent and what came."""
+"""The messages of a light as text, for the log of a session."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from ..error_flags import flag_names
 from ..identity import Identity
 from ..model import Status
-from ...mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    ComponentInformationBasic,
-    Heartbeat,
-    IlluminatorStatus,
-    MavCmd,
-    MavResult,
-    result_name,
-)
+from ...mavlink.messages import ComponentInformationBasic, IlluminatorStatus, Message
+from ...payload.checks import describe as protocols
 
 
-def command_name(command: int) -> str:
-    """Return the name of a MAV_CMD."""
-    try:
-        return f'MAV_CMD_{MavCmd(command).name}'
-    except ValueError:
-        return f'MAV_CMD {command}'
-
-
-def describe(message: Any) -> str:
+def describe(message: Message) -> str:
     """Return a message in one line."""
-    if isinstance(message, CommandLong | CommandInt):
-        return _command(message)
-    if isinstance(message, CommandAck):
-        return _ack(message)
     if isinstance(message, IlluminatorStatus):
         return f'ILLUMINATOR_STATUS {status_text(Status.from_message(message))}'
-    if isinstance(message, Heartbeat):
-        return (f'HEARTBEAT type {message.type}, autopilot {message.autopilot}, '
-                f'system_status {message.system_status}')
     if isinstance(message, ComponentInformationBasic):
         one = Identity.from_message(message)
         return (f'COMPONENT_INFORMATION_BASIC {one.vendor!r}, {one.model!r}, '
                 f'{one.software_version!r}, {one.hardware_version!r}, {one.serial_number!r}')
-    return str(message.msgname)
-
-
-def _command(message: Any) -> str:
-    params = [message.param1, message.param2, message.param3, message.param4]
-    while len(params) > 1 and params[-1] == 0:
-        params.pop()
-    to = Address(message.target_system, message.target_component)
-    again = getattr(message, 'confirmation', 0)
-    return (f'{message.msgname} to {to}: {command_name(message.command)} '
-            + ' '.join(f'{param:g}' for param in params)
-            + (f', confirmation {again}' if again else ''))
-
-
-def _ack(message: Any) -> str:
-    text = f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
-    if message.result == MavResult.IN_PROGRESS:
-        text += f', progress {message.progress}'
-    target = Address(message.target_system, message.target_component)
-    return text + (f' to {target}' if any(target) else '')
+    return protocols.describe(message)
 
 
 def status_text(status: Status) -> str:

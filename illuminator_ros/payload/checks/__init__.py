@@ -12,13 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The requirements, in the order in which they are checked; importing a module enters them."""
+"""
+Conformance checks of any payload: a session with one device, requirements, a run, a report.
 
-# isort: off
-from . import heartbeat, status, information, command  # noqa: I101
-from . import switch, configuration, interval, thermal, totals  # noqa: I101
-# isort: on
-from ..requirement import REQUIREMENTS
-
-__all__ = ['command', 'configuration', 'heartbeat', 'information', 'interval', 'REQUIREMENTS',
-           'status', 'switch', 'thermal', 'totals']
+No I/O and no ROS: an executable runs the session over a link.
+"""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a run has found, for people and for programs."""
+"""Reports of a run: text, JSON, JUnit XML."""
 
 from __future__ import annotations
 
@@ -23,12 +23,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 from .requirement import HEARTBEAT, Requirement, Result, Verdict
-from .requirements import REQUIREMENTS
 from ... import __version__
 
-# Lines of the exchange that a table shows; the files have more.
 SHOWN_LINES = 12
-# What XML 1.0 cannot carry, not even escaped.
+# Control characters, which XML cannot contain.
 _NOT_XML = {code: '?' for code in range(32) if code not in (9, 10, 13)}
 
 
@@ -37,19 +35,23 @@ class Report:
     """
     A run.
 
-    :param light: its address and what it says of itself, for people.
-    :param restored: what became of it.
+    :param payload: name of the payload.
+    :param kind: the kind of device.
+    :param device: its address and identity, as text.
+    :param restored: the state in which it was left, as text.
     """
 
+    payload: str
+    kind: str
     url: str
-    light: str
+    device: str
     results: tuple[Result, ...]
     restored: str
     seconds: float
     passed: bool
 
     def count(self, verdict: Verdict) -> int:
-        """Return how many results have a verdict."""
+        """Return the number of results with a verdict."""
         return sum(one.verdict is verdict for one in self.results)
 
     @property
@@ -60,32 +62,30 @@ class Report:
                 f'{self.restored}')
 
 
-def line(result: Result) -> str:
-    """Return a result in one line."""
+def lines(result: Result, *, verbose: bool = False) -> list[str]:
+    """
+    Return a result as lines of the table.
+
+    :param verbose: whether a requirement that is met gets the lines of the log, too.
+    """
     one = result.requirement
     detail = f' ({result.detail})' if result.detail and result.verdict is Verdict.PASS else ''
-    return f'{result.verdict.value:8}{one.name:23}{one.title}{detail}'
-
-
-def lines(result: Result, *, verbose: bool = False) -> list[str]:
-    """Return a result for a table: more than a line where there is something to say."""
-    one = result.requirement
-    text = [line(result)]
+    text = [f'{result.verdict.value:8}{one.name:23}{one.title}{detail}']
     if result.verdict is not Verdict.PASS:
         text.append(f'{"":8}{result.detail}')
     if result.verdict is Verdict.FAIL or verbose:
         text.append(f'{"":8}see {section(one)}')
-        said = [said for said in result.exchange
-                if one.specification is HEARTBEAT or ' HEARTBEAT ' not in said]
-        text += [f'{"":8}  {exchanged}' for exchanged in said[:SHOWN_LINES]]
-        if len(said) > SHOWN_LINES:
-            text.append(f'{"":8}  ... {len(said) - SHOWN_LINES} lines more, in --json')
+        shown = [line for line in result.exchange
+                 if one.specification is HEARTBEAT or ' HEARTBEAT ' not in line]
+        text += [f'{"":8}  {line}' for line in shown[:SHOWN_LINES]]
+        if len(shown) > SHOWN_LINES:
+            text.append(f'{"":8}  ... {len(shown) - SHOWN_LINES} more lines with --json')
     return text
 
 
 class Table:
     """
-    Turns results into lines for people: one line for all in a row that were not come to.
+    Turns results into lines; consecutive requirements that were not reached share one line.
 
     :param verbose: as in :func:`lines`.
     """
@@ -95,7 +95,7 @@ class Table:
         self._unreached: list[Result] = []
 
     def add(self, result: Result) -> list[str]:
-        """Take a result, and return the lines that can be shown now."""
+        """Add a result, and return the lines that are complete."""
         if not result.reached:
             ended = []
             if self._unreached and self._unreached[0].detail != result.detail:
@@ -105,24 +105,24 @@ class Table:
         return [*self.end(), *lines(result, verbose=self._verbose)]
 
     def end(self) -> list[str]:
-        """Return what has been held back."""
+        """Return the lines that were held back."""
         held, self._unreached = self._unreached, []
         if len(held) < 2:
             return [text for one in held for text in lines(one, verbose=self._verbose)]
         return [f'{Verdict.SKIPPED.value:8}{len(held)} requirements: {held[0].detail}']
 
 
-def section(one: Requirement) -> str:
-    """Return which part of the specification a requirement follows."""
+def section(one: Requirement[Any]) -> str:
+    """Return the section of the specification that contains a requirement."""
     return f'{one.specification.title}, "{one.section}": {one.specification.url}'
 
 
-def catalogue(requirements: Iterable[Requirement] = REQUIREMENTS) -> list[str]:
-    """Return all requirements, a line each."""
-    notes = {(False, False): '', (True, False): ', changes the light',
+def catalogue(requirements: Iterable[Requirement[Any]], kind: str) -> list[str]:
+    """Return all requirements on a kind of device, a line each."""
+    notes = {(False, False): '', (True, False): f', changes the {kind}',
              (True, True): ', needs your consent'}
     return [f'{one.name:23}{one.title} [{one.specification.title}, "{one.section}"'
-            f'{notes[one.changes, one.dazzles]}]' for one in requirements]
+            f'{notes[one.changes, one.needs_consent]}]' for one in requirements]
 
 
 def as_json(report: Report) -> str:
@@ -130,7 +130,7 @@ def as_json(report: Report) -> str:
     return json.dumps({
         'tool': f'illuminator_ros conformance {__version__}',
         'url': report.url,
-        'light': report.light,
+        report.kind: report.device,
         'passed': report.passed,
         'seconds': round(report.seconds, 3),
         'restored': report.restored,
@@ -155,13 +155,13 @@ def _result(result: Result) -> dict[str, Any]:
 
 
 def as_junit(report: Report) -> str:
-    """Return the report as JUnit XML, as CI servers read it."""
+    """Return the report as JUnit XML, in UTF-8."""
     suite = ElementTree.Element(
-        'testsuite', name='illuminator conformance', tests=str(len(report.results)),
+        'testsuite', name=f'{report.payload} conformance', tests=str(len(report.results)),
         failures=str(report.count(Verdict.FAIL)), errors='0',
         skipped=str(report.count(Verdict.SKIPPED)), time=f'{report.seconds:.3f}')
     properties = ElementTree.SubElement(suite, 'properties')
-    for name, value in (('url', report.url), ('light', report.light),
+    for name, value in (('url', report.url), (report.kind, report.device),
                         ('restored', report.restored)):
         ElementTree.SubElement(properties, 'property', name=name, value=_clean(value))
     for result in report.results:
@@ -176,7 +176,9 @@ def as_junit(report: Report) -> str:
             ElementTree.SubElement(case, 'skipped', message=_clean(result.detail))
         ElementTree.SubElement(case, 'system-out').text = _clean('\n'.join(result.exchange))
     ElementTree.indent(suite)
-    return ElementTree.tostring(suite, encoding='unicode', xml_declaration=True) + '\n'
+    # Not 'unicode', which declares the encoding of the locale.
+    text: bytes = ElementTree.tostring(suite, encoding='utf-8', xml_declaration=True)
+    return text.decode() + '\n'
 
 
 def _clean(text: str) -> str:

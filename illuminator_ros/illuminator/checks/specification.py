@@ -12,16 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How often something came."""
+"""The page of the MAVLink guide about lights."""
 
-from __future__ import annotations
+from ...payload.checks.requirement import Specification
 
-
-def periods(times: list[float]) -> list[float]:
-    """Return the differences of consecutive times."""
-    return [later - earlier for earlier, later in zip(times, times[1:], strict=False)]
-
-
-def median(values: list[float]) -> float:
-    """Return the middle one."""
-    return sorted(values)[len(values) // 2]
+ILLUMINATOR = Specification(
+    'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')

@@ -16,55 +16,60 @@
 
 from __future__ import annotations
 
-from ..bench import Bench
-from ..requirement import Failed, ILLUMINATOR, requirement, Skipped
-from ...error_flags import ErrorFlag, flag_names
-from ...model import Status
+from .specification import ILLUMINATOR
+from .tester import LightTester
+from ..error_flags import ErrorFlag, flag_names
+from ..model import Status
+from ...payload.checks.requirement import Failed, requirement, Skipped
 
-# K that a light has to get warmer for a flag to have a reason.
+# Smallest rise of temperature that explains a flag, K.
 STEP = 0.5
 THERMAL = (ErrorFlag.THERMAL_THROTTLING, ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
 
 
-@requirement('thermal-flags', 'its error flags go with its temperature', ILLUMINATOR,
-             'ILLUMINATOR_ERROR_FLAGS', dazzles=True)
-async def thermal(bench: Bench) -> str:
-    """Switch it on at 100 % for a while, then off for as long, and compare."""
-    if not bench.heat:
-        raise Skipped('not asked for: --heat 0')
-    await bench.baseline()
-    start = await bench.status()
+@requirement('thermal-flags', 'sets thermal error flags according to its temperature', ILLUMINATOR,
+             'ILLUMINATOR_ERROR_FLAGS', needs_consent=True)
+async def thermal(tester: LightTester) -> str:
+    """Keep it at 100 % for some time, then off for as long, and compare."""
+    heat = tester.conditions.options['heat']
+    if not heat:
+        raise Skipped('disabled by --heat 0')
+    await tester.baseline()
+    start = await tester.status()
     if start is None or start.temperature is None:
         raise Skipped('it reports no temperature')
     if start.error_flags & ErrorFlag.THERMISTOR_FAILURE:
         raise Skipped('its temperature sensor has failed')
-    await bench.configure(brightness=100.0)
-    on = await bench.switch(True)
+    await tester.configure(brightness=100.0)
+    on = (await tester.switch(True)).transaction
     if not on.accepted:
         raise Skipped(f'it cannot be switched on: {on.answer}')
-    seen = [start, *await _sample(bench)]
-    await bench.switch(False)
-    seen += await _sample(bench)
-    return _judge([one for one in seen if one.temperature is not None], bench.heat)
+    seen = [start, *await _sample(tester, heat)]
+    await tester.switch(False)
+    seen += await _sample(tester, heat)
+    return _judge([one for one in seen if one.temperature is not None], heat)
 
 
-async def _sample(bench: Bench) -> list[Status]:
+async def _sample(tester: LightTester, heat: float) -> list[Status]:
     samples = []
-    until = bench.now + bench.heat
-    while bench.now < until:
-        status = await bench.status()
+    session = tester.session
+    until = session.now + heat
+    while session.now < until:
+        status = await tester.status()
         if status is not None:
             samples.append(status)
-        await bench.sleep(min(0.5, bench.heat / 5))
+        await session.runner.sleep(min(0.5, heat / 5))
     return samples
 
 
 def _judge(seen: list[Status], seconds: float) -> str:
     """
-    Compare flags and temperatures, but not one sample with the next.
+    Return the temperatures at which flags were set.
 
-    Between two samples a small light may get hot and cool down again. What holds for all samples
-    is that a flag is set at no temperature at which the light began without it.
+    A flag must not be set at a temperature at which it was not set at first. Consecutive samples
+    are not compared: between them a small light may heat up and cool down.
+
+    :raises Failed: if a flag was.
     """
     start, hottest = seen[0].temperature or 0.0, max(one.temperature or 0.0 for one in seen)
     if not any(one.temperature for one in seen):
@@ -76,10 +81,10 @@ def _judge(seen: list[Status], seconds: float) -> str:
             continue
         name = flag_names(flag)[0]
         if min(flagged) < start + STEP:
-            raise Failed(f'{name} at {min(flagged):.1f} degC; at {start:.1f} degC there was none '
-                         'before')
+            raise Failed(f'{name} at {min(flagged):.1f} degC; it was not set at '
+                         f'{start:.1f} degC before')
         ranges.append(f'{name} from {min(flagged):.1f} to {max(flagged):.1f} degC')
     if not ranges:
-        raise Skipped(f'{seconds:g} s at 100 % brought it from {start:.1f} to {hottest:.1f} degC '
-                      'and no flag; try a longer --heat')
+        raise Skipped(f'{seconds:g} s at 100 % heated it from {start:.1f} to {hottest:.1f} degC '
+                      'and set no flag; try a longer --heat')
     return ', '.join(ranges)

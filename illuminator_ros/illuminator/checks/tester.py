@@ -1,0 +1,258 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tester of a light: it switches and configures the light, and compares the status."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .describe import status_text
+from ..error_flags import DIMMING_FLAGS
+from ..model import Configuration, Mode, NOTHING, shortest, Status
+from ...mavlink.messages import IlluminatorStatus, MavCmd, MavResult
+from ...payload.checks.payload_checks import NOT_AGREED
+from ...payload.checks.requirement import Conditions, Skipped
+from ...payload.checks.session import MESSAGE_TIMEOUT, Session
+from ...payload.checks.stream import restore_stream
+from ...payload.checks.transaction import Finding, Transaction
+
+# Brightness at which the light may be on without consent, and the limit of it, %.
+LOW = 10.0
+DIM = 20.0
+CHANGES = (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE)
+# s to wait for a status of the stream, where the light sends none on request.
+STREAM_TIMEOUT = 2.5
+
+
+def differences(asked: Configuration, status: Status) -> list[str]:
+    """Return the fields in which a status does not show a configuration."""
+    if not status.complete:
+        return [text.split()[0] for text in status.invalid]
+    shown = status.configuration(NOTHING)
+    dimmed = status.error_flags & DIMMING_FLAGS and shown.brightness < asked.brightness
+    return [name for name in asked.differences(shown) if name != 'brightness' or not dimmed]
+
+
+def same(one: Status, other: Status) -> bool:
+    """Return whether two statuses show the same switch and configuration."""
+    if one.enabled != other.enabled or not (one.complete and other.complete):
+        return (one.enabled, one.invalid) == (other.enabled, other.invalid)
+    return not (differences(one.configuration(NOTHING), other)
+                and differences(other.configuration(NOTHING), one))
+
+
+@dataclass(frozen=True)
+class Change:
+    """
+    A command that changes the light, and what the status shows of it.
+
+    :param not_shown: the fields in which the status does not show the accepted change.
+    :param contradiction: the finding about them.
+    """
+
+    transaction: Transaction
+    not_shown: tuple[str, ...] = ()
+    contradiction: Finding | None = None
+
+    def unmet(self, *names: str) -> Finding | None:
+        """Return why some fields were not changed; None if a status does not contradict."""
+        if not self.transaction.accepted:
+            return self.transaction.finding()
+        return self.contradiction if set(names) & set(self.not_shown) else None
+
+
+class LightTester:
+    """
+    Operates one light.
+
+    :param conditions: with consent, the light may strobe and shine at 100 %.
+    :ivar disagreements: accepted changes that the status did not show.
+    :ivar rejected_but_applied: rejected changes after which the status was different.
+    """
+
+    def __init__(self, session: Session, conditions: Conditions) -> None:
+        self.session = session
+        self.conditions = conditions
+        self.disagreements: list[Finding] = []
+        self.rejected_but_applied: list[Finding] = []
+        self._before: Status | None = None
+
+    # Commands and what the light shows
+
+    async def status(self) -> Status | None:
+        """Return a new status, None if the light does not send one."""
+        message = await self.session.request(IlluminatorStatus)
+        if message is None:
+            streamed = await self.session.receive_more(IlluminatorStatus, STREAM_TIMEOUT)
+            message = streamed[-1][1] if streamed else None
+        return None if message is None else Status.from_message(message)
+
+    async def switch(self, on: bool, *, as_int: bool = False) -> Change:
+        """Switch the light, and compare the status."""
+        one = await self.session.command(
+            MavCmd.ILLUMINATOR_ON_OFF, float(on), as_int=as_int)
+        return await self._compared(one, lambda status: [] if status.enabled == on else ['enable'])
+
+    async def configure(
+        self, mode: int = Mode.INTERNAL_CONTROL, brightness: float = LOW, period: float = 0.0,
+        duty: float = 0.0,
+    ) -> Change:
+        """Configure the light, and compare the status."""
+        asked = Configuration(Mode(mode), brightness, period, duty)
+        one = await self.session.command(
+            MavCmd.DO_ILLUMINATOR_CONFIGURE, mode, brightness, period, duty)
+        return await self._compared(one, lambda status: differences(asked, status))
+
+    async def _compared(
+        self, one: Transaction, differ: Callable[[Status], list[str]],
+    ) -> Change:
+        if not one.accepted:
+            return Change(one)
+        session = self.session
+        mark, since = session.log.count, session.now
+        while True:
+            status = await self.status()
+            if status is None or not differ(status):
+                return Change(one)
+            if session.now - since >= MESSAGE_TIMEOUT:
+                break
+            await session.runner.sleep(0.1)
+        not_shown = differ(status)
+        finding = Finding(
+            f'{one.text}: {one.answer}, but then the status differs in '
+            f'{" and ".join(not_shown)}: {status_text(status)}',
+            one.lines + session.log.since(mark)[-2:])
+        self.disagreements.append(finding)
+        return Change(one, tuple(not_shown), finding)
+
+    async def rejected(self, command: int, *params: float) -> Finding | None:
+        """Send a command that must be rejected; return a finding if its result is another."""
+        before = await self.status()
+        one = await self.session.command(command, *params)
+        after = await self.status()
+        restarted = before and after and after.uptime_ms < before.uptime_ms
+        if before and after and not (one.accepted or restarted or same(before, after)):
+            self.rejected_but_applied.append(
+                one.finding(f'{one.answer}, and then {status_text(after)}'))
+        if one.result == MavResult.DENIED:
+            return None
+        if one.accepted:
+            await self.baseline()
+        return one.finding()
+
+    # States that checks start from
+
+    async def baseline(self) -> None:
+        """Bring the light to the state that checks start from: off, dim, no strobe."""
+        status = await self.status()
+        low = Configuration(Mode.INTERNAL_CONTROL, LOW, 0.0, 0.0)
+        if status is None or status.enabled is not False:
+            await self._switch_off()
+            status = await self.status()
+        if status is None or differences(low, status):
+            await self.session.command(MavCmd.DO_ILLUMINATOR_CONFIGURE, *low.params())
+            status = await self.status()
+        if status is not None and status.enabled:
+            # A light whose brightness is its switch.
+            await self._switch_off()
+
+    async def _switch_off(self) -> None:
+        await self.session.command(MavCmd.ILLUMINATOR_ON_OFF, 0.0)
+
+    async def ensure_dim(self) -> None:
+        """
+        Bring the light to a state in which it may be switched on: off, dim, no strobe.
+
+        :raises Skipped: if it rejects the configuration, may be too bright, and there is no
+            consent.
+        """
+        await self.baseline()
+        if self.conditions.consent:
+            return
+        change = await self.configure()
+        status = await self.status()
+        if status is not None and status.enabled:
+            # A light whose brightness is its switch.
+            await self._switch_off()
+        if change.transaction.accepted and not change.contradiction:
+            return
+        if reason := _risk(status):
+            raise Skipped(f'switched on, {reason}, and that cannot be changed: {NOT_AGREED}')
+
+    async def ensure_unlit(self) -> None:
+        """
+        Bring the light to a state in which a brightness that it must reject cannot be seen.
+
+        :raises Skipped: if its brightness switches it on, and there is no consent.
+        """
+        await self.baseline()
+        if self.conditions.consent:
+            return
+        await self.configure(brightness=LOW / 2)
+        status = await self.status()
+        if status is None or status.enabled is not False:
+            raise Skipped('its brightness switches it on, so that an invalid one might dazzle: '
+                          + NOT_AGREED)
+
+    # Restoring
+
+    async def save(self) -> bool:
+        """See :class:`Tester`."""
+        self._before = self._before or await self.status()
+        return self._before is not None
+
+    @property
+    def saved(self) -> str:
+        """See :class:`Tester`."""
+        assert self._before is not None
+        return f'{"on" if self._before.enabled else "off"}, {_saved(self._before).describe()}'
+
+    async def restore(self) -> list[str]:
+        """See :class:`Tester`."""
+        assert self._before is not None
+        wanted, enabled = _saved(self._before), bool(self._before.enabled)
+        # First, so that the changes are not visible.
+        await self._switch_off()
+        await self.session.command(MavCmd.DO_ILLUMINATOR_CONFIGURE, *wanted.params())
+        # After it, because a light whose brightness is its switch is now on.
+        await self.session.command(MavCmd.ILLUMINATOR_ON_OFF, float(enabled))
+        await restore_stream(self.session, IlluminatorStatus)
+        status = await self.status()
+        if status is None:
+            return ['unknown']
+        return differences(wanted, status) + (['enable'] if status.enabled != enabled else [])
+
+
+def _saved(status: Status) -> Configuration:
+    """Return the configuration to restore; harmless values replace those that are invalid."""
+    return Configuration(
+        status.mode or Mode.INTERNAL_CONTROL,
+        LOW if status.brightness is None else shortest(status.brightness),
+        shortest(status.strobe_period or 0.0), shortest(status.strobe_duty_cycle or 0.0))
+
+
+def _risk(status: Status | None) -> str:
+    """Return how a light might dazzle when it is switched on, '' if it would not."""
+    # Off, a light whose brightness is its switch reports 0 and was brighter before.
+    if status is None or not status.brightness or status.error_flags & DIMMING_FLAGS:
+        return 'it might have any brightness'
+    if status.brightness > DIM:
+        return f'it would shine at {status.brightness:g} %'
+    if status.strobe_period != 0.0 and status.strobe_duty_cycle not in (0.0, 100.0):
+        return 'it might strobe'
+    if status.mode is Mode.EXTERNAL_SYNC:
+        return 'it might strobe with another signal'
+    return ''

@@ -1,0 +1,287 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``conformance`` as a process, over UDP, on a machine without ROS."""
+
+from collections.abc import Callable, Iterator
+import json
+import os
+from pathlib import Path
+import re
+import signal
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+import pytest
+from support.ports import free_port
+from support.processes import environment, Program, ROOT, run
+from support.terminals import conversation, on_terminal
+from support.waiting import eventually, PATIENCE
+
+Start = Callable[..., Program]
+
+# Started like this, a program can import only what `pip install` brings.
+WITHOUT_ROS = (
+    'import sys, support.no_ros\n'
+    'sys.modules.update(dict.fromkeys(["yaml", "serial"]))\n'
+    'from illuminator_ros.{0} import main\n'
+    'sys.exit(main(sys.argv[1:]))\n')
+# s; a whole run takes about 30.
+WHOLE_RUN = 300.0
+# Would keep the light at 100 % for an hour.
+LONG = ('--yes', '--only', 'brightness', '--only', 'thermal-flags', '--heat', '3600')
+
+
+@pytest.fixture
+def url() -> str:
+    return f'127.0.0.1:{free_port()}'
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Return a function that starts a program without ROS, until the test ends."""
+    started = []
+
+    def one(module: str, *arguments: str, **env: str) -> Program:
+        path = os.pathsep.join((str(ROOT), str(ROOT / 'test')))
+        started.append(Program(sys.executable, '-c', WITHOUT_ROS.format(module), *arguments,
+                               env={'PYTHONPATH': path, **env}))
+        return started[-1]
+
+    yield one
+    for program in started:
+        program.kill()
+
+
+@pytest.fixture
+def simulate(start: Start, url: str) -> Start:
+    """Return a function that starts a simulator on the URL."""
+    def one(*arguments: str, **env: str) -> Program:
+        program = start('simulator', f'udpin://{url}', *arguments, **env)
+        program.wait_for('link open')
+        return program
+    return one
+
+
+def shell(command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        f'{sys.executable} -m illuminator_ros.conformance {command}', shell=True, cwd=ROOT,
+        env=environment({'PYTHONUNBUFFERED': ''}), text=True, capture_output=True,
+        timeout=PATIENCE)
+
+
+@pytest.mark.timeout(WHOLE_RUN)
+def test_a_whole_run_ends_and_its_reports_agree(
+        url: str, start: Start, simulate: Start, tmp_path: Path) -> None:
+    # Without a virtual clock a busy machine may make the simulator slow, so FAIL is possible.
+    simulate()
+    program = start(
+        'conformance', f'udpout://{url}', '--yes', '--heat', '0', '--junit',
+        str(tmp_path / 'report.xml'), '--json', str(tmp_path / 'report.json'))
+    status = program.wait(WHOLE_RUN)
+
+    match = re.search(r'(\d+) passed, (\d+) failed, 1 skipped', program.log)
+    assert match, program.log
+    passed, failed = map(int, match.groups())
+    assert passed + failed + 1 == len(REQUIREMENTS)
+    assert passed > len(REQUIREMENTS) / 2
+    assert status == bool(failed)
+    assert 'the light is as it was' in program.log
+    assert json.loads((tmp_path / 'report.json').read_text())['passed'] is (not failed)
+    suite = ElementTree.parse(tmp_path / 'report.xml').getroot()
+    assert len(suite.findall('testcase')) == len(REQUIREMENTS)
+    assert len(suite.findall('testcase/failure')) == failed
+
+
+def test_a_failed_requirement_ends_with_status_1(url: str, start: Start, simulate: Start) -> None:
+    simulate('--fault', 'refuse=failed')
+    program = start('conformance', f'udpout://{url}', '--only', 'brightness', '--only', 'on')
+
+    assert program.wait() == 1
+    assert 'FAIL    brightness ' in program.log
+    # No terminal, no --yes: no consent.
+    assert 'switched on, it would shine at 100 %' in program.log
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_restores_the_light_and_ends_with_status_1(
+        url: str, start: Start, simulate: Start, number: int) -> None:
+    simulator = simulate()
+    program = start('conformance', f'udpout://{url}', *LONG)
+    simulator.wait_for('ON     100 %')
+    program.send(number)
+    program.wait_for('restoring the light')
+    # A closing terminal sends SIGHUP twice.
+    program.send(signal.SIGHUP)
+
+    assert program.wait() == 1
+    assert program.log.rstrip().endswith('the light is as it was')
+    assert 'Traceback' not in program.log
+    eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not restored')
+
+
+def test_a_second_signal_ends_at_once_and_says_that_the_light_is_changed(
+        url: str, start: Start, simulate: Start) -> None:
+    simulator = simulate()
+    program = start('conformance', f'udpout://{url}', *LONG)
+    simulator.wait_for('ON     100 %')
+    program.send(signal.SIGINT)
+    program.wait_for('restoring the light')
+    program.send(signal.SIGINT)
+
+    assert program.wait() == 1
+    assert program.log.rstrip().endswith('ended; the light is not as it was')
+
+
+def test_a_signal_before_a_light_is_found_speaks_of_no_restoring(url: str, start: Start) -> None:
+    program = start('conformance', f'udpin://{url}')
+    program.wait_for('checking the light')
+    program.send(signal.SIGTERM)
+
+    assert program.wait() == 1
+    assert 'restor' not in program.log
+    assert program.log.rstrip().endswith('skipped in 0 s; nothing was changed')
+
+
+def test_a_closed_terminal_leaves_the_light_as_it_was(url: str, simulate: Start) -> None:
+    simulator = simulate()
+    with on_terminal('illuminator_ros.conformance', f'udpout://{url}', *LONG) as (process, master):
+        simulator.wait_for('ON     100 %')
+        os.close(master)
+        process.send_signal(signal.SIGHUP)
+        process.wait(PATIENCE)
+        eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not restored')
+
+
+def test_under_nohup_a_run_ignores_sighup(url: str) -> None:
+    program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
+                      'illuminator_ros.conformance', f'udpout://{url}', '--yes')
+    program.wait_for('checking the light')
+    status = Path(f'/proc/{program.pid}/status').read_text()
+    program.kill()
+
+    assert int(re.findall(r'SigIgn:\s*(\w+)', status)[0], 16) & 1 << signal.SIGHUP - 1
+
+
+@pytest.mark.parametrize('arguments', ['--list', '--help', 'udpin://{url} --wait 0.1'])
+def test_a_full_disk_is_reported_in_one_line_with_status_1(url: str, arguments: str) -> None:
+    ended = shell(f'{arguments.format(url=url)} > /dev/full')
+
+    assert ended.stderr == 'conformance: standard output: No space left on device\n'
+    assert ended.returncode == 1
+
+
+@pytest.mark.parametrize('redirection', ['<&-', '<&- >&-', '<&- >&- 2>&-', '2>&-'])
+def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirection: str) -> None:
+    simulate()
+    ended = shell(f'udpout://{url} --only strobe --only address {redirection}')
+
+    assert ended.returncode == 0
+    assert 'Traceback' not in ended.stderr
+
+
+def test_a_name_that_the_encoding_lacks_is_escaped(
+        url: str, start: Start, simulate: Start) -> None:
+    simulate('--vendor', 'Müller')
+    program = start('conformance', f'udpout://{url}', '--only', 'information-request',
+                    PYTHONIOENCODING='ascii')
+
+    assert program.wait() == 0
+    assert 'M\\xfcller' in program.log
+
+
+def test_without_a_light_the_status_is_1(url: str, start: Start) -> None:
+    program = start('conformance', f'udpin://{url}', '--wait', '0.5')
+
+    assert program.wait() == 1
+    assert 'no light was heard within 0.5 s' in program.log
+    assert '0 passed, 1 failed' in program.log
+
+
+def test_a_light_that_refuses_the_connection_is_a_finding(start: Start) -> None:
+    program = start('conformance', 'tcp://127.0.0.1:1', '--wait', '0.5')
+
+    assert program.wait() == 1
+    *_, light, summary = program.log.splitlines()
+    assert light.startswith('no light: link not open: tcp://127.0.0.1:1: ')
+    assert summary.startswith('0 passed, 1 failed')
+    assert len(program.log.splitlines()) < 12
+
+
+@pytest.mark.parametrize(('link', 'reason'), [
+    ('udpin://{url}', 'Address already in use; nothing was checked'),
+    ('serial:///nowhere/tty:57600', 'nothing was checked'),
+])
+def test_a_link_that_this_computer_cannot_open_ends_with_status_2_and_no_finding(
+        url: str, start: Start, simulate: Start, link: str, reason: str) -> None:
+    simulate()
+    program = start('conformance', link.format(url=url), '--wait', '0.5')
+
+    assert program.wait() == 2
+    assert reason in program.log
+    assert 'FAIL' not in program.log
+
+
+@pytest.mark.parametrize(('arguments', 'reason'), [
+    ([], 'the connection URL is missing'),
+    (['udp:x:y'], "port 'y' is not a number"),
+    (['udpin://:1', '--only', 'nope'], "invalid choice: 'nope'"),
+    (['udpin://:1', '--payload', 'nope'], "invalid choice: 'nope'"),
+    (['udpin://:1', '--target', '1'], "'1' is "),
+    (['udpin://:1', '--junit', '/nowhere/at/all.xml'], 'there is no such directory'),
+    (['udpin://:1', '--signing-mode', 'sign'], 'key'),
+])
+def test_a_wrong_argument_is_named_in_one_line_with_status_2(
+        arguments: list[str], reason: str) -> None:
+    ended = run('illuminator_ros.conformance', *arguments)
+
+    assert ended.returncode == 2
+    assert reason in ended.stderr
+    assert ended.stderr.count('\n') == 1
+
+
+def test_the_list_has_a_line_for_each_requirement() -> None:
+    ended = run('illuminator_ros.conformance', '--list')
+
+    assert ended.returncode == 0
+    assert len(ended.stdout.splitlines()) == len(REQUIREMENTS)
+
+
+@pytest.mark.parametrize(('answer', 'reply'), [
+    ('n', 'SKIPPED strobe'), ('y', 'PASS    strobe'),
+    ('maybe', "'maybe' is neither y nor n: taken as no")])
+def test_the_question_names_the_light_after_the_others_on_the_link(
+        url: str, simulate: Start, answer: str, reply: str) -> None:
+    simulate('--light', '1/7', '--light', '1/8')
+    status, seen = conversation(
+        'illuminator_ros.conformance', f'udpout://{url}', '--target', '1/8', '--only', 'strobe',
+        '--only', 'address', answers=[('[y/N]', answer)])
+
+    announced, _, question = seen.partition('Some checks')
+    assert 'found light 1/8' in announced
+    assert 'not checked: light 1/7' in announced
+    assert 'May light 1/8 strobe' in question
+    assert reply in question
+    assert status == 0
+
+
+def test_a_run_without_dangerous_checks_asks_nothing(url: str, simulate: Start) -> None:
+    simulate()
+    status, seen = conversation(
+        'illuminator_ros.conformance', f'udpout://{url}', '--only', 'on', answers=[])
+
+    assert status == 0
+    assert '[y/N]' not in seen

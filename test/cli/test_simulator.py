@@ -1,0 +1,86 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``simulator`` as a process: its terminal, and its standard input."""
+
+import contextlib
+import subprocess
+import sys
+
+import pytest
+from support.ports import free_port
+from support.processes import environment, python, ROOT
+from support.terminals import conversation
+from support.waiting import eventually, PATIENCE
+
+
+@pytest.fixture
+def url() -> str:
+    return f'udpin://127.0.0.1:{free_port()}'
+
+
+def test_a_simulator_on_a_terminal_takes_commands_and_draws_with_escapes(url: str) -> None:
+    status, seen = conversation(
+        'illuminator_ros.simulator', url, '--light', '1/7=bow',
+        answers=[('1/7 bow', 'bow on'), ('ON ', 'quit')])
+
+    assert status == 0
+    assert '\x1b7' in seen
+
+
+def test_a_simulator_on_a_pipe_takes_commands_and_prints_plain_text(url: str) -> None:
+    ended = subprocess.run(
+        [sys.executable, '-m', 'illuminator_ros.simulator', url], cwd=ROOT, env=environment(),
+        input='on\nbrightness 40\nfault nope\nstatus\nquit\n', text=True, capture_output=True,
+        timeout=PATIENCE)
+
+    assert ended.returncode == 0
+    assert "no fault 'nope'" in ended.stdout
+    assert 'ON      40 %' in ended.stdout
+    assert '\x1b' not in ended.stdout
+
+
+def test_a_simulator_whose_input_has_ended_runs_until_a_signal(url: str) -> None:
+    simulator = python('illuminator_ros.simulator', url)
+    simulator.wait_for('link open')
+
+    assert simulator.running
+    assert simulator.end() == 0
+
+
+def test_undecodable_input_does_not_end_the_console_of_a_simulator(url: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'illuminator_ros.simulator', url], cwd=ROOT,
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+        env=environment({'PYTHONIOENCODING': 'utf-8:strict'}))
+    assert process.stdin is not None
+
+    def ended() -> bool:
+        # Repeated, because a line that is read together with the bytes is dropped with them.
+        assert process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.write(b'quit\n')
+            process.stdin.flush()
+        return process.poll() is not None
+
+    try:
+        process.stdin.write(b'\xff\n')
+        process.stdin.flush()
+        eventually(ended, 'it takes no command any more')
+        assert process.returncode == 0
+    finally:
+        process.kill()
+        process.wait()
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
