@@ -46,6 +46,10 @@ def run_program(
     :param more: signals that end it too, see :class:`Termination`.
     :param queued: descriptors that are written to through an :class:`~.output.OutputQueue`.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A text that the encoding lacks must not end the program.
+            stream.reconfigure(errors='backslashreplace')
     termination = Termination(more, queued)
     status = explained(name, lambda: run(termination))
     termination.finish()

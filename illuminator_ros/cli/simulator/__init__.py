@@ -12,9 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executable ``simulator``: MAVLink illuminators without hardware, and without ROS."""
+"""The executable ``simulator``: MAVLink devices without hardware, and without ROS."""
 
 from __future__ import annotations
+
+import sys
 
 from ..program import run_program
 from ..termination import Termination
@@ -30,4 +32,6 @@ def main(args: list[str] | None = None) -> int:
         from .run import run
         return run(args, termination)
 
-    return run_program('simulator', start)
+    # The live view needs the terminal itself; only the view waits while that is stopped.
+    live = sys.stdout is not None and sys.stdout.isatty()
+    return run_program('simulator', start, queued=[2] if live else [1, 2])

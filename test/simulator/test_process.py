@@ -1,0 +1,116 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulator as a process: its output is blocked, closed, full or of another encoding."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+
+from illuminator_ros.mavlink.messages import Address
+import pytest
+from support.live_link import Bridge
+from support.ports import free_port
+from support.processes import ended, environment, prepare_child, python, ROOT, run
+from support.waiting import PATIENCE
+
+SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
+
+
+@contextlib.contextmanager
+def simulator(*arguments, **streams):
+    """Run a simulator with standard streams of its own."""
+    process = subprocess.Popen([*SIMULATOR, *arguments], env=environment(), cwd=ROOT,
+                               preexec_fn=prepare_child, **streams)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize('stream', ['stdout', 'stderr'])
+def test_a_reader_that_stops_reading_delays_no_command_and_no_sigterm(stream):
+    port = free_port()
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, bytes(4096))
+    os.set_blocking(writing, True)
+    bridge = Bridge(f'udpin:127.0.0.1:{port}')
+    streams = {'stdin': subprocess.DEVNULL, 'stdout': subprocess.DEVNULL,
+               'stderr': subprocess.DEVNULL, stream: writing}
+    try:
+        with simulator(f'udpout://127.0.0.1:{port}', **streams) as process:
+            assert bridge.enable(True).success
+            process.send_signal(signal.SIGTERM)
+            begun = time.monotonic()
+            assert process.wait(PATIENCE) == 0
+            assert time.monotonic() - begun < 1.5
+    finally:
+        bridge.stop()
+        os.close(reading)
+        os.close(writing)
+
+
+def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped():
+    with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{free_port()}',
+                      '--light', '1/243=Größe', env={'PYTHONIOENCODING': 'ascii'})) as program:
+        program.wait_for(r'1/243 Gr\xf6\xdfe')
+
+
+def test_an_error_with_such_a_name_is_one_line():
+    done = run('illuminator_ros.simulator', '--fault', 'ö', env={'PYTHONIOENCODING': 'ascii'})
+    assert (done.returncode, done.stderr.count('\n')) == (2, 1)
+
+
+def test_the_help_on_a_full_disk_ends_without_a_traceback():
+    with open('/dev/full', 'wb') as full:
+        done = subprocess.run([*SIMULATOR, '--help'], env=environment(), cwd=ROOT, stdout=full,
+                              stderr=subprocess.PIPE, preexec_fn=prepare_child,
+                              timeout=PATIENCE, check=False)
+    assert (done.returncode, done.stderr) == (0, b'')
+
+
+@pytest.mark.parametrize('closed', ['<&-', '>&-', '<&- >&- 2>&-'])
+def test_lights_are_served_while_standard_streams_are_closed(closed):
+    port = free_port()
+    bridge = Bridge(f'udpin:127.0.0.1:{port}')
+    command = f'exec {" ".join(SIMULATOR)} udpout://127.0.0.1:{port} {closed}'
+    process = subprocess.Popen(['sh', '-c', command], env=environment(), cwd=ROOT,
+                               preexec_fn=prepare_child)
+    try:
+        assert bridge.enable(True).success
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+    finally:
+        bridge.stop()
+        process.kill()
+
+
+def test_the_first_message_of_a_peer_is_one_line():
+    port = free_port()
+    with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')) as program:
+        bridge = Bridge(f'udpin:127.0.0.1:{port}')
+        try:
+            assert bridge.enable(True).success
+            program.wait_for(f'peer {Address(1, 194)}: first message')
+            assert bridge.enable(False).success
+        finally:
+            bridge.stop()
+    assert program.count('first message') == 1
