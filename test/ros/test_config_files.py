@@ -1,0 +1,199 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The files in config/ name the topics, types and services that a real bridge has."""
+
+from collections.abc import Iterator
+from importlib import import_module
+import json
+from pathlib import Path
+import re
+from typing import Any
+import xml.etree.ElementTree as ET
+
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from support.graph import Interface, interface
+from support.light import Address, ServedLight
+from support.ros import Ros, running_bridge, STREAM
+import yaml
+
+CONFIG = Path(__file__).parents[2] / 'config'
+AGGREGATOR = yaml.safe_load(
+    (CONFIG / 'diagnostics_aggregator.yaml').read_text())['/**']['ros__parameters']['lights']
+JOYSTICK = yaml.safe_load((CONFIG / 'joystick.yaml').read_text())['/**']['ros__parameters']
+FOXGLOVE = json.loads((CONFIG / 'foxglove_layout.json').read_text())
+PLOTJUGGLER = ET.parse(CONFIG / 'plotjuggler_layout.xml').getroot()
+CURVES = [curve.attrib['name'] for curve in PLOTJUGGLER.iter('curve')]
+PLOTS = [series['value'] for panel in FOXGLOVE['configById'].values()
+         for series in panel.get('paths', [])]
+POLICY = ET.parse(CONFIG / 'sros2' / 'illuminator.policy.xml').getroot()
+# The rules of a policy, and the part of a node's interface that each names.
+RULES = {('topic', 'publish'): 'publishers', ('topic', 'subscribe'): 'subscriptions',
+         ('service', 'reply'): 'services', ('service', 'request'): 'clients'}
+NUMBERS = {'boolean', 'float', 'double', 'uint32'}
+SHOWN = {'brightness', 'temperature', 'connected', 'enabled', 'error_flags'}
+
+
+@pytest.fixture(scope='module')
+def settings() -> dict[str, Any]:
+    """With everything that makes the node do more."""
+    return {'use_sim_time': True, 'beam_range': 5.0}
+
+
+@pytest.fixture(scope='module')
+def offered(ros: Ros, shared_bridge: object) -> Interface:
+    """Return the interface of the bridge's first node."""
+    return interface(ros)
+
+
+def field_type(message: str, path: list[str]) -> str:
+    """Return the type of a field of a message."""
+    package, _, name = message.split('/')
+    fields = getattr(import_module(f'{package}.msg'), name).get_fields_and_field_types()
+    kind: str = fields[path[0]]
+    return field_type(kind.replace('/', '/msg/'), path[1:]) if path[1:] else kind
+
+
+def panels(layout: Any) -> Iterator[str]:
+    """Return the ids of the panels that are laid out."""
+    if isinstance(layout, str):
+        yield layout
+        return
+    assert layout.keys() == {'direction', 'first', 'second', 'splitPercentage'}
+    yield from panels(layout['first'])
+    yield from panels(layout['second'])
+
+
+def test_foxglove_layout_places_each_panel_and_plots_published_fields(
+    offered: Interface,
+) -> None:
+    topics = offered.publishers
+    by_topic = {topic: name.partition('!')[0] for name, panel in FOXGLOVE['configById'].items()
+                for topic in [*panel.get('topics', {}), panel.get('topicToRender')] if topic}
+
+    assert sorted(panels(FOXGLOVE['layout'])) == sorted(FOXGLOVE['configById'])
+    for path in PLOTS:
+        topic, *fields = path.split('.')
+        assert field_type(topics[topic], fields) in NUMBERS | {'string'}, path
+    assert {path.split('.')[0].removeprefix('/illuminator/') for path in PLOTS} >= {*SHOWN, 'mode'}
+    assert by_topic == {'/illuminator/beam': '3D', '/diagnostics': 'DiagnosticStatusPanel'}
+    assert topics['/illuminator/beam'] == 'visualization_msgs/msg/Marker'
+
+
+def test_plotjuggler_layout_selects_and_plots_published_numbers(
+    ros: Ros, offered: Interface,
+) -> None:
+    topics = offered.publishers
+    [selected] = [str(element.attrib['value']).split(';')
+                  for element in PLOTJUGGLER.iter('selected_topics')]
+    array = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait(
+        lambda array: len(array.status) == 2)
+    diagnosed = {f'{status.name}/{key}' for status in array.status
+                 for key in ['level', *(value.key for value in status.values)]}
+
+    assert set(selected) == {topic for curve in CURVES for topic in topics
+                             if curve.startswith(f'{topic}/')}
+    for curve in CURVES:
+        if curve.startswith('/diagnostics/'):
+            # PlotJuggler calls them TOPIC/HARDWARE_ID/NAME/KEY; the demo has these two ids.
+            url, _, key = curve.removeprefix('/diagnostics/').rpartition('/illuminator: ')
+            assert url in ('udpin://127.0.0.1:14590', 'SIM-1-243')
+            assert f'illuminator: {key}' in diagnosed
+        else:
+            [topic] = [topic for topic in topics if curve.startswith(f'{topic}/')]
+            fields = curve.removeprefix(f'{topic}/').split('/')
+            assert field_type(topics[topic], fields) in NUMBERS
+    assert {name.split('/')[2] for name in CURVES if name.startswith('/illuminator/')} >= SHOWN
+    for splitter in PLOTJUGGLER.iter('DockSplitter'):
+        sizes = [float(size) for size in splitter.attrib['sizes'].split(';')]
+        assert len(sizes) == int(splitter.attrib['count']) == len(splitter)
+
+
+def test_joystick_commands_are_topics_of_the_bridge_and_the_axis_covers_0_to_100_percent(
+    offered: Interface,
+) -> None:
+    for command in JOYSTICK.values():
+        assert command['type'] == 'topic'
+        assert offered.subscriptions[
+            '/' + command['topic_name']] == command['interface_type']
+    # joy_teleop publishes axis * scale + offset, and refuses an integer for a Float32.
+    mapping = JOYSTICK['dim']['axis_mappings']['data']
+    assert [axis * mapping['scale'] + mapping['offset'] for axis in (-1, 0, 1)] == [0, 50, 100]
+    assert {type(mapping['scale']), type(mapping['offset'])} == {float}
+    values = {name: command['message_value']['data']['value']
+              for name, command in JOYSTICK.items() if 'message_value' in command}
+    assert values == {'switch_on': True, 'switch_off': False}
+    assert [len(JOYSTICK[name]['deadman_buttons']) for name in values] == [2, 1]
+
+
+def permitted(node: str, element: str, action: str) -> list[str]:
+    """Return the names in full of what the policy lets a node do."""
+    [profile] = [one for one in POLICY.iter('profile') if one.attrib['node'] == node]
+    rules = [rule for rule in profile if action in rule.attrib]
+    assert all(rule.attrib == {action: 'ALLOW'} for rule in rules)
+    names = [str(name.text) for rule in rules for name in rule.iter(element)]
+    return [f'/{node}{name[1:]}' if name.startswith('~') else name for name in names]
+
+
+@pytest.mark.parametrize(('rule', 'part'), RULES.items(), ids=RULES.values())
+def test_policy_permits_the_bridge_its_interface_and_nothing_else(
+    offered: Interface, rule: tuple[str, str], part: str,
+) -> None:
+    assert sorted(permitted('illuminator', *rule)) == sorted(getattr(offered, part))
+
+
+def test_policy_permits_the_operator_all_that_the_bridge_offers_but_its_internals(
+    ros: Ros, offered: Interface,
+) -> None:
+    own = {'/clock', '/diagnostics', '/parameter_events', '/rosout'}
+    internal = {f'/illuminator/{name}' for name in (
+        'get_logger_levels', 'set_logger_levels', 'get_type_description')}
+    mine = interface(ros, 'tester', ['/tester/get_type_description'])
+
+    assert set(permitted('operator', 'topic', 'subscribe')) - own == set(
+        offered.publishers) - own
+    assert set(permitted('operator', 'topic', 'publish')) - own == set(
+        offered.subscriptions) - own
+    assert set(permitted('operator', 'service', 'request')) == set(offered.services) - internal
+    assert sorted(permitted('operator', 'service', 'reply')) == sorted(
+        name.replace('/tester/', '/operator/') for name in mine.services)
+    assert set(mine.publishers) <= set(permitted('operator', 'topic', 'publish'))
+
+
+def test_aggregator_takes_all_statuses_of_all_lights_and_no_others(
+    own_ros: Ros, port: int,
+) -> None:
+    def matches(name: str) -> bool:
+        # As GenericAnalyzer::match does with the names as they are published.
+        return (any(re.fullmatch(pattern, name) for pattern in AGGREGATOR.get('regex', []))
+                or any(map(name.startswith, AGGREGATOR.get('startswith', [])))
+                or any(part in name for part in AGGREGATOR.get('contains', [])))
+
+    nodes = ('illuminator', 'illuminator_1_244')
+    names = {f'{node}: {part}' for node in nodes for part in ('link', 'lamp')}
+    with (running_bridge(own_ros.domain, port, diagnostics_period=0.1, target_component=243),
+          ServedLight(port), ServedLight(port, Address(1, 244))):
+        recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        for node in nodes:
+            recorder.wait(lambda array, node=node: [status.name for status in array.status] == [
+                f'{node}: link', f'{node}: lamp'])
+
+    assert AGGREGATOR['type'] == 'diagnostic_aggregator/GenericAnalyzer'
+    assert all(map(matches, names))
+    assert set(AGGREGATOR['expected']) <= names
+    assert not any(map(matches, (
+        'illuminator_driver: link', 'illuminator: battery', 'my illuminator: lamp')))
+    # A status of the default period, 1 s, is not stale between two.
+    assert AGGREGATOR['timeout'] > 3.0
