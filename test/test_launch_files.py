@@ -19,6 +19,7 @@ import re
 import xml.etree.ElementTree as ET
 
 from illuminator_ros.cli.simulator.options import parser
+from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
@@ -133,7 +134,7 @@ def test_included_file_declares_the_arguments_given_to_it(launch: ET.Element) ->
 
 
 def test_parameter_of_the_bridge_exists_with_that_type() -> None:
-    known = {spec.name: spec for spec in LINK_PARAMETERS}
+    known = {spec.name: spec for spec in (*LINK_PARAMETERS, *LIGHT_PARAMETERS)}
     given = [param.attrib for node in bridges() for param in node.findall('param')]
     assert given
     for param in given:

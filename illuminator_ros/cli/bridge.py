@@ -16,32 +16,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+import json
+import os
 import sys
 
+from .payloads import PAYLOADS
 from .program import one_line, run_program
 from .termination import Termination
+from ..payload.registry import PayloadType
+
+NODE_NAME = 'illuminator'
 
 
-def usage() -> str:
+def usage(payloads: Mapping[str, PayloadType] = PAYLOADS) -> str:
     """Return what ``--help`` prints."""
-    from ..ros.parameter_spec import ParameterSpec
-    from ..ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
+    from ..ros.parameters import LINK_PARAMETERS, ParameterSpec
+    from ..ros.payload import RosPayload
+
+    kinds: list[RosPayload] = [payload.load('ros') for payload in payloads.values()]
 
     def row(spec: ParameterSpec, default: str) -> str:
         limits = f'{spec.shown_range} {spec.unit}'.strip()
         return (f'  {spec.name:22} {default:27} {spec.description}'
                 + (f' ({limits})' if limits else ''))
 
-    link = '\n'.join(row(spec, spec.shown_default) for spec in LINK_PARAMETERS)
-    device = '\n'.join(row(spec, '') for spec in DEVICE_PARAMETERS)
+    link = '\n'.join(row(spec, spec.shown_default) for spec in (
+        *LINK_PARAMETERS, *(spec for kind in kinds for spec in kind.parameters)))
+    device = '\n'.join(row(spec, '')
+                       for kind in kinds for spec in kind.device_parameters)
     return f"""\
-usage: bridge [-h | --version] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
+usage: bridge [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
 
 Makes a MAVLink illuminator (searchlight, torch, strobe) a ROS 2 node, /illuminator.
 
 examples:
   ros2 run illuminator_ros bridge
-  ros2 run illuminator_ros bridge --ros-args -p connection_url:=serial:///dev/ttyACM0:57600
+  ros2 run illuminator_ros bridge serial:///dev/ttyACM0:57600
   ros2 run illuminator_ros bridge --ros-args -p connection_url:=udpin://0.0.0.0:14550
 
   ros2 service call /illuminator/enable std_srvs/srv/SetBool "{{data: true}}"
@@ -63,18 +74,23 @@ parameter is wrong.
 """
 
 
-def main(args: list[str] | None = None) -> int:
+def main(
+    args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> int:
     """
     Run the bridge until a signal; see :func:`usage`.
 
     :param args: the command line without the program's name.
+    :param payloads: the kinds of payloads that the parameter ``payloads`` may name.
     """
     arguments = sys.argv[1:] if args is None else args
     return run_program(
-        'bridge', lambda termination: _run(arguments, termination), queued=[2])
+        'bridge', lambda termination: _run(arguments, termination, payloads), queued=[2])
 
 
-def _run(arguments: list[str], termination: Termination) -> int:
+def _run(
+    arguments: list[str], termination: Termination, payloads: Mapping[str, PayloadType],
+) -> int:
     own = arguments
     if '--ros-args' in arguments:
         # Slow to import, as all else that is imported in a function here.
@@ -84,16 +100,21 @@ def _run(arguments: list[str], termination: Termination) -> int:
         except Exception as error:
             return _wrong(f'wrong ROS arguments: {error}')
     if '-h' in own or '--help' in own:
-        print(usage(), end='')
+        print(usage(payloads), end='')
         return 0
     if '--version' in own:
         from .. import __version__
         print(__version__)
         return 0
+    if own and not own[0].startswith('-'):
+        url = own.pop(0)
+        # In double quotes: the value is YAML.
+        arguments = [*(argument for argument in arguments if argument != url),
+                     '--ros-args', '-p', f'connection_url:={json.dumps(url)}']
     if own:
         return _wrong(f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
                       'bridge --help')
-    return _serve(arguments, termination)
+    return _serve(arguments, termination, payloads)
 
 
 def _wrong(what: str) -> int:
@@ -102,35 +123,61 @@ def _wrong(what: str) -> int:
     return 2
 
 
-def _serve(arguments: list[str], termination: Termination) -> int:
+def _serve(
+    arguments: list[str], termination: Termination, payloads: Mapping[str, PayloadType],
+) -> int:
     import gc
 
     import rclpy
+    from rclpy.impl.implementation_singleton import rclpy_implementation
     from rclpy.signals import SignalHandlerOptions
 
-    from ..ros.node import IlluminatorNode
-    from ..ros.parameter_spec import ParameterError
-    from ..ros.process import BridgeProcess
+    from ..ros.bridge import Bridge
+    from ..ros.node import PayloadNode
+    from ..ros.parameters import ParameterError
 
     # From here on the ROS graph has to be left in order, so a signal only has effect later.
     termination.calls(lambda: None)
+    if (refusal := _log_directory_refusal()):
+        return _wrong(refusal)
+    # On a terminal rcutils colours its lines; it sees a pipe in its place.
+    if termination.is_terminal:
+        os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
     try:
         rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = IlluminatorNode()
+        node = PayloadNode(NODE_NAME)
     except Exception as error:
         # rclpy has an exception of its own for each thing that can be wrong with an argument.
         return _wrong(f'wrong ROS arguments: {error}')
     try:
-        process = BridgeProcess(node, arguments)
+        bridge = Bridge(node, arguments, payloads)
     except ParameterError as error:
         return _wrong(f'parameter {error}')
-    # What is there now stays: to look for garbage among it would only hold up an answer.
+    except rclpy_implementation.RCLError as error:
+        # Such as two topics with one name.
+        return _wrong(f'cannot create the node: {error}')
+    # All that exists now stays: to look for garbage among it would only hold up an answer.
     gc.collect()
     gc.freeze()
-    termination.calls(process.end)
-    process.run()
+    termination.calls(bridge.end)
+    bridge.run()
     rclpy.try_shutdown()
     return 0
+
+
+def _log_directory_refusal() -> str:
+    """Return which directory for log files cannot be written, '' if it can."""
+    home = os.environ.get('ROS_HOME') or '~/.ros'
+    directory = os.path.expanduser(os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log'))
+    try:
+        os.makedirs(directory, exist_ok=True)
+        if os.access(directory, os.W_OK | os.X_OK):
+            return ''
+        reason = 'no permission'
+    except OSError as error:
+        reason = error.strerror or str(error)
+    return (f'log files cannot be written to {directory}: {reason}; set ROS_LOG_DIR to a '
+            'directory that can be written')
 
 
 if __name__ == '__main__':

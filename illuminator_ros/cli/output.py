@@ -16,11 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import contextlib
 import fcntl
+import functools
 import os
 import select
-import socket
 import stat
 import threading
 
@@ -95,8 +96,12 @@ class _Stream:
             fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, QUEUE_SIZE)
         os.set_blocking(self.source, False)
         os.set_blocking(self._input, False)
-        self._socket = (socket.socket(fileno=self.target)
-                        if stat.S_ISSOCK(os.fstat(self.target).st_mode) else None)
+        self._send: Callable[[bytes], int] = functools.partial(os.write, self.target)
+        if stat.S_ISSOCK(os.fstat(self.target).st_mode):
+            # Slow to import, and signals must be taken before that.
+            import socket
+            connection = socket.socket(fileno=self.target)
+            self._send = lambda data: connection.send(data, socket.MSG_DONTWAIT)
         self.queue = bytearray()
         self.at_end = False
         self._lost = 0
@@ -123,10 +128,7 @@ class _Stream:
             self._add(line)
         try:
             if self.queue and _is_writable(self.target):
-                chunk = self.queue[:WRITE_SIZE]
-                size = (self._socket.send(chunk, socket.MSG_DONTWAIT) if self._socket
-                        else os.write(self.target, chunk))
-                del self.queue[:size]
+                del self.queue[:self._send(bytes(self.queue[:WRITE_SIZE]))]
         except BlockingIOError:
             pass
         except OSError:

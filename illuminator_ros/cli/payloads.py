@@ -22,6 +22,7 @@ from ..payload.registry import PayloadType
 
 PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
-        'illuminator', simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
+        'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
+        simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
         checks='illuminator_ros.illuminator.checks.catalogue:CHECKS'),
 )}

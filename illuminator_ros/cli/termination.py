@@ -46,6 +46,7 @@ class Termination:
 
     :param more: signals beside SIGINT, SIGTERM and SIGHUP. Under nohup SIGHUP is left ignored.
     :param queued: descriptors that are written to through an :class:`OutputQueue`.
+    :ivar is_terminal: whether stderr leads to a terminal.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class Termination:
         ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
         self._signals = {*SIGNALS, *more} - ignored
         signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
+        self.is_terminal = sys.stderr is not None and sys.stderr.isatty()
         self._output = OutputQueue(*queued)
         self._lock = threading.Lock()
         self._end: Callable[[], None] | None = None

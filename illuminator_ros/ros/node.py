@@ -12,159 +12,178 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node of one light."""
+"""A node of a payload: topics, services and commands from tables."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 import threading
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from .beam_output import BeamOutput
-from .diagnostics import (
-    hardware_id,
-    lamp_findings,
-    lamp_status,
-    level,
-    link_findings,
-    link_status,
-    why_no_light,
-)
-from .inputs import Inputs
-from .mounting import Mounting
-from .outputs import Outputs, STREAM_QOS
-from .parameters import declare_device_parameters, misspelt
-from ..illuminator.client import IlluminatorClient
-from ..illuminator.light import Light
-from ..mavlink.component import Component
+from .cdr import serializer
+from .executor import DeferredService
+from .link_call import LinkCalls, MAX_PENDING
+from .log import NodeLog
 from ..mavlink.link import Link
 
-# s without a light, after which the log says once what is known of the reason.
-PATIENCE = 5.0
-DEFAULT_NAME = 'illuminator'
+# A late subscriber gets the last value.
+STATE_QOS = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL)
+STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+# Publishers of both kinds are heard.
+COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Requests that the middleware keeps while others are taken; more than LinkCalls lets wait.
+SERVICE_QOS = QoSProfile(depth=2 * MAX_PENDING, reliability=ReliabilityPolicy.RELIABLE)
 
 
-class IlluminatorNode(Node):
+class PayloadNode(Node):
     """
-    Serves one light: topics, services, parameters, diagnostics.
+    A node without rclpy's parameter services and QoS events.
 
-    The link's parameters are not declared here but by whoever makes the link.
+    An executor would wait for an event of each publisher and subscription, and memory is theirs.
 
-    :param kwargs: as for rclpy's Node: namespace, parameter_overrides, context ...
+    :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """
 
-    def __init__(self, name: str = DEFAULT_NAME, **kwargs: Any) -> None:
-        super().__init__(name, start_parameter_services=False, enable_logger_service=True,
-                         **kwargs)
-        self.light: Light | None = None
-        self._hardware_id = ''
-        self._levels: list[bytes] = []
-        self._publishing = threading.Lock()
+    # rclpy's own signatures are long, and differ between its versions.
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, start_parameter_services=False, **options)
 
-    def serve(
-        self, link: Link, component: Component, client: IlluminatorClient, *, url: str,
-        mounting: Mounting, period: float,
+    def create_publisher(self, *arguments: Any, **options: Any) -> Any:
+        """See :meth:`Node.create_publisher`."""
+        options.setdefault(
+            'event_callbacks', PublisherEventCallbacks(use_default_callbacks=False))
+        return super().create_publisher(*arguments, **options)
+
+    def create_subscription(self, *arguments: Any, **options: Any) -> Any:
+        """See :meth:`Node.create_subscription`."""
+        options.setdefault(
+            'event_callbacks', SubscriptionEventCallbacks(use_default_callbacks=False))
+        return super().create_subscription(*arguments, **options)
+
+
+@dataclass(frozen=True)
+class Publication:
+    """
+    A topic ``~/name`` that the node publishes.
+
+    :param type: the message's class.
+    :param qos: :data:`STATE_QOS` where it is None.
+    """
+
+    name: str
+    type: Any
+    qos: QoSProfile | None = None
+
+
+@dataclass(frozen=True)
+class RequestService:
+    """
+    A service ``~/name``.
+
+    :param type: the service's class; its response has ``success`` and ``message``.
+    :param start: called in the link's thread with the request, the time (s), and the function
+        that it must call once with success and message, then or later.
+    :param limit: requests that may wait for their answers; one more is answered at once.
+    """
+
+    name: str
+    type: Any
+    start: Callable[[Any, float, Callable[[bool, str], None]], None]
+    limit: int = MAX_PENDING
+
+
+@dataclass(frozen=True)
+class CommandTopic:
+    """
+    A topic ``~/name`` that the node subscribes to.
+
+    :param type: a class of std_msgs.
+    :param take: called in the link's thread with ``data`` and the time (s); of values that come
+        faster than the link takes them only the newest.
+    :param check: returns a value as ``take`` is given it, in any thread; a ValueError is logged.
+    """
+
+    name: str
+    type: Any
+    take: Callable[[Any, float], None]
+    check: Callable[[Any], Any] = lambda value: value
+
+
+class NodeInterface:
+    """The topics and services of one node, as tables give them."""
+
+    def __init__(
+        self, node: Node, link: Link, log: NodeLog, *,
+        publications: Iterable[Publication] = (), services: Iterable[RequestService] = (),
+        commands: Iterable[CommandTopic] = (),
     ) -> None:
-        """
-        Create what the node offers.
+        self._publishers = {
+            one.name: (
+                node.create_publisher(one.type, f'~/{one.name}', one.qos or STATE_QOS).publish,
+                serializer(one.type))
+            for one in publications}
+        for service in services:
+            node.create_service(
+                service.type, f'~/{service.name}',
+                DeferredService(_taker(service, LinkCalls(link, log, service.limit))),
+                qos_profile=SERVICE_QOS)
+        for command in commands:
+            node.create_subscription(
+                command.type, f'~/{command.name}', _Newest(link, log, command).offer, COMMAND_QOS)
 
-        :param url: the connection URL, which diagnostics show as the link's hardware id.
-        :param period: of diagnostics, s.
-        :raises ParameterError: if the value given for a parameter of the light is wrong.
+    def publish(self, name: str, value: Any) -> None:
         """
+        Publish a value; callable from any thread.
+
+        :param value: ``data`` for a type of std_msgs, else the message or its serialized bytes.
+        """
+        publish, serialize = self._publishers[name]
+        publish(serialize(value))
+
+
+def _taker(service: RequestService, calls: LinkCalls) -> Callable[[Any, Any], None]:
+    response = service.type.Response
+
+    def take(request: Any, respond: Callable[[Any], None]) -> None:
+        def start(now: float, answer: Callable[[Any], None]) -> None:
+            service.start(request, now, lambda success, message: answer(
+                response(success=success, message=message)))
+
+        calls.ask(start, respond, lambda reason: respond(response(success=False, message=reason)))
+
+    return take
+
+
+class _Newest:
+    """Hands the newest value of a topic to the link's thread."""
+
+    def __init__(self, link: Link, log: NodeLog, command: CommandTopic) -> None:
         self._link = link
-        self._component = component
-        self._client = client
-        self._url = url
-        self._started = link.clock()
-        self._overrides = declare_device_parameters(self)
-        for warning in misspelt(self):
-            self.get_logger().warning(warning)
-        self._beam = BeamOutput(self, mounting, link.clock) if mounting.beam_range else None
-        self.outputs = Outputs(
-            self, mounting.frame_id, self._check_lamp,
-            self._beam.take if self._beam else lambda event: None,
-            begun_anew=self._forgive_loss)
-        self.inputs = Inputs(self, link, lambda: self.light, self.absence)
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
-        self._period = period
-        self._missed = False
-        self._diagnostics_due = self._started
+        self._log = log
+        self._command = command
+        self._waiting: list[Any] = []
+        self._lock = threading.Lock()
 
-    def bind(self, light: Light, now: float) -> None:
-        """Serve a light from now on, and tell what is known of it; in the link's thread."""
-        self.light = light
-        for event in light.snapshot(now).events():
-            self.outputs.take(event)
-        if self._overrides:
-            light.set_desired(self._overrides, now)
+    def offer(self, message: Any) -> None:
+        try:
+            value = self._command.check(message.data)
+        except ValueError as error:
+            self._log.warning(f'~/{self._command.name}: {error}', self._command.name)
+            return
+        with self._lock:
+            called = bool(self._waiting)
+            self._waiting[:] = [value]
+        if not called:
+            self._link.call(self._deliver)
 
-    def end(self) -> None:
-        """Take back what others would go on to show, after the executor has ended."""
-        if self._beam is not None:
-            self._beam.end()
-
-    def absence(self) -> str:
-        """Return why there is no light, for people."""
-        return f'no light connected: {why_no_light(self._link.state(), self._client)}'
-
-    def poll(self, tolerance: float) -> None:
-        """
-        Publish diagnostics if it is time to, or if a level has changed.
-
-        :param tolerance: how much too early it may be, s.
-        """
-        now = self._link.clock()
-        if self.light is None and not self._missed and now >= self._started + PATIENCE:
-            self._missed = True
-            self.get_logger().warning(self.absence())
-        if now >= self._diagnostics_due - tolerance:
-            self._diagnostics_due = now + self._period
-            self.publish_diagnostics()
-        elif self._worst(now) != self._levels:
-            self.publish_diagnostics()
-
-    def _worst(self, now: float) -> list[bytes]:
-        """Return the levels that would be published now."""
-        levels = [level(link_findings(
-            self._link.state(), self._component, self._client, self.light, now=now,
-            started=self._started))]
-        if self.light is not None and self.light.identification.settled(now):
-            levels.append(level(lamp_findings(self.light, now)))
-        return levels
-
-    def _check_lamp(self) -> None:
-        """Publish at once where the lamp's level has changed; asked after each status."""
-        light = self.light
-        if light is not None and self._levels[1:] not in (
-                [], [level(lamp_findings(light, self._link.clock()))]):
-            self.publish_diagnostics()
-
-    def _forgive_loss(self) -> None:
-        """Take the step back of a restarted light's sequence numbers for no loss of frames."""
-        counter = self.light and self._link.state().traffic.sources.get(self.light.address)
-        if counter:
-            counter.forgive()
-
-    def publish_diagnostics(self) -> None:
-        """Publish both statuses, or only the link's while it is open who the light is."""
-        with self._publishing:
-            now = self._link.clock()
-            light = self.light
-            array = DiagnosticArray()
-            array.header.stamp = self.get_clock().now().to_msg()
-            array.status = [link_status(
-                self.get_name(), self._url, self._link.state(), self._component, self._client,
-                light, now=now, started=self._started)]
-            if light is not None and light.identification.settled(now):
-                # A light that tells its serial number late keeps the id it had.
-                self._hardware_id = self._hardware_id or hardware_id(light)
-                array.status.append(
-                    lamp_status(self.get_name(), self._hardware_id, light, now))
-            for status in array.status:
-                # Their names leave out the namespace.
-                status.values.append(KeyValue(key='node', value=self.get_fully_qualified_name()))
-            self._levels = [status.level for status in array.status]
-            self._diagnostics.publish(array)
+    def _deliver(self, now: float) -> None:
+        with self._lock:
+            value = self._waiting.pop()
+        self._command.take(value, now)

@@ -16,20 +16,18 @@
 The parameter services of a node whose parameters live in a device.
 
 rclpy's own answer from synchronous callbacks: while one waits for the device, the executor
-stands still, and each parameter of a list is a command of its own. These are coroutines: a set
-waits for the light's acknowledgement while everything else goes on, and what comes in one call
-goes out in one command.
+stands still, and each parameter of a list is a command of its own. With these, a set waits for
+the device's acknowledgement while everything else goes on, and the values of one call go out in
+one command.
 """
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Awaitable, Callable
-import contextlib
-import inspect
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from rcl_interfaces.msg import ParameterValue, SetParametersResult
+from rcl_interfaces.msg import ListParametersResult, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -38,35 +36,49 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
-from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import ParameterNotDeclaredException, ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_parameters
+from rclpy.qos import qos_profile_services_default, QoSProfile
 
-from .parameters import DEVICE_SPECS
-from ..illuminator.model import checked, InvalidValue, Limits
+from .executor import DeferredService, Take
+from .link_call import LinkCalls
+from .log import NodeLog
+from .parameters import DeviceParameters
+from ..mavlink.link import Link
 
-# Sets values in the device; returns '' or why not.
-Configure = Callable[[dict[str, Any]], Awaitable[str]]
+# Names in one request; longer lists would hold up the other services of the node.
+MAX_NAMES = 1000
+# Requests that wait in the middleware, each of the size of a few parameters.
+QUEUE_DEPTH = 100
+
+# Sets values in the device, in the link's thread, given the time (s); calls its last argument
+# once with '' or why the values were not set.
+Configure = Callable[[Mapping[str, Any], float, Callable[[str], None]], None]
+# Raises ValueError where the device cannot take a value of a parameter, given its name.
+Check = Callable[[str, Any], object]
 
 
 class ParameterServices:
     """
     The six parameter services of a node made with ``start_parameter_services=False``.
 
-    :param configure: sets some of the parameters of the device with one command.
-    :param limits: returns what the device reports to be possible.
+    :param device: the parameters that the device accepts or refuses.
     """
 
     def __init__(
-        self, node: Node, group: CallbackGroup, configure: Configure,
-        limits: Callable[[], Limits],
+        self, node: Node, link: Link, log: NodeLog, device: DeviceParameters, check: Check,
+        configure: Configure,
     ) -> None:
         self._node = node
+        self._log = log
+        self._device = device
+        self._check_value = check
         self._configure = configure
-        self._limits = limits
-        callbacks: tuple[tuple[str, type[Any], Callable[[Any, Any], Any]], ...] = (
+        self._calls = LinkCalls(link, log)
+        qos = QoSProfile(depth=QUEUE_DEPTH,
+                         reliability=qos_profile_services_default.reliability)
+        services: tuple[tuple[str, Any, Take], ...] = (
             ('describe_parameters', DescribeParameters, self._describe),
             ('get_parameters', GetParameters, self._get),
             ('get_parameter_types', GetParameterTypes, self._types),
@@ -74,41 +86,35 @@ class ParameterServices:
             ('set_parameters', SetParameters, self._set),
             ('set_parameters_atomically', SetParametersAtomically, self._set_atomically),
         )
-        for name, service, callback in callbacks:
-            node.create_service(service, f'~/{name}', self._answering(callback),
-                                qos_profile=qos_profile_parameters, callback_group=group)
+        for name, type_, take in services:
+            node.create_service(type_, f'~/{name}', DeferredService(take), qos_profile=qos)
 
-    def _answering(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        """Return a service callback that answers whatever goes wrong in it."""
-        async def answering(request: Any, response: Any) -> Any:
-            try:
-                answer = callback(request, response)
-                return await answer if inspect.isawaitable(answer) else answer
-            except Exception as error:
-                reason = f'internal error: {error!r}'
-                self._node.get_logger().error(reason)
-                failure = SetParametersResult(successful=False, reason=reason)
-                if isinstance(response, SetParameters.Response):
-                    response.results = [failure] * len(request.parameters)
-                elif isinstance(response, SetParametersAtomically.Response):
-                    response.result = failure
-                return response
-        return answering
+    def _is_short(self, names: list[Any]) -> bool:
+        if len(names) <= MAX_NAMES:
+            return True
+        self._log.warning(f'a request for {len(names)} parameters was refused: the limit is '
+                          f'{MAX_NAMES}', 'parameter names')
+        return False
 
-    def _describe(self, request: Any, response: Any) -> Any:
+    # In the executor's thread. Where a name is unknown or the list too long, the answer is an
+    # empty list, as that of rclpy and rclcpp; tools take it for "not set".
+
+    def _describe(self, request: Any, respond: Callable[[Any], None]) -> None:
+        respond(DescribeParameters.Response(
+            descriptors=self._each(request.names, self._node.describe_parameter)))
+
+    def _get(self, request: Any, respond: Callable[[Any], None]) -> None:
+        respond(GetParameters.Response(values=self._each(request.names, self._value)))
+
+    def _types(self, request: Any, respond: Callable[[Any], None]) -> None:
+        respond(GetParameterTypes.Response(
+            types=self._each(request.names, lambda name: self._value(name).type)))
+
+    def _each(self, names: list[str], look_up: Callable[[str], Any]) -> list[Any]:
         try:
-            response.descriptors = self._node.describe_parameters(request.names)
+            return [look_up(name) for name in names] if self._is_short(names) else []
         except ParameterNotDeclaredException:
-            response.descriptors = []
-        return response
-
-    def _get(self, request: Any, response: Any) -> Any:
-        try:
-            response.values = [self._value(name) for name in request.names]
-        except ParameterNotDeclaredException:
-            # rclpy and rclcpp answer so; tools take it for "not set".
-            response.values = []
-        return response
+            return []
 
     def _value(self, name: str) -> ParameterValue:
         try:
@@ -116,52 +122,80 @@ class ParameterServices:
         except ParameterUninitializedException:
             return ParameterValue()
 
-    def _types(self, request: Any, response: Any) -> Any:
-        try:
-            response.types = [self._value(name).type for name in request.names]
-        except ParameterNotDeclaredException:
-            response.types = []
-        return response
+    def _list(self, request: Any, respond: Callable[[Any], None]) -> None:
+        """Leave out what is not set, so that the output of ``ros2 param dump`` can be loaded."""
+        result = ListParametersResult()
+        if self._is_short(request.prefixes):
+            try:
+                result = self._node.list_parameters(list(request.prefixes), request.depth)
+            except (TypeError, ValueError) as error:
+                self._log.warning(f'list_parameters: {error}', 'list_parameters')
+            result.names = [name for name in result.names if self._value(name).type]
+        respond(ListParameters.Response(result=result))
 
-    def _list(self, request: Any, response: Any) -> Any:
-        with contextlib.suppress(TypeError, ValueError):
-            response.result = self._node.list_parameters(list(request.prefixes), request.depth)
-        return response
+    def _set(self, request: Any, respond: Callable[[Any], None]) -> None:
+        messages = list(request.parameters) if self._is_short(request.parameters) else []
 
-    async def _set(self, request: Any, response: Any) -> Any:
-        """Set each parameter for itself, those of the light all with one command."""
-        results = [SetParametersResult() for _ in request.parameters]
-        changes: dict[str, Any] = {}
-        changing = []
-        for message, result in zip(request.parameters, results, strict=True):
-            result.reason = self._check(message)
-            if not result.reason and message.name in DEVICE_SPECS:
-                changes[message.name] = _value(message)
-                changing.append(result)
-            elif not result.reason:
-                result.reason = self._set_local([message])
-        reason = await self._configure(changes) if changes else ''
-        for result in changing:
-            result.reason = reason
-        for result in results:
-            result.successful = not result.reason
-        response.results = results
-        return response
+        def answer(reasons: list[str]) -> None:
+            respond(SetParameters.Response(results=[_result(reason) for reason in reasons]))
 
-    async def _set_atomically(self, request: Any, response: Any) -> Any:
-        """Set all or none. What is ours is set first: it can be taken back, light cannot."""
-        reason = next(filter(None, map(self._check, request.parameters)), '')
-        local = [p for p in request.parameters if p.name not in DEVICE_SPECS]
-        changes = [p for p in request.parameters if p.name in DEVICE_SPECS]
-        before = [self._node.get_parameter(p.name) for p in local] if not reason else []
+        def start(now: float, done: Callable[[list[str]], None]) -> None:
+            self._set_each(messages, now, done)
+
+        self._calls.ask(start, answer, lambda reason: answer([reason] * len(messages)))
+
+    def _set_atomically(self, request: Any, respond: Callable[[Any], None]) -> None:
+        def answer(reason: str) -> None:
+            respond(SetParametersAtomically.Response(result=_result(reason)))
+
+        messages = request.parameters
+        if not self._is_short(messages):
+            answer(f'{len(messages)} parameters are more than {MAX_NAMES}')
+            return
+        self._calls.ask(
+            lambda now, done: self._set_all(messages, now, done), answer, answer)
+
+    # In the link's thread
+
+    def _set_each(
+        self, messages: list[Any], now: float, answer: Callable[[list[str]], None],
+    ) -> None:
+        """Set each parameter for itself, those of the device all with one command."""
+        reasons = [self._check(message) for message in messages]
+        changes = {message.name: _value(message)
+                   for message, reason in zip(messages, reasons, strict=True)
+                   if message.name in self._device.specs and not reason}
+        for index, message in enumerate(messages):
+            if not reasons[index] and message.name not in changes:
+                reasons[index] = self._set_local([message])
+
+        def done(refusal: str) -> None:
+            answer([reason or (refusal if message.name in changes else '')
+                    for message, reason in zip(messages, reasons, strict=True)])
+
+        if changes:
+            self._configure(changes, now, done)
+        else:
+            done('')
+
+    def _set_all(self, messages: list[Any], now: float, answer: Callable[[str], None]) -> None:
+        """Set all or none. Local ones are set first: they can be rolled back."""
+        local = [message for message in messages if message.name not in self._device.specs]
+        reason = next(filter(None, map(self._check, messages)), '')
+        before = [] if reason else [self._node.get_parameter(one.name) for one in local]
         if not reason and local:
             reason = self._set_local(local)
-        if not reason and changes:
-            reason = await self._configure({p.name: _value(p) for p in changes})
-            if reason and before:
+
+        def done(refusal: str) -> None:
+            if refusal and before:
                 self._node.set_parameters_atomically(before)
-        response.result = SetParametersResult(successful=not reason, reason=reason)
-        return response
+            answer(refusal)
+
+        if reason or len(local) == len(messages):
+            answer(reason)
+        else:
+            self._configure({message.name: _value(message) for message in messages
+                             if message.name in self._device.specs}, now, done)
 
     def _set_local(self, messages: list[Any]) -> str:
         result = self._node.set_parameters_atomically(
@@ -169,23 +203,26 @@ class ParameterServices:
         return '' if result.successful else str(result.reason)
 
     def _check(self, message: Any) -> str:
-        """Return why a parameter cannot be set, '' if that is left to see."""
+        """Return why a parameter cannot be set, '' if the device or rclpy decides that."""
         name = message.name
         if not self._node.has_parameter(name):
-            return f'{name} is no parameter of this node'
+            return f'{name} is not a parameter of this node'
         try:
             value = _value(message)
         except ValueError:
-            return f'{name}: {message.value.type} is no parameter type'
-        if name not in DEVICE_SPECS:
-            return ''
-        if value is None:
-            return f'{name} cannot be deleted'
-        try:
-            checked(name, value, self._limits())
-        except InvalidValue as error:
-            return str(error)
+            return f'{name}: {message.value.type} is not a parameter type'
+        if name in self._device.specs:
+            if value is None:
+                return f'{name} cannot be deleted'
+            try:
+                self._check_value(name, value)
+            except ValueError as error:
+                return str(error)
         return ''
+
+
+def _result(reason: str) -> SetParametersResult:
+    return SetParametersResult(successful=not reason, reason=reason)
 
 
 def _value(message: Any) -> Any:

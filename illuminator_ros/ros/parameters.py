@@ -12,94 +12,182 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The parameters of the node: one table each for the link and for the light."""
+"""Parameters: their specification, those of the link, and those that show a device."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 import difflib
 import math
-import re
-import reprlib
+import time
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from .parameter_spec import ParameterError, ParameterSpec
-from ..illuminator.model import checked, InvalidValue, MAX_STROBE_PERIOD, MODES
 from ..mavlink.messages import Address
-from ..mavlink.signing import SigningMode
+from ..mavlink.signing import Signing, SigningMode
+from ..mavlink.signing_files import keyed, KeyFileError, TimestampStore
 from ..mavlink.url import parse_url, Url, UrlError
+
+_TYPES: dict[type, tuple[Parameter.Type, str]] = {
+    float: (Parameter.Type.DOUBLE, 'number'),
+    int: (Parameter.Type.INTEGER, 'integer'),
+    str: (Parameter.Type.STRING, 'string'),
+    bool: (Parameter.Type.BOOL, 'boolean'),
+    list: (Parameter.Type.STRING_ARRAY,
+           "list of strings, as in -p names:=\"['1/244=belly']\""),
+}
+
+
+class ParameterError(ValueError):
+    """A parameter that the node cannot start with; the message names it and says why."""
+
+
+@dataclass(frozen=True)
+class ParameterSpec:
+    """
+    One parameter.
+
+    :param default: its type is that of the parameter; for a parameter of a device only the type
+        counts.
+    :param unit: of the value and of its range, '' for none.
+    :param low: and ``high``, the range of a number, both ends included.
+    :param choices: the values of a string, where they are few.
+    :param constraints: other conditions on the value, for people.
+    """
+
+    name: str
+    default: Any  # a value of any type of parameter
+    description: str
+    unit: str = ''
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+    constraints: str = ''
+
+    @property
+    def type(self) -> Parameter.Type:
+        """Return the parameter's type."""
+        return _TYPES[type(self.default)][0]
+
+    @property
+    def shown_default(self) -> str:
+        """Return the default as it is written in YAML, '' for none."""
+        if self.default in ('', []):
+            return ''
+        return str(self.default).lower() if isinstance(self.default, bool) else str(self.default)
+
+    @property
+    def shown_range(self) -> str:
+        """Return the range for people, ``1 to 255``, or the choices; '' if there is none."""
+        if self.low is None or self.high is None:
+            return ', '.join(self.choices)
+        return f'{self.low:g} to {self.high:g}'
+
+    def descriptor(self, *, read_only: bool, high: float | None = None) -> ParameterDescriptor:
+        """
+        Return the descriptor that tools show.
+
+        :param high: the upper end of the range where it is another than that of the table.
+        """
+        unit = f' [{self.unit}]' if self.unit else ''
+        constraints = self.constraints
+        if self.choices:
+            constraints = f'one of: {", ".join(self.choices)}'
+        descriptor = ParameterDescriptor(
+            description=self.description + unit, additional_constraints=constraints,
+            read_only=read_only, type=self.type.value)
+        if self.low is not None and self.high is not None:
+            top = self.high if high is None else high
+            if isinstance(self.default, float):
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=float(self.low), to_value=float(top))]
+            else:
+                descriptor.integer_range = [
+                    IntegerRange(from_value=int(self.low), to_value=int(top))]
+        return descriptor
+
+    def check(self, value: Any) -> Any:
+        """
+        Return a value of this parameter's type; an integer is taken for a double.
+
+        :raises ParameterError: if it is of another type or out of range.
+        """
+        wanted = type(self.default)
+        if wanted is float and type(value) is int:
+            value = float(value)
+        if wanted is list and isinstance(value, list | tuple):
+            value = [entry for entry in value if entry != '']
+        if value is False and 'off' in self.choices:
+            # For YAML, on the command line too, a bare off is a boolean.
+            value = 'off'
+        if type(value) is not wanted:
+            raise ParameterError(f'{self.name}: {value!r} is not a {_TYPES[wanted][1]}')
+        if self.choices and value not in self.choices:
+            raise ParameterError(
+                f'{self.name}: {value!r} is not one of {", ".join(self.choices)}')
+        if self.low is not None and self.high is not None and not self.low <= value <= self.high:
+            unit = f' {self.unit}' if self.unit else ''
+            raise ParameterError(
+                f'{self.name}: {value}{unit} is out of range: {self.low:g} to '
+                f'{self.high:g}{unit}')
+        return value
+
 
 DEFAULT_URL = 'udpin://127.0.0.1:14590'
 
 LINK_PARAMETERS = (
-    ParameterSpec('connection_url', DEFAULT_URL, 'where the light is: UDP, TCP or serial'),
+    ParameterSpec('connection_url', DEFAULT_URL, 'where the device is: UDP, TCP or serial'),
+    ParameterSpec('payloads', ['illuminator'], 'kinds of devices that the bridge serves'),
     ParameterSpec('system_id', 1, 'our MAVLink system id', low=1, high=255),
     ParameterSpec('component_id', 194, 'our MAVLink component id', low=1, high=255),
-    ParameterSpec('target_system', 0, 'system id of the light to serve; 0 = any', low=0,
-                  high=255),
-    ParameterSpec('target_component', 0, 'component id of the light to serve; 0 = any', low=0,
-                  high=255),
-    ParameterSpec('only_target', False, 'leave lights alone that the target does not select'),
-    ParameterSpec('names', [''], 'node names of further lights, such as 1/244=belly'),
-    ParameterSpec('heartbeat_timeout', 3.0, 'silence after which the light is lost', 's', 1.1,
-                  3600.0),
     ParameterSpec('command_timeout', 0.5, 'longest wait for one acknowledgement', 's', 0.05,
                   60.0),
     ParameterSpec('command_retries', 3, 'resends of an unacknowledged command', low=0, high=20),
-    ParameterSpec('status_interval', 0.0, "period of the light's status; 0 = its own", 's', 0.0,
-                  3600.0),
-    ParameterSpec('frame_id', 'illuminator', 'frame of temperature and beam'),
-    ParameterSpec('beam_range', 0.0, 'length of the cone on ~/beam; 0 = no ~/beam', 'm', 0.0,
-                  10_000.0),
-    ParameterSpec('beam_angle', 0.5, 'full opening angle of the cone on ~/beam', 'rad', 0.01,
-                  3.0),
     ParameterSpec('diagnostics_period', 1.0, 'period of /diagnostics', 's', 0.1, 60.0),
-    ParameterSpec('off_on_shutdown', False, 'switch the light off when the node ends'),
-    ParameterSpec('restore_configuration', True,
-                  'configure a light that has restarted as it was before'),
     ParameterSpec('signing_mode', 'off', 'MAVLink 2 message signing',
                   choices=tuple(mode.value for mode in SigningMode)),
     ParameterSpec('signing_key_file', '', 'path of the signing key, readable by its owner only'),
 )
-
-DEVICE_PARAMETERS = (
-    ParameterSpec('mode', '', 'what controls the light', choices=tuple(MODES)),
-    ParameterSpec('brightness', 0.0, 'brightness', '%', 0.0, 100.0),
-    ParameterSpec('strobe_period', 0.0, 'strobe period', 's', 0.0, MAX_STROBE_PERIOD,
-                  constraints='0 = no strobe, else within what the light reports'),
-    ParameterSpec('strobe_duty_cycle', 0.0, 'share of the strobe period in which it is lit', '%',
-                  0.0, 100.0),
-)
-DEVICE_SPECS = {spec.name: spec for spec in DEVICE_PARAMETERS}
 
 
 @dataclass(frozen=True)
 class LinkParameters:
     """The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges."""
 
+    connection_url: str
     url: Url
-    identity: Address
-    target: Address
-    only_target: bool
-    names: Mapping[Address, str]
-    heartbeat_timeout: float
+    payloads: tuple[str, ...]
+    address: Address
     command_timeout: float
     command_retries: int
-    status_interval: float
-    off_on_shutdown: bool
-    restore_configuration: bool
+    diagnostics_period: float
     signing_mode: SigningMode
     signing_key_file: str
-    connection_url: str
-    frame_id: str
-    beam_range: float
-    beam_angle: float
-    diagnostics_period: float
+
+    def signing(self) -> tuple[Signing, TimestampStore | None]:
+        """
+        Return the signing of the link, and where its time stamps are stored.
+
+        :raises ParameterError: if the key cannot be used, or is given and not used.
+        """
+        if self.signing_mode is SigningMode.OFF:
+            if self.signing_key_file:
+                raise ParameterError('signing_key_file: is given, but signing_mode is off')
+            return Signing(), None
+        try:
+            return keyed(
+                self.signing_mode, self.signing_key_file, f'bridge {self.address}', time.time())
+        except KeyFileError as error:
+            raise ParameterError(f'signing_key_file: {error}') from None
 
 
 def declare_link_parameters(node: Node) -> LinkParameters:
@@ -108,111 +196,120 @@ def declare_link_parameters(node: Node) -> LinkParameters:
 
     :raises ParameterError: if one is wrong.
     """
-    values = {spec.name: declare_read_only(node, spec, spec.default) for spec in LINK_PARAMETERS}
+    values = declare_read_only(node, LINK_PARAMETERS)
     try:
         url = parse_url(values['connection_url'])
     except UrlError as error:
         raise ParameterError(f'connection_url: {error}') from None
+    payloads = tuple(values.pop('payloads'))
+    if not payloads or len(set(payloads)) < len(payloads):
+        raise ParameterError(f'payloads: {list(payloads)} is empty or names one twice')
     return LinkParameters(
-        url=url, identity=Address(values['system_id'], values['component_id']),
-        target=Address(values['target_system'], values['target_component']),
-        names=_parse_names(values['names'], node.get_name()),
-        signing_mode=SigningMode(values['signing_mode']),
-        **{name: values[name] for name in (
-            'only_target', 'heartbeat_timeout', 'command_timeout', 'command_retries',
-            'status_interval', 'off_on_shutdown', 'restore_configuration', 'signing_key_file',
-            'connection_url', 'frame_id', 'beam_range', 'beam_angle', 'diagnostics_period')})
+        url=url, payloads=payloads,
+        address=Address(values.pop('system_id'), values.pop('component_id')),
+        signing_mode=SigningMode(values.pop('signing_mode')), **values)
 
 
-def declare_read_only(node: Node, spec: ParameterSpec, otherwise: Any) -> Any:
+def declare_read_only(
+    node: Node, specs: Iterable[ParameterSpec], defaults: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
     """
-    Declare a parameter as it is given, else with another value, and return it.
+    Declare parameters as they are given, read-only, and return their values.
 
-    :raises ParameterError: if it is wrong.
+    :param defaults: replace those of the specifications.
+    :raises ParameterError: if a value is wrong.
     """
-    override = take_override(node, spec.name)
-    value = spec.check(otherwise if override is None else override)
-    node.declare_parameter(
-        spec.name, value, spec.descriptor(read_only=True), ignore_override=True)
-    return value
-
-
-def _parse_names(entries: list[str], first: str) -> dict[Address, str]:
-    names: dict[Address, str] = {}
-    for entry in filter(None, entries):
-        match = re.fullmatch(r'([0-9]{1,3})/([0-9]{1,3})=(.*)', str(entry))
-        if not match or int(match[1]) > 255 or int(match[2]) > 255:
-            raise ParameterError(
-                f'names: {reprlib.repr(entry)} is not of the form 1/244=belly')
-        name = match[3]
-        if not re.fullmatch(r'[A-Za-z_][A-Za-z0-9_]*', name):
-            raise ParameterError(f'names: {name!r} in {entry!r} is no node name')
-        source = Address(int(match[1]), int(match[2]))
-        if source in names or name in names.values():
-            raise ParameterError(f'names: {entry!r} repeats an address or a name')
-        if name == first:
-            raise ParameterError(f'names: {entry!r} is the name of the first node')
-        other = re.fullmatch(rf'{first}_([0-9]+)_([0-9]+)', name)
-        if other and other.groups() != (str(source.system), str(source.component)):
-            raise ParameterError(
-                f'names: {entry!r} is the name of light {"/".join(other.groups())}')
-        names[source] = name
-    return names
-
-
-def declare_device_parameters(node: Node) -> dict[str, Any]:
-    """
-    Declare the parameters of the light, without values, and return their overrides.
-
-    They get values from the light: until its first status they are not set.
-
-    :raises ParameterError: if an override is wrong.
-    """
-    overrides = {}
-    for spec in DEVICE_PARAMETERS:
-        override = take_override(node, spec.name)
-        if override is not None:
-            try:
-                overrides[spec.name] = checked(spec.name, override)
-            except InvalidValue as error:
-                raise ParameterError(str(error)) from None
-        kind = Parameter.Type.from_parameter_value(spec.default)
+    values = {}
+    for spec in specs:
+        override = given_parameters(node).get(spec.name)
+        default = (defaults or {}).get(spec.name, spec.default)
+        value = spec.check(default if override is None else override.value)
+        # The type of an empty list cannot be inferred.
         node.declare_parameter(
-            spec.name, kind, spec.descriptor(read_only=False), ignore_override=True)
-    return overrides
+            spec.name, spec.type if value == [] else value,
+            spec.descriptor(read_only=value != []), ignore_override=True)
+        if value == []:
+            node.set_parameters_atomically([Parameter(spec.name, spec.type, [])])
+            node.set_descriptor(spec.name, spec.descriptor(read_only=True))
+        values[spec.name] = value
+    return values
 
 
-def take_override(node: Node, name: str) -> Any:
+def given_parameters(node: Node) -> Mapping[str, Parameter]:
     """
-    Return what the command line or a parameter file gives for a parameter, None if nothing.
+    Return what the command line and parameter files give for a node, by name.
 
-    Declaring it for a moment with any type is the public way to an override of a wrong type:
-    an integer for a double would otherwise end the node.
+    rclpy has no public way to values of the wrong type, such as an integer for a double, and to
+    parameters that are not declared.
+
+    :raises RuntimeError: if rclpy has renamed the private attribute.
     """
-    node.declare_parameter(name, None, ParameterDescriptor(dynamic_typing=True))
-    value = node.get_parameter(name).value
-    node.undeclare_parameter(name)
-    return value
+    try:
+        return node._parameter_overrides
+    except AttributeError:
+        raise RuntimeError(
+            'this version of rclpy is not supported: it has no Node._parameter_overrides, which '
+            'holds the parameters given on the command line') from None
 
 
 def misspelt(node: Node) -> list[str]:
-    """Return a warning for each override that looks like one of our parameters but is none."""
-    known = [spec.name for spec in (*LINK_PARAMETERS, *DEVICE_PARAMETERS)]
-    warnings = []
-    # There is no public way to overrides that nobody declares.
-    for name in getattr(node, '_parameter_overrides', {}):
-        if not node.has_parameter(name) and name not in known:
-            close = difflib.get_close_matches(name, known, 1, 0.75)
-            if close:
-                warnings.append(
-                    f'parameter {name!r} is unknown and ignored; did you mean {close[0]!r}?')
-    return warnings
+    """Return a warning for each given parameter that resembles one of the node's."""
+    known = list(node.list_parameters([], 0).names)
+    return [f'parameter {name!r} is unknown and ignored; did you mean {close[0]!r}?'
+            for name in given_parameters(node) if not node.has_parameter(name)
+            if (close := difflib.get_close_matches(name, known, 1, 0.75))]
 
 
-def period_range(max_period: float, reported: float) -> ParameterDescriptor:
-    """Return the descriptor of ``strobe_period`` for a light that reports these values, s."""
-    spec = DEVICE_SPECS['strobe_period']
-    high = max_period if max_period > 0 else MAX_STROBE_PERIOD
-    # What the light reports must fit, or it could not be shown.
-    high = max(high, reported) if math.isfinite(reported) else high
-    return spec.descriptor(read_only=False, high=high)
+class DeviceParameters:
+    """
+    Parameters of a node that show a device; for the link's thread.
+
+    They have no value until the device reports one, and only :meth:`show` sets them.
+
+    :ivar specs: by name.
+    """
+
+    def __init__(self, node: Node, specs: Iterable[ParameterSpec]) -> None:
+        self.specs = {spec.name: spec for spec in specs}
+        self._node = node
+        self._showing = False
+        for spec in self.specs.values():
+            node.declare_parameter(
+                spec.name, spec.type, spec.descriptor(read_only=False), ignore_override=True)
+        node.add_on_set_parameters_callback(self._may_set)
+
+    def overrides(self) -> dict[str, Any]:
+        """Return the values that the command line or a parameter file gives, unchecked."""
+        given = given_parameters(self._node)
+        return {name: given[name].value for name in self.specs if name in given}
+
+    def show(self, values: Mapping[str, Any]) -> str:
+        """Set parameters to what the device reports; return '' or why that failed."""
+        self._showing = True
+        try:
+            result = self._node.set_parameters_atomically([
+                Parameter(name, value=value) for name, value in values.items()])
+        finally:
+            self._showing = False
+        return '' if result.successful else str(result.reason)
+
+    def set_high(self, name: str, high: float) -> None:
+        """Show another upper end of the range of a number; its value is made to fit."""
+        value = self._node.get_parameter_or(name).value
+        # rclpy cannot describe anew what has no value; that follows with the first one.
+        if isinstance(value, float) and math.isfinite(high):
+            self._showing = True
+            try:
+                self._node.set_descriptor(name, self.specs[name].descriptor(
+                    read_only=False, high=max(high, value)))
+            finally:
+                self._showing = False
+
+    def _may_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse a value that the device has not accepted."""
+        names = [parameter.name for parameter in parameters if parameter.name in self.specs
+                 and parameter.type_ != Parameter.Type.NOT_SET]
+        if names and not self._showing:
+            return SetParametersResult(successful=False, reason=(
+                f'{", ".join(names)}: only the parameter services reach the device'))
+        return SetParametersResult(successful=True)

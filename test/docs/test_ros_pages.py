@@ -23,16 +23,17 @@ from illuminator_ros.cli.bridge import usage
 from illuminator_ros.cli.monitor import graph, keys, model, requests
 from illuminator_ros.cli.monitor.options import parser
 from illuminator_ros.illuminator.error_flags import ErrorFlag
+from illuminator_ros.illuminator.ros import beam
+from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
+from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
 from illuminator_ros.mavlink.messages import (
     CommandAck,
     ComponentInformationBasic,
     IlluminatorStatus,
     MavCmd,
 )
-from illuminator_ros.ros import beam, beam_output, mounting
-from illuminator_ros.ros.diagnostics import FLAG_LEVELS
-from illuminator_ros.ros.parameter_spec import ParameterSpec
-from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
+from illuminator_ros.ros.parameters import LINK_PARAMETERS as SHARED_PARAMETERS
+from illuminator_ros.ros.parameters import ParameterSpec
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from support.light import eventually
@@ -46,6 +47,7 @@ YAML = (ROOT / 'config' / 'bridge.yaml').read_text()
 REFERENCE, PROTOCOL, MONITOR, BEAM, PERFORMANCE = (
     (ROOT / 'doc' / f'{page}.md').read_text()
     for page in ('reference', 'protocol', 'monitor', 'beam', 'performance'))
+LINK_PARAMETERS = (*SHARED_PARAMETERS, *LIGHT_PARAMETERS)
 PARAMETERS = (*LINK_PARAMETERS, *DEVICE_PARAMETERS)
 LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
 QOS = {'state': (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),
@@ -170,10 +172,9 @@ def test_the_protocol_page_has_each_command_and_error_flag() -> None:
 
 def test_the_beam_page_has_the_parameters_and_limits_of_the_code() -> None:
     assert {cells[0]: cells[1] for cells in table(BEAM, 'parameter')} == {
-        f'`{spec.name}`': spec.unit for spec in LINK_PARAMETERS if spec.name in mounting.NAMES}
-    for text in (f'under {beam.SHORTEST_PERIOD:g} s', f'at least {beam.SHORTEST_FLASH:g} s',
-                 f'{beam_output.LIFETIME} s'):
-        assert text in BEAM
+        f'`{name}`': spec.unit for spec in LINK_PARAMETERS
+        if (name := spec.name) in ('frame_id', 'beam_range', 'beam_angle')}
+    assert f'{beam.LIFETIME} s' in BEAM
 
 
 def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:

@@ -21,9 +21,10 @@ import re
 import subprocess
 from typing import Any
 
-from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.parameter_spec import ParameterError
-from illuminator_ros.ros.process import BridgeProcess
+from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.ros.bridge import Bridge
+from illuminator_ros.ros.node import PayloadNode
+from illuminator_ros.ros.parameters import ParameterError
 import pytest
 from rclpy.parameter import Parameter
 from support.ports import free_port
@@ -133,8 +134,8 @@ def test_it_ends_the_start(outcomes: dict[str, Any], keys: Path, what: str) -> N
     ({'command_timeout': float('nan')}, 'command_timeout: nan s is out of range: 0.05 to 60 s'),
     ({'connection_url': 'udpin://127.0.0.1:99999'}, 'port 99999 is outside 1..65535'),
     ({'connection_url': ''}, "connection URL '': it is empty"),
-    ({'names': ['1/244=2 fast']}, "names: '2 fast' in '1/244=2 fast' is no node name"),
-    ({'names': ['1/244=']}, "names: '' in '1/244=' is no node name"),
+    ({'names': ['1/244=2 fast']}, "names: '2 fast' is not a valid node name"),
+    ({'names': ['1/244=']}, "names: '' is not a valid node name"),
     ({'names': ['1/999=belly']}, "names: '1/999=belly' is not of the form 1/244=belly"),
     ({'names': ['1/244=belly', '1/245=belly']}, "'1/245=belly' repeats an address or a name"),
     ({'names': ['1/244=belly', '1/244=nose']}, "'1/244=nose' repeats an address or a name"),
@@ -144,10 +145,10 @@ def test_it_ends_the_start(outcomes: dict[str, Any], keys: Path, what: str) -> N
 ])
 def test_the_reason_names_what_is_wrong(ros: Ros, given: dict[str, Any], reason: str) -> None:
     overrides = [Parameter(name, value=value) for name, value in given.items()]
-    node = IlluminatorNode(context=ros.context, parameter_overrides=overrides)
+    node = PayloadNode('illuminator', context=ros.context, parameter_overrides=overrides)
 
     with pytest.raises(ParameterError) as error:
-        BridgeProcess(node, [])
+        Bridge(node, [], PAYLOADS)
 
     node.destroy_node()
     assert reason in str(error.value)

@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The shape, the colour and the blinking of a beam."""
+"""The shape, the colour and the opacity of a beam."""
 
 import math
 
 from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.ros.beam import Beam, cone, Look, MAX_ALPHA, SIDES
+from illuminator_ros.illuminator.ros.beam import Beam, cone, MAX_ALPHA, SIDES
 import pytest
 from support.fake_light import status_message
 
@@ -27,24 +27,15 @@ EXTERNAL_SYNC = 2
 
 
 def beam_of(*reports: dict[str, float]) -> Beam:
-    """Return the beam of a light that is on and sends these statuses, one a second."""
+    """Return the beam of a light that is on and sends these statuses."""
     beam = Beam()
-    for now, report in enumerate(reports):
-        beam.take(Status.from_message(status_message(**{'enable': 1, **report})), float(now))
+    for report in reports:
+        beam = beam.updated(Status.from_message(status_message(**{'enable': 1, **report})))
     return beam
 
 
 def strobe(period: float, duty: float, **fields: float) -> dict[str, float]:
     return {'strobe_period': period, 'strobe_duty_cycle': duty, **fields}
-
-
-def flashes(beam: Beam, until: float) -> list[tuple[float, bool]]:
-    """Return when it changes and whether it is lit then, as a timer would see it."""
-    now, seen = 0.0, []
-    while now < until:
-        seen.append((round(now, 6), beam.look(now).alpha > 0))
-        now += beam.changes_in(now)
-    return seen
 
 
 @given(st.floats(0.1, 10_000), st.floats(0.01, 3.0))
@@ -66,57 +57,28 @@ def test_cone_is_closed_with_its_apex_at_the_origin_and_normals_pointing_outward
 
 
 @pytest.mark.parametrize(('reports', 'look'), [
-    ([], Look(0.0)),
-    ([{'brightness': 100.0}], Look(MAX_ALPHA)),
-    ([{'brightness': 1.0}], Look(pytest.approx(MAX_ALPHA / 100))),
-    ([{}, {'enable': 0}], Look(0.0)),
-    ([strobe(1.0, 50.0, enable=0)], Look(0.0)),
-    *(([{'error_status': flags}], Look(MAX_ALPHA, error=True)) for flags in (1, 2, 4, 0x100)),
-    ([{'error_status': 1}, {}], Look(MAX_ALPHA)),
+    ([], (0.0, False)),
+    ([{'brightness': 100.0}], (MAX_ALPHA, False)),
+    ([{'brightness': 1.0}], (pytest.approx(MAX_ALPHA / 100), False)),
+    ([{}, {'enable': 0}], (0.0, False)),
+    ([strobe(1.0, 50.0, enable=0)], (0.0, False)),
+    *(([{'error_status': flags}], (MAX_ALPHA, True)) for flags in (1, 2, 4, 0x100)),
+    ([{'error_status': 1}, {}], (MAX_ALPHA, False)),
     *(([{'brightness': 40.0}, {'brightness': 40.0, **nonsense}],
-       Look(pytest.approx(0.4 * MAX_ALPHA))) for nonsense in (
+       (pytest.approx(0.4 * MAX_ALPHA), False)) for nonsense in (
         {'enable': 7}, {'brightness': math.nan}, {'brightness': 500.0},
         {'strobe_period': -1.0}, {'strobe_duty_cycle': math.inf})),
-    # A strobe that is none, has no known rhythm, or is faster than ten flashes a second.
-    *(([strobe(period, duty)], Look(MAX_ALPHA))
+    # A strobe is drawn as bright as it is on average; another signal's strobe is not known.
+    *(([strobe(period, duty)], (MAX_ALPHA, False))
       for period, duty in ((0.0, 50.0), (1.0, 100.0))),
-    ([strobe(1.0, 10.0, mode=EXTERNAL_SYNC)], Look(MAX_ALPHA)),
-    ([strobe(0.02, 30.0, brightness=50.0)], Look(pytest.approx(0.15 * MAX_ALPHA))),
+    ([strobe(1.0, 10.0, mode=EXTERNAL_SYNC)], (MAX_ALPHA, False)),
+    ([strobe(2.0, 25.0)], (pytest.approx(MAX_ALPHA / 4), False)),
+    ([strobe(2.0, 25.0), strobe(0.0, 25.0)], (MAX_ALPHA, False)),
+    ([strobe(0.02, 30.0, brightness=50.0)], (pytest.approx(0.15 * MAX_ALPHA), False)),
 ])
-def test_steady_beam_has_the_look_of_the_last_plausible_status(
-    reports: list[dict[str, float]], look: Look,
+def test_beam_has_the_look_of_the_last_plausible_status(
+    reports: list[dict[str, float]], look: tuple[float, bool],
 ) -> None:
     beam = beam_of(*reports)
 
-    assert [beam.look(now) for now in (5.0, 5.013, 5.9)] == [look] * 3
-    assert beam.changes_in(5.0) == math.inf
-
-
-def test_lost_light_has_no_beam() -> None:
-    beam = beam_of(strobe(1.0, 50.0))
-
-    beam.lose()
-
-    assert (beam.look(0.0), beam.changes_in(0.0)) == (Look(0.0), math.inf)
-
-
-@pytest.mark.parametrize(('reports', 'until', 'expected'), [
-    # The second status, which changes the brightness only, keeps the rhythm.
-    ([strobe(2.0, 25.0), strobe(2.0, 25.0, brightness=10.0)], 5.0, [
-        (0.0, True), (0.5, False), (2.0, True), (2.5, False), (4.0, True), (4.5, False)]),
-    ([strobe(0.1, 50.0)], 0.17, [(0.0, True), (0.05, False), (0.1, True), (0.15, False)]),
-    # Flashes and gaps last long enough to be seen.
-    ([strobe(1.0, 1.0)], 1.0, [(0.0, True), (0.05, False)]),
-    ([strobe(1.0, 99.0)], 1.0, [(0.0, True), (0.95, False)]),
-])
-def test_strobe_is_lit_for_the_duty_cycle_of_each_period(
-    reports: list[dict[str, float]], until: float, expected: list[tuple[float, bool]],
-) -> None:
-    assert flashes(beam_of(*reports), until) == expected
-
-
-@given(st.floats(0.1, 3600.0), st.floats(0.001, 99.999), st.floats(0.0, 1e6))
-def test_strobe_changes_within_each_period_and_never_at_once(
-    period: float, duty: float, now: float,
-) -> None:
-    assert 0 < beam_of(strobe(period, duty)).changes_in(now) <= period
+    assert (beam.alpha, beam.error) == look

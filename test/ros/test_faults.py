@@ -19,10 +19,11 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.outputs import Outputs
+from illuminator_ros.illuminator.ros.publishers import LightPublishers
+from illuminator_ros.ros.bridge import Bridge
+from illuminator_ros.ros.diagnostics_publisher import DiagnosticsPublisher
+from illuminator_ros.ros.node import PayloadNode
 from illuminator_ros.ros.parameter_services import ParameterServices
-from illuminator_ros.ros.process import BridgeProcess
 import pytest
 from rcl_interfaces.srv import ListParameters
 from std_msgs.msg import Bool, Float32
@@ -39,7 +40,7 @@ def fail(*arguments: Any, **named: Any) -> None:
 
 
 @pytest.fixture
-def bridge(own_ros: Ros, port: int) -> Iterator[BridgeProcess]:
+def bridge(own_ros: Ros, port: int) -> Iterator[Bridge]:
     """Return a bridge with a light that has reported its configuration."""
     with embedded_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
         Parameters(own_ros).wait(mode='internal_control')
@@ -59,7 +60,7 @@ def works(ros: Ros) -> bool:
     (Light, 'refresh', 'refresh', Trigger),
 ])
 def test_a_service_says_that_it_failed(
-    own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch, owner: type,
+    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, owner: type,
     method: str, service: str, type_: Any,
 ) -> None:
     with monkeypatch.context() as patch:
@@ -75,7 +76,7 @@ def test_a_service_says_that_it_failed(
     (Light, 'configure'), (ParameterServices, '_check')])
 @pytest.mark.parametrize('atomically', [False, True])
 def test_a_set_says_that_it_failed(
-    own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch, owner: type,
+    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, owner: type,
     method: str, atomically: bool,
 ) -> None:
     with monkeypatch.context() as patch:
@@ -89,10 +90,10 @@ def test_a_set_says_that_it_failed(
 
 
 def test_other_parameter_services_answer(
-    own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch,
+    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(IlluminatorNode, 'list_parameters', fail)
+        patch.setattr(PayloadNode, 'list_parameters', fail)
         response = Parameters(own_ros).start(ListParameters, 'list_parameters').result()
 
     assert response.result.names == []
@@ -100,11 +101,11 @@ def test_other_parameter_services_answer(
 
 
 @pytest.mark.parametrize(('owner', 'method'), [
-    (Outputs, 'take'), (IlluminatorNode, 'publish_diagnostics'),
-    (IlluminatorNode, 'poll'),
+    (LightPublishers, 'take'), (DiagnosticsPublisher, 'poll'),
+    (DiagnosticsPublisher, 'look'),
 ])
 def test_what_goes_wrong_in_publishing_is_over_when_it_is_over(
-    own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch, owner: type,
+    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, owner: type,
     method: str,
 ) -> None:
     calls = []
@@ -128,7 +129,7 @@ def test_what_goes_wrong_in_publishing_is_over_when_it_is_over(
     ('brightness', Float32, 20.0, Light, 'set_brightness'),
 ])
 def test_a_command_topic_goes_on(
-    own_ros: Ros, bridge: BridgeProcess, monkeypatch: pytest.MonkeyPatch, topic: str,
+    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, topic: str,
     type_: Any, value: object, owner: type, method: str,
 ) -> None:
     calls = []

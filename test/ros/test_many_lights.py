@@ -50,6 +50,11 @@ def group(domain: int) -> Iterator[tuple[Program, Group]]:
         yield bridge, lights
 
 
+# What the first node offers for the whole process.
+OF_PROCESS = {'/diagnostics', '/get_logger_levels', '/set_logger_levels',
+              '/get_type_description'}
+
+
 @pytest.fixture
 def lights(group: tuple[Program, Group]) -> Iterator[Group]:
     """Return the lights by their nodes, all off and obedient, which a test may change."""
@@ -74,14 +79,15 @@ def interface(ros: Ros, node: str) -> set[tuple[str, str]]:
 
 
 @pytest.mark.parametrize('node', [node for node in NODES if node != '/illuminator'])
-def test_further_light_has_the_interface_of_the_first_one_but_for_the_services_for_all(
+def test_further_light_has_the_interface_of_the_first_one_but_for_all_lights_and_the_process(
     ros: Ros, lights: Group, node: str,
 ) -> None:
     def missing() -> set[str]:
         return {name for name, _ in interface(ros, '/illuminator') ^ interface(ros, node)}
 
     eventually(
-        lambda: len(interface(ros, '/illuminator')) > 20 and missing() == FOR_ALL_LIGHTS)
+        lambda: len(interface(ros, '/illuminator')) > 20
+        and missing() == FOR_ALL_LIGHTS | OF_PROCESS)
 
 
 @pytest.mark.parametrize('node', NODES)

@@ -46,12 +46,13 @@ def alone(ros: Ros) -> Iterator[Parameters]:
         yield Parameters(ros, '/alone')
 
 
-def test_parameters_of_the_light_are_described_and_not_set_before_its_first_status(
+def test_parameters_of_the_light_are_described_and_not_listed_before_its_first_status(
     alone: Parameters,
 ) -> None:
     assert alone.get(*DEVICE, 'frame_id') == [None] * 4 + ['illuminator']
     assert alone.types(*DEVICE) == [NOT_SET] * 4
-    assert set(DEVICE) <= set(alone.names())
+    # ros2 param dump would write null, which cannot be loaded.
+    assert not set(DEVICE) & set(alone.names())
     assert [one.type for one in alone.describe(*DEVICE)] == [STRING, DOUBLE, DOUBLE, DOUBLE]
     assert alone.get('connection_url', 'component_id') == ['memory://none', 194]
 

@@ -23,10 +23,11 @@ import threading
 from typing import Any
 from unittest import mock
 
+from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.ros import process as process_module
-from illuminator_ros.ros.node import IlluminatorNode
-from illuminator_ros.ros.process import BridgeProcess
+from illuminator_ros.ros import bridge as bridge_module
+from illuminator_ros.ros.bridge import Bridge
+from illuminator_ros.ros.node import PayloadNode
 import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
@@ -36,14 +37,14 @@ from support.waiting import PATIENCE
 
 def _make(
     context: Context, link: Callable[..., Link], **parameters: Any,
-) -> BridgeProcess:
-    with mock.patch.object(process_module, 'Link', link):
-        return BridgeProcess(IlluminatorNode(context=context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in parameters.items()]), [])
+) -> Bridge:
+    with mock.patch.object(bridge_module, 'Link', link):
+        return Bridge(PayloadNode('illuminator', context=context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in parameters.items()]), [], PAYLOADS)
 
 
 @contextlib.contextmanager
-def embedded_bridge(domain: int, port: int, **parameters: Any) -> Iterator[BridgeProcess]:
+def embedded_bridge(domain: int, port: int, **parameters: Any) -> Iterator[Bridge]:
     """Run the bridge in a thread, by the slow clock, listening on a UDP port of loopback."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)
@@ -63,7 +64,7 @@ def embedded_bridge(domain: int, port: int, **parameters: Any) -> Iterator[Bridg
 @contextlib.contextmanager
 def resting_bridge(
     domain: int, clock: Callable[[], float], **parameters: Any,
-) -> Iterator[BridgeProcess]:
+) -> Iterator[Bridge]:
     """Make the bridge and do not run it: what it would do is done by the test, at its times."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)

@@ -21,7 +21,8 @@ import sys
 
 from illuminator_ros import __version__
 from illuminator_ros.cli.simulator.options import parser
-from illuminator_ros.ros.parameters import DEVICE_PARAMETERS, LINK_PARAMETERS
+from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
+from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from support.open_channel import bound_socket
 from support.processes import ended, environment, Program, ROOT, run
@@ -45,7 +46,7 @@ class TestHelp:
     def test_the_bridge_s_tells_every_parameter_and_form_of_url(self) -> None:
         text = run(BRIDGE, '--help').stdout
 
-        for spec in (*LINK_PARAMETERS, *DEVICE_PARAMETERS):
+        for spec in (*LINK_PARAMETERS, *LIGHT_PARAMETERS, *DEVICE_PARAMETERS):
             assert re.search(rf'^  {spec.name} .*{re.escape(spec.description)}', text, re.M)
         for scheme in ('udp://', 'udpin://', 'udpout://', 'tcp://', 'tcp-l://', 'serial://',
                        '/dev/ttyUSB0,57600', 'udpin:'):

@@ -182,7 +182,7 @@ def test_what_is_wrong_with_an_argument_is_told_in_one_line(
 
 def test_the_bridge_neither_has_nor_needs_rich() -> None:
     done = subprocess.run(
-        [sys.executable, '-c', 'import sys; import illuminator_ros.ros.process; '
+        [sys.executable, '-c', 'import sys; import illuminator_ros.ros.bridge; '
          'print("rich" in sys.modules)'],
         cwd=ROOT, env=environment(), text=True, capture_output=True, timeout=30)
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 import contextlib
 import signal
 
-from illuminator_ros.ros import process as process_module
+from illuminator_ros.ros import bridge as bridge_module
 import pytest
 from std_srvs.srv import SetBool
 from support.embedded import embedded_bridge
@@ -81,7 +81,7 @@ def test_without_it_the_light_is_left_as_it_is(own_ros: Ros, port: int) -> None:
 def test_a_lost_command_is_sent_again(
     own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(process_module, 'OFF_LIMIT', PATIENCE)
+    monkeypatch.setattr(bridge_module, 'OFF_LIMIT', PATIENCE)
     with (ServedLight(port, enable=1) as light,
           embedded_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge):
         Parameters(own_ros).wait(brightness=100.0)
@@ -102,7 +102,7 @@ def test_a_light_that_says_nothing_does_not_hold_the_node(own_ros: Ros, port: in
 
 
 @pytest.mark.parametrize(('result', 'limit', 'line'), [
-    (MavResult.ACCEPTED, PATIENCE, '[INFO] light 1/243 is dark: off, confirmed'),
+    (MavResult.ACCEPTED, PATIENCE, '[INFO] light 1/243 is off: off, confirmed'),
     (MavResult.DENIED, PATIENCE,
      '[ERROR] light 1/243 may still be on: refused: MAV_RESULT_DENIED (1 try, '),
     (None, 0.0, '[ERROR] light 1/243 may still be on: no confirmation within 0 ms'),
@@ -111,7 +111,7 @@ def test_the_log_says_what_became_of_it(
     own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
     result: int | None, limit: float, line: str,
 ) -> None:
-    monkeypatch.setattr(process_module, 'OFF_LIMIT', limit)
+    monkeypatch.setattr(bridge_module, 'OFF_LIMIT', limit)
     with (ServedLight(port, enable=1) as light,
           embedded_bridge(own_ros.domain, port, off_on_shutdown=True)):
         Parameters(own_ros).wait(brightness=100.0)

@@ -26,7 +26,7 @@ import time
 
 from illuminator_ros.cli import termination
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.ros import process
+from illuminator_ros.ros import bridge
 import pytest
 from std_srvs.srv import SetBool
 from support.light import eventually, ON_OFF, ServedLight
@@ -193,7 +193,7 @@ def test_a_program_that_hangs_ends_all_the_same() -> None:
 
 
 def test_the_parts_of_an_end_have_time_before_it_is_forced_and_that_is_within_a_second() -> None:
-    assert (process.OFF_LIMIT + process.STOP_LIMIT + process.THREADS_LIMIT
+    assert (bridge.OFF_LIMIT + bridge.STOP_LIMIT + bridge.THREADS_LIMIT
             < termination.LIMIT < 1.0)
 
 

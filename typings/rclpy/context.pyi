@@ -13,8 +13,12 @@
 # limitations under the License.
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 class Context:
+    # A capsule of rcl, with no type of its own.
+    @property
+    def handle(self) -> Any: ...
     def init(
         self, args: Sequence[str] | None = None, *, initialize_logging: bool = True,
         domain_id: int | None = None,

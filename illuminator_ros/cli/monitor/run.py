@@ -48,7 +48,8 @@ from .terminal import (
 from .view import plain, Scene, screen
 from ..program import discard_output, one_line
 from ..termination import Termination
-from ...ros.spinner import Spinner
+from ...ros.executor import NodeExecutor
+from ...ros.log import NodeLog
 
 # s between pictures.
 INTERVAL = 0.25
@@ -70,8 +71,9 @@ class Monitor:
         self._fleet = Fleet()
         self._lock = threading.Lock()
         self.graph = Graph(node, self._fleet, self._lock, clock)
-        self._spinner = Spinner(node)
-        self._thread = threading.Thread(target=self._spinner.run, name='ros', daemon=True)
+        self._executor = NodeExecutor(node.context, NodeLog(node.get_logger()))
+        self._executor.add_node(node)
+        self._thread = threading.Thread(target=self._executor.run, name='ros', daemon=True)
         self._thread.start()
 
     def lights(self) -> list[Light]:
@@ -81,7 +83,7 @@ class Monitor:
 
     def end(self) -> None:
         """End the thread."""
-        self._spinner.end()
+        self._executor.end()
         self._thread.join(0.3)
 
 

@@ -12,14 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the log says of the error flags of one light."""
+"""Log lines on the error flags of one light."""
 
 from __future__ import annotations
 
 import math
 
-from .diagnostics import Finding, flag_findings, OK
-from ..illuminator.error_flags import flag_names
+from .diagnostics import flag_findings
+from ..error_flags import flag_names
+from ...ros.diagnostics import Finding, OK
 
 # s between two lines on one flag.
 PAUSE = 5.0
@@ -27,22 +28,21 @@ PAUSE = 5.0
 
 class FlagLog:
     """
-    Tells the coming and the going of each flag.
+    Reports when each flag is set and cleared, at most every :data:`PAUSE`.
 
-    A flag that toggles is told of every :data:`PAUSE` at most. What has changed meanwhile is told
-    after it, so that the last line on a flag comes to be true.
+    A change within the pause is reported after it, so that the last line on a flag is true.
     """
 
     def __init__(self) -> None:
-        # By flag, what was last told of it and when; no finding where it was told to be gone.
+        # By flag, the name in its last line and the time, s; '' where that said it is cleared.
         self._told: dict[int, tuple[str, float]] = {}
 
     def take(self, flags: int, now: float) -> list[Finding]:
         """
-        Return what is to be told, :data:`~.diagnostics.OK` for a flag that has gone.
+        Return the lines to log, of level OK for a flag that was cleared.
 
-        :param flags: those of a status; for bits that nobody knows, one line tells of all.
-        :param now: when it came, s.
+        :param flags: those of a status; all unknown bits share one line.
+        :param now: when it was received, s.
         """
         lines: list[Finding] = []
         found = flag_findings(flags)

@@ -1,0 +1,156 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``~/beam``: a cone as RViz and Foxglove show it, as opaque as the light is bright."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import math
+import time
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+from .parameters import BeamGeometry
+from ..events import AnyLightEvent, LightLost, StatusReceived
+from ..model import Mode, Status
+from ...ros.node import STATE_QOS
+
+Point = tuple[float, float, float]
+
+# Triangles of a cone: enough to look round.
+SIDES = 24
+# Opacity at 100 % brightness: what stands in the beam must be seen.
+MAX_ALPHA = 0.5
+# Red, green, blue.
+WARM_WHITE = (1.0, 0.95, 0.75)
+RED = (1.0, 0.0, 0.0)
+# s between publications of a beam that does not change, and for which viewers show it without
+# one: the beam of a bridge that was killed does not stay.
+REFRESH = 1.0
+LIFETIME = 5
+# For which a bridge that ends waits until its beam was removed.
+REMOVAL_TIMEOUT = Duration(seconds=0.05)
+
+
+def cone(length: float, angle: float, sides: int = SIDES) -> list[Point]:
+    """
+    Return the corners of the triangles, three for each, that a cone around +x consists of.
+
+    Its apex is the origin. Seen from outside the corners run counter-clockwise. It has no lid:
+    light does not end there.
+
+    :param length: along x, m.
+    :param angle: the full opening angle, rad, less than pi.
+    """
+    radius = length * math.tan(angle / 2)
+    rim = [(length, radius * math.cos(turn), radius * math.sin(turn))
+           for turn in (2 * math.pi * side / sides for side in range(sides))]
+    corners: list[Point] = []
+    for side in range(sides):
+        corners += (0.0, 0.0, 0.0), rim[(side + 1) % sides], rim[side]
+    return corners
+
+
+@dataclass(frozen=True)
+class Beam:
+    """
+    How a beam is drawn, from the last plausible value of each field of the statuses.
+
+    :param brightness: %.
+    :param duty_cycle: % of the time in which it is lit, 100 without a strobe.
+    """
+
+    on: bool = False
+    brightness: float = 100.0
+    duty_cycle: float = 100.0
+    error: bool = False
+
+    def updated(self, status: Status) -> Beam:
+        """Return the beam after a status."""
+        period, duty = status.strobe_period, status.strobe_duty_cycle
+        if status.mode is Mode.EXTERNAL_SYNC or period == 0:
+            # Under external sync another signal makes the strobe.
+            duty = 100.0
+        elif not (period and duty):
+            duty = self.duty_cycle
+        return Beam(self.on if status.enabled is None else status.enabled,
+                    self.brightness if status.brightness is None else status.brightness,
+                    duty, bool(status.error_flags))
+
+    @property
+    def alpha(self) -> float:
+        """
+        Return the opacity, 0 for no beam.
+
+        A strobe is drawn steady, as bright as it is on average: viewers draw 30 to 60 pictures
+        a second, and the moment of a flash is not known.
+        """
+        return MAX_ALPHA * self.brightness / 100 * self.duty_cycle / 100 if self.on else 0.0
+
+
+class BeamPublisher:
+    """Publishes the beam of one light; for the link's thread."""
+
+    def __init__(self, node: Node, geometry: BeamGeometry) -> None:
+        # Imported only where the beam is shown.
+        from geometry_msgs.msg import Point as PointMessage
+        from visualization_msgs.msg import Marker
+
+        self._publisher = node.create_publisher(Marker, '~/beam', STATE_QOS)
+        self._beam = Beam()
+        self._due = math.inf
+        self._marker = marker = Marker(
+            ns=node.get_name(), type=Marker.TRIANGLE_LIST, frame_locked=True)
+        # Without a stamp, and locked to its frame, it is drawn where the light is now.
+        marker.header.frame_id = geometry.frame_id
+        marker.pose.orientation.w = 1.0
+        marker.scale.x = marker.scale.y = marker.scale.z = 1.0
+        marker.lifetime.sec = LIFETIME
+        marker.points = [PointMessage(x=x, y=y, z=z)
+                         for x, y, z in cone(geometry.beam_range, geometry.beam_angle)]
+
+    def take(self, event: AnyLightEvent) -> None:
+        """Take an event of the light."""
+        if isinstance(event, StatusReceived):
+            self._show(self._beam.updated(event.status))
+        elif isinstance(event, LightLost):
+            self._show(replace(self._beam, on=False))
+
+    def poll(self) -> None:
+        """Publish a beam again that has not changed."""
+        if time.monotonic() >= self._due:
+            self._publish()
+
+    def close(self) -> None:
+        """Remove the beam, after the link's thread has ended."""
+        if self._beam.alpha:
+            self._show(replace(self._beam, on=False))
+            # What a publisher has sent last may be lost when it is destroyed.
+            self._publisher.wait_for_all_acked(REMOVAL_TIMEOUT)
+
+    def _show(self, beam: Beam) -> None:
+        before, self._beam = self._beam, beam
+        if beam != before and (beam.alpha or before.alpha):
+            self._publish()
+
+    def _publish(self) -> None:
+        marker, alpha = self._marker, self._beam.alpha
+        # In real time, as viewers count it.
+        self._due = time.monotonic() + REFRESH if alpha else math.inf
+        marker.action = marker.ADD if alpha else marker.DELETE
+        marker.color.r, marker.color.g, marker.color.b = RED if self._beam.error else WARM_WHITE
+        marker.color.a = alpha
+        self._publisher.publish(marker)

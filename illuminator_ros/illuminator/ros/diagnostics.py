@@ -1,0 +1,167 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The reports of one light's node on /diagnostics: pure functions of snapshots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from ..error_flags import ErrorFlag, flag_names, KNOWN_FLAGS
+from ..events import LightSnapshot
+from ...mavlink.command import format_seconds
+from ...mavlink.messages import Address
+from ...ros.diagnostics import (
+    ERROR,
+    Finding,
+    link_findings,
+    link_report,
+    LinkSnapshot,
+    Report,
+    Value,
+    WARN,
+    why_nothing_is_heard,
+)
+
+# s without a status from a light that has sent some: it is asked for one every 2.5 s.
+STATUS_SILENCE = 10.0
+
+# The consequence of each flag for the user of the light.
+FLAG_LEVELS: dict[ErrorFlag, tuple[bytes, str]] = {
+    ErrorFlag.THERMAL_THROTTLING: (WARN, 'dimmed because it is hot'),
+    ErrorFlag.OVER_TEMPERATURE_SHUTDOWN: (ERROR, 'switched off because it is too hot'),
+    ErrorFlag.THERMISTOR_FAILURE: (WARN, 'temperature sensor failed'),
+}
+
+
+def flag_findings(flags: int) -> dict[int, Finding]:
+    """Return the finding on each error flag; the unknown ones share one."""
+    found: dict[int, Finding] = {
+        flag: finding for flag, finding in FLAG_LEVELS.items() if flags & flag}
+    if unknown := flags & ~KNOWN_FLAGS:
+        found[~KNOWN_FLAGS] = (WARN, flag_names(unknown)[0])
+    return found
+
+
+@dataclass(frozen=True)
+class LightsHeard:
+    """
+    The lights on a link.
+
+    :param some: the first few, those that are not served included.
+    :param limit_reached: whether there are more than are taken.
+    """
+
+    count: int
+    some: tuple[Address, ...]
+    limit_reached: bool
+
+
+def why_no_light(link: LinkSnapshot, heard: LightsHeard) -> str:
+    """Return why the node has no light, for people."""
+    if link.state.failure:
+        return link.state.failure
+    if heard.some:
+        return f'{", ".join(map(str, heard.some))} heard, none of which is the target'
+    return f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "an illuminator")}'
+
+
+def reports(
+    link: LinkSnapshot, *, light: LightSnapshot | None, heard: LightsHeard, hardware_id: str,
+    started: float,
+) -> list[Report]:
+    """
+    Return the reports of a node.
+
+    :param light: the node's light, None if there is none yet.
+    :param hardware_id: of the light, '' while its identity is not settled.
+    :param started: when the node was started, s on the link's clock.
+    """
+    address = light.address if light else None
+    findings = link_findings(
+        link, address, what='light', absence=why_no_light(link, heard), started=started)
+    if heard.limit_reached:
+        findings.append((WARN, f'more than {heard.count} lights, some ignored'))
+    made = [link_report(link, address, findings, {'lights': heard.count})]
+    if light is not None and hardware_id:
+        made.append(lamp_report(light, hardware_id, link.taken_at))
+    return made
+
+
+def lamp_findings(light: LightSnapshot, now: float) -> list[Finding]:
+    """Return the findings on a light."""
+    if not light.connected:
+        return [(ERROR, light.unreachable)]
+    findings: list[Finding] = []
+    status = light.status
+    if status is not None:
+        findings += flag_findings(status.error_flags).values()
+        silence = now - light.status_at
+        if silence > max(STATUS_SILENCE, 3 * light.status_interval):
+            findings.append((WARN, f'no status for {format_seconds(silence)}'))
+        if status.invalid:
+            findings.append((WARN, f'not believable: {", ".join(status.invalid)}'))
+    if light.shared_address:
+        findings.append((WARN, f'several lights answer as {light.address}: their statuses '
+                               'contradict one another'))
+    if light.discrepancy:
+        findings.append((WARN, light.discrepancy))
+    return findings
+
+
+def lamp_report(light: LightSnapshot, hardware_id: str, now: float) -> Report:
+    """Return the report on a light."""
+    on = light.status.enabled if light.status else None
+    fine = {True: 'on', False: 'off', None: 'connected'}[on]
+    return Report('lamp', hardware_id, lamp_findings(light, now), fine,
+                  lambda: _lamp_values(light, now))
+
+
+def _lamp_values(light: LightSnapshot, now: float) -> dict[str, Value]:
+    status, identity = light.status, light.identity
+    values: dict[str, Value] = {
+        'address': str(light.address),
+        'connected': light.connected,
+        'heard_s_ago': now - light.heard_at if math.isfinite(light.heard_at) else None,
+        'restarts': light.restarts,
+        'shared_address': light.shared_address,
+    }
+    if status is not None:
+        values |= {
+            'enabled': status.enabled,
+            'mode': status.mode.label,
+            'brightness_percent': status.brightness,
+            'strobe_period_s': status.strobe_period,
+            'strobe_duty_cycle_percent': status.strobe_duty_cycle,
+            'temperature_c': light.temperature,
+            'error_flags': status.error_flags,
+            'uptime_s': status.uptime_ms / 1000.0,
+            'status_s_ago': now - light.status_at,
+        }
+    if light.configuration:
+        values['agreed'] = light.configuration.describe()
+    if identity is not None:
+        values |= {
+            'vendor': identity.vendor, 'model': identity.model,
+            'software_version': identity.software_version,
+            'hardware_version': identity.hardware_version,
+            'serial_number': identity.serial_number}
+    return values
+
+
+def hardware_id(light: LightSnapshot) -> str:
+    """Return the id of a light: its serial number, else its address as ``mavlink:1/243``."""
+    serial = light.identity.serial_number if light.identity else ''
+    return serial or f'mavlink:{light.address}'

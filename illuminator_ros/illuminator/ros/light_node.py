@@ -1,0 +1,212 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The interface of the node of one light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import functools
+import itertools
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import Bool, Float32
+from std_srvs.srv import SetBool, Trigger
+
+from .beam import BeamPublisher
+from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
+from .parameters import BeamGeometry, DEVICE_PARAMETERS
+from .publishers import LightPublishers, PUBLICATIONS
+from ..client import IlluminatorClient
+from ..events import AnyLightEvent
+from ..light import Light
+from ..model import checked, InvalidValue
+from ..operation import Result
+from ...mavlink.messages import Address
+from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
+from ...ros.link_call import LatestOnly
+from ...ros.log import NodeLog
+from ...ros.node import CommandTopic, NodeInterface, RequestService
+from ...ros.parameter_services import ParameterServices
+from ...ros.parameters import DeviceParameters, ParameterError
+from ...ros.payload import Host
+
+# Refreshes that may wait for their answers: each is two messages of the light.
+MAX_REFRESHES = 16
+# Lights that are named where the target is not there.
+MAX_NAMED = 8
+
+Answer = Callable[[bool, str], None]
+
+
+class LightNode:
+    """
+    Serves one light with a node: topics, services, parameters, diagnostics.
+
+    All methods but :meth:`close` are for the link's thread.
+
+    :param services: ``commands``, of the node beside those of its light.
+    :ivar address: of the light, None while there is none.
+    :raises ParameterError: if the value given for a parameter of the light is wrong.
+    """
+
+    def __init__(
+        self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
+        geometry: BeamGeometry, *, services: tuple[RequestService, ...] = (),
+        commands: tuple[CommandTopic, ...] = (),
+    ) -> None:
+        self.name = node.get_name()
+        self.full_name = node.get_fully_qualified_name()
+        self.address: Address | None = None
+        self._host = host
+        self._log = log
+        self._client = client
+        self._started = host.link.clock()
+        self._hardware_id = ''
+        self._switching = LatestOnly(self._switch)
+        parameters = DeviceParameters(node, DEVICE_PARAMETERS)
+        self._overrides = _checked(parameters.overrides())
+        interface = NodeInterface(
+            node, host.link, log, publications=PUBLICATIONS,
+            services=(
+                RequestService('enable', SetBool, self._enable),
+                RequestService('refresh', Trigger, self._refresh, limit=MAX_REFRESHES),
+                *services),
+            commands=(
+                CommandTopic('cmd/enable', Bool, self._switching.offer),
+                CommandTopic('cmd/brightness', Float32, self._set_brightness,
+                             functools.partial(checked, 'brightness')),
+                *commands))
+        ParameterServices(
+            node, host.link, log, parameters, self._check_value, self._configure)
+        self._publishers = LightPublishers(
+            node, interface, parameters, log, frame_id=geometry.frame_id,
+            check_diagnostics=host.check_diagnostics)
+        self._beam = BeamPublisher(node, geometry) if geometry.beam_range else None
+        self.source = DiagnosticsSource(self.name, self.full_name, self._look)
+
+    def bind(self, address: Address, now: float) -> None:
+        """Serve a light from now on, and publish what is known of it."""
+        self.address = address
+        light = self._client.lights.get(address)
+        if light is not None:
+            for event in light.snapshot(now).events():
+                self.take(event)
+            if self._overrides:
+                light.set_desired(self._overrides, now)
+
+    def release(self) -> None:
+        """Serve no light: it was forgotten."""
+        self.address = None
+
+    def take(self, event: AnyLightEvent) -> None:
+        """Publish an event of the light."""
+        self._publishers.take(event)
+        if self._beam is not None:
+            self._beam.take(event)
+
+    def poll(self) -> None:
+        """Do what is due."""
+        if self._beam is not None:
+            self._beam.poll()
+
+    def close(self) -> None:
+        """Remove the beam, after the link's thread has ended."""
+        if self._beam is not None:
+            self._beam.close()
+
+    def absence(self, now: float) -> str:
+        """Return why there is no light, for people."""
+        why = why_no_light(self._host.diagnostics.look(now), self._heard())
+        return f'no light connected: {why}'
+
+    def _light(self) -> Light | None:
+        return self._client.lights.get(self.address) if self.address else None
+
+    # Requests
+
+    def _enable(self, request: SetBool.Request, now: float, answer: Answer) -> None:
+        self._request_enable(request.data, now, 'service', answer)
+
+    def _request_enable(self, on: bool, now: float, way: str, answer: Answer) -> None:
+        light = self._light()
+        if light is None:
+            answer(False, self.absence(now))
+        else:
+            light.enable(on, now, lambda result, now: answer(result.success, result.message),
+                         detail=way)
+
+    def _switch(self, on: bool, now: float, ended: Callable[[float], None]) -> None:
+        def answer(success: bool, message: str) -> None:
+            if not success:
+                self._log.warning(f'~/cmd/enable: {message}', 'cmd/enable')
+            ended(self._host.link.clock())
+
+        self._request_enable(on, now, 'topic', answer)
+
+    def _refresh(self, request: Trigger.Request, now: float, answer: Answer) -> None:
+        light = self._light()
+        if light is None:
+            answer(False, self.absence(now))
+        else:
+            light.refresh(now, lambda result, now: answer(result.success, result.message))
+
+    def _set_brightness(self, brightness: float, now: float) -> None:
+        light = self._light()
+        if light is None:
+            self._log.warning(f'~/cmd/brightness: {self.absence(now)}', 'cmd/brightness')
+        else:
+            light.set_brightness(brightness, now)
+
+    # The value of a parameter is of any type.
+    def _check_value(self, name: str, value: Any) -> None:
+        light = self._light()
+        checked(name, value, light.limits if light else None)
+
+    def _configure(
+        self, changes: Mapping[str, Any], now: float, answer: Callable[[str], None],
+    ) -> None:
+        def done(result: Result, now: float) -> None:
+            answer('' if result.success else result.message)
+
+        light = self._light()
+        if light is None:
+            answer(self.absence(now))
+        else:
+            light.configure(changes, now, done)
+
+    # Diagnostics
+
+    def _look(self, now: float) -> MakeReports:
+        light = self._light()
+        snapshot = light.snapshot(now) if light else None
+        if snapshot is not None and snapshot.identity_is_settled:
+            # A light that tells its serial number late keeps the id it had.
+            self._hardware_id = self._hardware_id or hardware_id(snapshot)
+        return functools.partial(
+            reports, light=snapshot, heard=self._heard(), hardware_id=self._hardware_id,
+            started=self._started)
+
+    def _heard(self) -> LightsHeard:
+        client = self._client
+        some = itertools.islice((*client.lights, *client.left_alone), MAX_NAMED)
+        return LightsHeard(len(client.lights), tuple(some), client.passed_over)
+
+
+def _checked(overrides: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        return {name: checked(name, value) for name, value in overrides.items()}
+    except InvalidValue as error:
+        raise ParameterError(str(error)) from None

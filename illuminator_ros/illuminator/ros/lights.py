@@ -1,0 +1,228 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lights of a link and their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+import functools
+import logging
+import math
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+from .light_node import Answer, LightNode
+from .parameters import (
+    BeamGeometry,
+    DEVICE_PARAMETERS,
+    ignored_parameters,
+    LIGHT_PARAMETERS,
+    Selection,
+    settings,
+)
+from ..client import IlluminatorClient
+from ..events import (
+    AnyLightEvent,
+    LightConnected,
+    LightForgotten,
+    LightRestarted,
+    StatusReceived,
+)
+from ..fleet import enable_all
+from ..light import Light
+from ..operation import Result
+from ...mavlink.command import CommandSender
+from ...mavlink.messages import Address
+from ...ros.link_call import LatestOnly
+from ...ros.log import NodeLog
+from ...ros.node import CommandTopic, RequestService
+from ...ros.parameters import misspelt
+from ...ros.payload import Host, RosPayload, ShutdownReport
+
+# s without a light, after which the log says once why there is none.
+NO_LIGHT_DELAY = 5.0
+# s from the first light on, in which those that are switched on with it are heard.
+NAMES_DELAY = 10.0
+
+
+class Lights:
+    """
+    Gives each light on the link a node. In the link's thread, but for :meth:`close`.
+
+    :raises ParameterError: if a parameter is wrong.
+    """
+
+    def __init__(self, client: IlluminatorClient, host: Host) -> None:
+        self._client = client
+        self._host = host
+        self._selection = Selection(host.values, host.node.get_name())
+        self._geometry = BeamGeometry.of(host.values)
+        self._switching = LatestOnly(self._switch_all)
+        self._first = LightNode(
+            host.node, host, host.log, client, self._geometry,
+            services=(RequestService('enable_all', SetBool, self._enable_all),),
+            commands=(CommandTopic('cmd/enable_all', Bool, self._switching.offer),))
+        # By the addresses of their lights.
+        self._nodes: dict[Address, LightNode] = {}
+        self._wanted: set[Address] = set()
+        self._told_of_second = False
+        self._no_light_due = host.link.clock() + NO_LIGHT_DELAY
+        self._names_due = math.inf
+        host.diagnostics.add(self._first.source)
+        client.events.subscribe(self._take)
+
+    def _take(self, event: AnyLightEvent) -> None:
+        node = self._nodes.get(event.address)
+        if isinstance(event, LightForgotten):
+            self._forget(event.address)
+        elif node is not None:
+            if isinstance(event, LightRestarted):
+                self._forgive_loss(event.address)
+            node.take(event)
+        elif isinstance(event, LightConnected | StatusReceived):
+            self._serve(event.address)
+
+    def _serve(self, address: Address) -> None:
+        """Give a light a node: the first one, or one of its own."""
+        now = self._host.link.clock()
+        selected = self._selection.is_target(address)
+        if selected and self._first.address is None:
+            if warning := self._selection.unused_name(address):
+                self._host.log.warning(warning)
+            self._names_due = now + NAMES_DELAY
+            self._bind(self._first, address, now)
+        elif address not in self._wanted:
+            self._wanted.add(address)
+            if selected and not self._told_of_second:
+                self._told_of_second = True
+                self._host.log.info(
+                    f'a second light, {address}, was found; {self._first.full_name} serves '
+                    f'{self._first.address}. Set target_system and target_component to choose')
+            self._host.nodes.make(
+                address, f'light {address}', self._selection.node_name(address),
+                functools.partial(self._serve_further, address))
+
+    def _serve_further(self, address: Address, node: Node) -> None:
+        """Give the node of a further light its interface; in the thread that makes nodes."""
+        log = NodeLog(node.get_logger())
+        geometry = self._geometry.declare(node)
+        light_node = LightNode(node, self._host, log, self._client, geometry)
+        for warning in (*ignored_parameters(node, self._host.node), *misspelt(node)):
+            log.warning(warning)
+        self._host.log.info(f'light {address} is served by {light_node.full_name}', 'served')
+        self._host.link.call(lambda now: self._bind(light_node, address, now))
+
+    def _bind(self, node: LightNode, address: Address, now: float) -> None:
+        if address in self._client.lights:
+            self._nodes[address] = node
+            node.bind(address, now)
+            self._host.diagnostics.add(node.source)
+
+    def _forget(self, address: Address) -> None:
+        self._wanted.discard(address)
+        node = self._nodes.pop(address, None)
+        if node is self._first:
+            node.release()
+        else:
+            if node is not None:
+                self._host.diagnostics.remove(node.source)
+                self._host.log.info(f'light {address} was silent for long: {node.full_name} '
+                                    'is removed', 'forgotten')
+            self._host.nodes.remove(address)
+
+    def _forgive_loss(self, address: Address) -> None:
+        """Do not count the step back of a restarted light's sequence numbers as loss."""
+        counter = self._host.link.state().traffic.sources.get(address)
+        if counter:
+            counter.forgive()
+
+    # Requests to all lights
+
+    def _enable_all(self, request: SetBool.Request, now: float, answer: Answer) -> None:
+        lights = self._client.commanded_or_found
+        if lights:
+            enable_all(lights, request.data, now,
+                       lambda result, now: answer(result.success, result.message),
+                       name=self._name_of)
+        else:
+            answer(False, self._first.absence(now))
+
+    def _switch_all(self, on: bool, now: float, ended: Any) -> None:
+        def answer(success: bool, message: str) -> None:
+            if not success:
+                self._host.log.warning(f'~/cmd/enable_all: {message}', 'cmd/enable_all')
+            ended(self._host.link.clock())
+
+        self._enable_all(SetBool.Request(data=on), now, answer)
+
+    def _name_of(self, light: Light) -> str:
+        node = self._nodes.get(light.address)
+        return f'{node.name} ({light.address})' if node else str(light.address)
+
+    # The bridge's calls
+
+    def poll(self, now: float) -> None:
+        """See :meth:`ServedPayload.poll`."""
+        if now >= self._no_light_due:
+            self._no_light_due = math.inf
+            if self._first.address is None:
+                self._host.log.warning(self._first.absence(now))
+        if now >= self._names_due:
+            self._names_due = math.inf
+            for warning in self._selection.unused_names(self._client.lights):
+                self._host.log.warning(warning)
+        for node in self._nodes.values():
+            node.poll()
+
+    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+        """See :meth:`ServedPayload.shut_down`: switch all off, or name those that are left on."""
+        lights = self._client.commanded_or_found
+        if not self._host.values['off_on_shutdown']:
+            on = [light for light in lights if light.status and light.status.enabled]
+            for light in on:
+                report(light.address, logging.WARNING, f'light {light.address} is left on')
+            return {light.address: '' for light in on}
+
+        def done(address: Address, result: Result, now: float) -> None:
+            if result.success:
+                report(address, logging.INFO, f'light {address} is off: {result.message}')
+            else:
+                report(address, logging.ERROR, f'light {address} may still be on: '
+                                               f'{result.message}')
+
+        for light in lights:
+            light.cancel(now)
+            light.enable(False, now, functools.partial(done, light.address), detail='shutdown')
+        return {light.address: f'light {light.address} may still be on: no confirmation'
+                for light in lights}
+
+    def close(self) -> None:
+        """See :meth:`ServedPayload.close`."""
+        self._first.close()
+        for node in self._nodes.values():
+            if node is not self._first:
+                node.close()
+
+
+def _make_client(commands: CommandSender, values: Mapping[str, Any]) -> IlluminatorClient:
+    return IlluminatorClient(
+        commands, settings(values), wanted=Selection(values, 'illuminator').is_served)
+
+
+ILLUMINATOR = RosPayload(
+    'illuminator', _make_client, Lights, LIGHT_PARAMETERS, DEVICE_PARAMETERS)

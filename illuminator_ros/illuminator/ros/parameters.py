@@ -1,0 +1,174 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parameters of the light's nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import re
+import reprlib
+from typing import Any
+
+from rclpy.node import Node
+
+from ..light import Settings
+from ..model import MAX_STROBE_PERIOD, MODES
+from ...mavlink.messages import Address
+from ...ros.parameters import declare_read_only, given_parameters, ParameterError, ParameterSpec
+
+LIGHT_PARAMETERS = (
+    ParameterSpec('target_system', 0, 'system id of the light to serve; 0 = any', low=0,
+                  high=255),
+    ParameterSpec('target_component', 0, 'component id of the light to serve; 0 = any', low=0,
+                  high=255),
+    ParameterSpec('only_target', False, 'leave lights alone that the target does not select'),
+    ParameterSpec('names', [], 'node names of further lights, such as 1/244=belly'),
+    ParameterSpec('heartbeat_timeout', 3.0, 'silence after which the light is lost', 's', 1.1,
+                  3600.0),
+    ParameterSpec('status_interval', 0.0, "period of the light's status; 0 = its own", 's', 0.0,
+                  3600.0),
+    ParameterSpec('frame_id', 'illuminator', 'frame of temperature and beam'),
+    ParameterSpec('beam_range', 0.0, 'length of the cone on ~/beam; 0 = no ~/beam', 'm', 0.0,
+                  10_000.0),
+    ParameterSpec('beam_angle', 0.5, 'full opening angle of the cone on ~/beam', 'rad', 0.01,
+                  3.0),
+    ParameterSpec('off_on_shutdown', False, 'switch the lights off when the node ends'),
+    ParameterSpec('restore_configuration', True,
+                  'configure a light that has restarted as it was before'),
+)
+
+DEVICE_PARAMETERS = (
+    ParameterSpec('mode', '', 'what controls the light', choices=tuple(MODES)),
+    ParameterSpec('brightness', 0.0, 'brightness', '%', 0.0, 100.0),
+    ParameterSpec('strobe_period', 0.0, 'strobe period', 's', 0.0, MAX_STROBE_PERIOD,
+                  constraints='0 = no strobe, else within what the light reports'),
+    ParameterSpec('strobe_duty_cycle', 0.0, 'share of the strobe period in which it is lit', '%',
+                  0.0, 100.0),
+)
+# Those that each node may have for itself.
+_GEOMETRY = ('frame_id', 'beam_range', 'beam_angle')
+
+
+@dataclass(frozen=True)
+class BeamGeometry:
+    """
+    Where a light is, and the cone of its beam along +x from there.
+
+    :param beam_range: the length of the beam, m; 0 for none.
+    :param beam_angle: the full opening angle of the beam, rad.
+    """
+
+    frame_id: str
+    beam_range: float
+    beam_angle: float
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> BeamGeometry:
+        """Return the one that parameters give."""
+        return cls(*(values[name] for name in _GEOMETRY))
+
+    def declare(self, node: Node) -> BeamGeometry:
+        """
+        Declare the geometry of a further light, read-only, and return it.
+
+        :raises ParameterError: if a parameter is wrong.
+        """
+        return BeamGeometry.of(declare_read_only(
+            node, (spec for spec in LIGHT_PARAMETERS if spec.name in _GEOMETRY), vars(self)))
+
+
+def ignored_parameters(node: Node, first: Node) -> list[str]:
+    """Return a warning for each parameter that is given for a further node and has no effect."""
+    given = given_parameters(node)
+    return [f'parameter {name!r} is of the link, and ignored here: that of '
+            f'{first.get_fully_qualified_name()} holds' for name, parameter in given.items()
+            if not node.has_parameter(name) and first.has_parameter(name)
+            and parameter.value != first.get_parameter(name).value]
+
+
+def settings(values: Mapping[str, Any]) -> Settings:
+    """Return how lights are treated."""
+    return Settings(values['heartbeat_timeout'], values['status_interval'],
+                    values['restore_configuration'])
+
+
+class Selection:
+    """
+    Which lights are served, and by which nodes.
+
+    :param values: of the parameters.
+    :param first: the name of the first node.
+    :raises ParameterError: if ``names`` is wrong.
+    """
+
+    def __init__(self, values: Mapping[str, Any], first: str) -> None:
+        self._target = Address(values['target_system'], values['target_component'])
+        self._only_target = bool(values['only_target'])
+        self._first = first
+        self.names = _parse_names(values['names'], first)
+
+    def is_target(self, address: Address) -> bool:
+        """Return whether the first node may serve a light."""
+        return (self._target.system in (0, address.system)
+                and self._target.component in (0, address.component))
+
+    def is_served(self, address: Address) -> bool:
+        """Return whether any node may serve a light."""
+        return not self._only_target or self.is_target(address)
+
+    def node_name(self, address: Address) -> str:
+        """Return the name of the node of a further light."""
+        return (self.names.get(address)
+                or f'{self._first}_{address.system}_{address.component}')
+
+    def unused_name(self, served: Address) -> str:
+        """Return the warning for a name of the light that the first node serves, '' for none."""
+        name = self.names.get(served)
+        return (f'names: {served}={name} is not used, since light {served} is served by the first '
+                f'node, {self._first}: -r __node:={name} names that, target_system and '
+                'target_component choose its light') if name else ''
+
+    def unused_names(self, heard: Mapping[Address, object]) -> list[str]:
+        """Return a warning for each name of a light that is not served or was not heard."""
+        return [f'names: {address}={name} is not used, since only_target leaves light {address} '
+                'alone' if not self.is_served(address) else
+                f'names: {address}={name} is not used yet, since no light {address} has been '
+                'heard'
+                for address, name in self.names.items()
+                if not self.is_served(address) or address not in heard]
+
+
+def _parse_names(entries: list[str], first: str) -> dict[Address, str]:
+    names: dict[Address, str] = {}
+    for entry in entries:
+        match = re.fullmatch(r'([0-9]{1,3})/([0-9]{1,3})=(.*)', str(entry))
+        if not match or int(match[1]) > 255 or int(match[2]) > 255:
+            raise ParameterError(
+                f'names: {reprlib.repr(entry)} is not of the form 1/244=belly')
+        name = match[3]
+        if not re.fullmatch(r'[A-Za-z_][A-Za-z0-9_]{0,199}', name):
+            raise ParameterError(f'names: {reprlib.repr(name)} is not a valid node name')
+        address = Address(int(match[1]), int(match[2]))
+        if address in names or name in names.values():
+            raise ParameterError(f'names: {entry!r} repeats an address or a name')
+        if name == first:
+            raise ParameterError(f'names: {entry!r} is the name of the first node')
+        other = re.fullmatch(rf'{first}_([0-9]+)_([0-9]+)', name)
+        if other and other.groups() != (str(address.system), str(address.component)):
+            raise ParameterError(
+                f'names: {entry!r} is the name of light {"/".join(other.groups())}')
+        names[address] = name
+    return names

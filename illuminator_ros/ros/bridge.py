@@ -1,0 +1,232 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bridge's process: one link, one component, any number of payloads and their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+import contextlib
+import logging
+import math
+import queue
+import threading
+import time
+
+from rclpy.node import Node
+
+from .diagnostics_publisher import DiagnosticsPublisher
+from .executor import NodeExecutor
+from .log import LogForwarder, NodeLog
+from .logger_services import LoggerServices
+from .node import PayloadNode
+from .node_pool import NodePool
+from .parameters import (
+    declare_link_parameters,
+    declare_read_only,
+    misspelt,
+    ParameterError,
+)
+from .payload import Host, RosPayload, ServedPayload
+from ..mavlink.command import CommandSender, format_seconds
+from ..mavlink.component import Component
+from ..mavlink.link import Link
+from ..mavlink.link_state import LinkEvent
+from ..payload.registry import PayloadType
+
+# s; SIGINT and SIGTERM end the process within 1 s, these and the leaving of ROS included.
+OFF_LIMIT = 0.6
+STOP_LIMIT = 0.15
+THREADS_LIMIT = 0.1
+# s between looks at the diagnostics, and at least between two that events cause.
+TICK = 0.25
+CHECK_INTERVAL = 0.02
+# s between looks for another node of the same name.
+NAMES_INTERVAL = 5.0
+# Characters of a node's full name: topics and services below it, with the prefixes and suffixes
+# of the middleware, must have at most 255.
+MAX_NODE_NAME = 255 - len('rq//set_parameters_atomicallyRequest') - 8
+
+
+class Bridge:
+    """
+    Connects the nodes of payloads with one link.
+
+    :param node: the first node, that of the first payload.
+    :param arguments: the command line, which the nodes of further devices follow too.
+    :param types: the kinds of payloads that the parameter ``payloads`` may name.
+    :raises ParameterError: if a parameter is wrong.
+    """
+
+    def __init__(
+        self, node: Node, arguments: Sequence[str], types: Mapping[str, PayloadType],
+    ) -> None:
+        self.node = node
+        if len(node.get_fully_qualified_name()) > MAX_NODE_NAME:
+            raise ParameterError(
+                f'the node name {node.get_fully_qualified_name()[:40]}... has more than '
+                f'{MAX_NODE_NAME} characters')
+        self.log = NodeLog(node.get_logger())
+        LogForwarder.install(self.log)
+        self.parameters = parameters = declare_link_parameters(node)
+        kinds = [_load(name, types) for name in parameters.payloads]
+        values = [declare_read_only(node, kind.parameters) for kind in kinds]
+        commands = CommandSender(
+            parameters.address, parameters.command_timeout, parameters.command_retries)
+        self.clients = [kind.make_client(commands, value)
+                        for kind, value in zip(kinds, values, strict=True)]
+        self.component = Component(commands, self.clients)
+        signing, store = parameters.signing()
+        self.link = Link(
+            parameters.url, self.component, label=parameters.connection_url,
+            on_event=self._link_event, signing=signing, store=store)
+        # Set where there is something to do before the next tick.
+        self._wake = threading.Event()
+        self._ended = threading.Event()
+        self._closed = threading.Event()
+        self._housekeeping = threading.Thread(
+            target=self._keep_house, name='housekeeping', daemon=True)
+        self.pool = NodePool(node, arguments, self.log, self._wake.set)
+        self._diagnostics = DiagnosticsPublisher(
+            node, self.link, self.component, url=parameters.connection_url,
+            period=parameters.diagnostics_period)
+        LoggerServices(node, self.log)
+        self._executor = NodeExecutor(node.context, self.log)
+        self._executor.add_node(node)
+        self._own_nodes = [node, *(
+            PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context)
+            for kind in kinds[1:])]
+        self._payloads: list[ServedPayload] = []
+        for own, kind, client, value in zip(
+                self._own_nodes, kinds, self.clients, values, strict=True):
+            log = self.log if own is node else NodeLog(own.get_logger())
+            self._payloads.append(kind.serve(client, Host(
+                own, self.link, log, self.pool, self._diagnostics, parameters, value,
+                self._wake.set)))
+            if own is not node:
+                self._executor.add_node(own)
+        for warning in misspelt(node):
+            self.log.warning(warning)
+        # A whole number of ticks makes a period, which would else now and then be one too long.
+        self._tick = parameters.diagnostics_period / math.ceil(
+            parameters.diagnostics_period / TICK)
+
+    @property
+    def nodes(self) -> list[Node]:
+        """Return all nodes of the process."""
+        return [*self._own_nodes, *self.pool.nodes]
+
+    def run(self) -> None:
+        """Serve until :meth:`end` is called or the context is shut down."""
+        self._housekeeping.start()
+        self.link.start()
+        self._executor.run()
+        if not self._ended.is_set():
+            self.end()
+        self._closed.wait(OFF_LIMIT + STOP_LIMIT)
+        self.pool.end()
+        deadline = time.monotonic() + THREADS_LIMIT
+        self._housekeeping.join(max(deadline - time.monotonic(), 0.0))
+        self.pool.join(deadline)
+        for payload in self._payloads:
+            payload.close()
+        # At once, so that other nodes see that they are gone.
+        for node in self.nodes:
+            node.destroy_node()
+
+    def end(self) -> None:
+        """
+        Bring the devices into the state in which they are left, and have :meth:`run` return.
+
+        It does not need the executor, which may be busy. Takes 0.75 s at most; callable from any
+        thread, once.
+        """
+        self._ended.set()
+        self._shut_down_devices()
+        self.link.stop(STOP_LIMIT)
+        self._closed.set()
+        self._wake.set()
+        self._executor.end()
+
+    def _shut_down_devices(self) -> None:
+        reports: queue.SimpleQueue[tuple[Hashable, int, str]] = queue.SimpleQueue()
+        expected: queue.SimpleQueue[dict[Hashable, str]] = queue.SimpleQueue()
+
+        def start(now: float) -> None:
+            late: dict[Hashable, str] = {}
+            for payload in self._payloads:
+                late |= payload.shut_down(
+                    now, lambda key, severity, text: reports.put((key, severity, text)))
+            expected.put(late)
+
+        deadline = time.monotonic() + OFF_LIMIT
+        self.link.call(start)
+        try:
+            late = expected.get(timeout=OFF_LIMIT)
+        except queue.Empty:
+            late = {None: 'the link did not answer, devices may still be on: no confirmation'}
+        with contextlib.suppress(queue.Empty):
+            while late:
+                key, severity, text = reports.get(timeout=max(deadline - time.monotonic(), 0.0))
+                late.pop(key, None)
+                self.log.write(severity, text)
+        for text in late.values():
+            self.log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
+
+    def _keep_house(self) -> None:
+        names_due = 0.0
+        while not self._ended.is_set():
+            try:
+                more = self.pool.work()
+                self.link.call(self._poll)
+                self._diagnostics.poll(self._tick / 2)
+                self.log.flush()
+                if time.monotonic() >= names_due:
+                    names_due = time.monotonic() + NAMES_INTERVAL
+                    self._check_names()
+            except Exception as error:
+                self.log.error(f'internal error: {error!r}', 'housekeeping')
+                more = False
+            self._ended.wait(CHECK_INTERVAL)
+            if not more:
+                self._wake.wait(self._tick)
+            self._wake.clear()
+
+    def _poll(self, now: float) -> None:
+        for payload in self._payloads:
+            payload.poll(now)
+
+    def _check_names(self) -> None:
+        names = [f'{namespace.rstrip("/")}/{name}'
+                 for name, namespace in self.node.get_node_names_and_namespaces()]
+        for node in self.nodes:
+            if names.count(node.get_fully_qualified_name()) > 1:
+                self.log.warning(
+                    f'another node is called {node.get_fully_qualified_name()}: services and '
+                    'parameters of either may answer; give one another name with -r __node:=NAME',
+                    f'name {node.get_fully_qualified_name()}')
+
+    def _link_event(self, event: LinkEvent) -> None:
+        self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event), 'link')
+        self._wake.set()
+
+
+def _load(name: str, types: Mapping[str, PayloadType]) -> RosPayload:
+    try:
+        payload = types[name].load('ros')
+    except LookupError:
+        raise ParameterError(
+            f'payloads: {name!r} is not one of {", ".join(types)}') from None
+    assert isinstance(payload, RosPayload)
+    return payload

@@ -1,0 +1,120 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Publishing /diagnostics for all nodes of a process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import queue
+import threading
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from .diagnostics import link_snapshot, LinkSnapshot, Report
+from .node import STREAM_QOS
+from ..mavlink.component import Component
+from ..mavlink.link import Link
+
+# s for which the link's thread may take to answer, at most.
+SNAPSHOT_TIMEOUT = 1.0
+
+# Makes reports of a snapshot that was taken in the link's thread; a pure function.
+MakeReports = Callable[[LinkSnapshot], Sequence[Report]]
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosticsSource:
+    """
+    The reports of one node.
+
+    :param look: takes a snapshot, in the link's thread, given the time (s).
+    """
+
+    node_name: str
+    full_name: str
+    look: Callable[[float], MakeReports]
+
+
+class DiagnosticsPublisher:
+    """
+    Publishes the reports of each node when they are due, or at once when a level has changed.
+
+    :param url: the connection URL, which is the hardware id of the link.
+    :param period: s between publications of a node.
+    """
+
+    def __init__(
+        self, node: Node, link: Link, component: Component, *, url: str, period: float,
+    ) -> None:
+        self._clock = node.get_clock()
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
+        self._link = link
+        self._component = component
+        self._url = url
+        self._period = period
+        self._lock = threading.Lock()
+        # When each is due, and the levels that were published last.
+        self._sources: dict[DiagnosticsSource, tuple[float, list[bytes]]] = {}
+
+    def add(self, source: DiagnosticsSource) -> None:
+        """Publish for a node from now on; callable from any thread."""
+        with self._lock:
+            self._sources[source] = -1.0, []
+
+    def remove(self, source: DiagnosticsSource) -> None:
+        """Publish nothing more for a node; callable from any thread."""
+        with self._lock:
+            self._sources.pop(source, None)
+
+    def look(self, now: float) -> LinkSnapshot:
+        """Return what is known of the link; in its thread."""
+        return link_snapshot(self._link, self._component, self._url, now)
+
+    def poll(self, tolerance: float) -> None:
+        """
+        Publish everything that is due or has changed.
+
+        :param tolerance: how much too early it may be, s.
+        """
+        with self._lock:
+            sources = list(self._sources)
+        taken: queue.SimpleQueue[tuple[float, LinkSnapshot, list[MakeReports]]] = (
+            queue.SimpleQueue())
+        self._link.call(lambda now: taken.put((
+            now, self.look(now), [source.look(now) for source in sources])))
+        try:
+            now, link, looks = taken.get(timeout=SNAPSHOT_TIMEOUT)
+        except queue.Empty:
+            return
+        for source, make_reports in zip(sources, looks, strict=True):
+            reports = make_reports(link)
+            levels = [report.level for report in reports]
+            due, published = self._sources.get(source, (0.0, levels))
+            if now >= due - tolerance:
+                due = now + self._period
+            elif levels == published:
+                continue
+            with self._lock:
+                if source in self._sources:
+                    self._sources[source] = due, levels
+            self._publish(source, reports)
+
+    def _publish(self, source: DiagnosticsSource, reports: Sequence[Report]) -> None:
+        array = DiagnosticArray()
+        array.header.stamp = self._clock.now().to_msg()
+        array.status = [report.message(source.node_name, source.full_name) for report in reports]
+        self._publisher.publish(array)

@@ -1,0 +1,117 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bringing requests from ROS callbacks to the link's thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+from typing import Generic, TypeVar
+
+from .log import NodeLog
+from ..mavlink.link import Link
+
+T = TypeVar('T')
+
+# Requests of one kind that wait for their answers at a time.
+MAX_PENDING = 64
+
+# A request: called in the link's thread with the time, s, and with the function that it must
+# call once with its answer, then or later.
+Request = Callable[[float, Callable[[T], None]], None]
+
+
+class LinkCalls:
+    """
+    Requests of one kind to the link's thread.
+
+    :param limit: how many may wait for their answers; one more is refused at once.
+    """
+
+    def __init__(self, link: Link, log: NodeLog, limit: int = MAX_PENDING) -> None:
+        self._link = link
+        self._log = log
+        self._limit = limit
+        self._pending = 0
+        self._lock = threading.Lock()
+
+    def ask(
+        self, request: Request[T], answer: Callable[[T], None], refuse: Callable[[str], None],
+    ) -> None:
+        """
+        Have a request carried out, without waiting for the link.
+
+        One of the two is called once, in any thread.
+
+        :param refuse: takes the reason why the request cannot be carried out.
+        """
+        with self._lock:
+            busy = self._pending >= self._limit
+            self._pending += not busy
+        if busy:
+            refuse(f'busy: {self._limit} requests wait for an answer already')
+            return
+        answered = False
+
+        def end(reply: Callable[[], None]) -> None:
+            nonlocal answered
+            if not answered:
+                answered = True
+                with self._lock:
+                    self._pending -= 1
+                reply()
+
+        def run(now: float) -> None:
+            try:
+                request(now, lambda value: end(lambda: answer(value)))
+            except Exception as error:
+                reason = f'internal error: {error!r}'
+                self._log.error(reason, 'request')
+                end(lambda: refuse(reason))
+
+        self._link.call(run)
+
+
+class LatestOnly(Generic[T]):
+    """
+    Carries out one request after the other; of those that come meanwhile only the newest.
+
+    For the link's thread.
+
+    :param start: starts a request, given its value, the time (s), and the function to call with
+        the time when it has ended.
+    """
+
+    def __init__(self, start: Callable[[T, float, Callable[[float], None]], None]) -> None:
+        self._start = start
+        self._waiting: list[T] = []
+        self._busy = False
+
+    def offer(self, value: T, now: float) -> None:
+        """Carry out a request, unless a newer one comes before it is sent."""
+        self._waiting[:] = [value]
+        if not self._busy:
+            self._next(now)
+
+    def _next(self, now: float) -> None:
+        self._busy = False
+        if self._waiting:
+            value = self._waiting.pop()
+            self._busy = True
+            try:
+                self._start(value, now, self._next)
+            except Exception:
+                self._busy = False
+                raise

@@ -1,0 +1,156 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The log of a node: lines of one kind are limited in rate, and those left out are counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import logging
+import threading
+import time
+
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.logging import LoggingSeverity
+
+# Lines of one kind in PERIOD, s; the last of those left out is written after it.
+BURST = 10
+PERIOD = 10.0
+# Kinds that are limited each for itself.
+MAX_KINDS = 256
+
+
+@dataclass
+class _Kind:
+    since: float
+    lines: int = 0
+    left_out: int = 0
+    last: tuple[int, str] = (logging.INFO, '')
+
+
+class NodeLog:
+    """
+    Writes to the logger of a node, from any thread.
+
+    Writing never waits for the reader of stderr: that leads to an
+    :class:`~illuminator_ros.cli.output.OutputQueue`.
+    """
+
+    def __init__(
+        self, logger: RcutilsLogger, clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._logger = logger
+        self._clock = clock
+        self._kinds: dict[str, _Kind] = {}
+        self._lock = threading.Lock()
+
+    def info(self, text: str, kind: str = '') -> None:
+        """See :meth:`write`."""
+        self.write(logging.INFO, text, kind)
+
+    def warning(self, text: str, kind: str = '') -> None:
+        """See :meth:`write`."""
+        self.write(logging.WARNING, text, kind)
+
+    def error(self, text: str, kind: str = '') -> None:
+        """See :meth:`write`."""
+        self.write(logging.ERROR, text, kind)
+
+    def write(self, severity: int, text: str, kind: str = '') -> None:
+        """
+        Write a line.
+
+        :param severity: of :mod:`logging`.
+        :param kind: names the lines that are limited together. Each line that another program
+            can cause must have one; '' is not limited.
+        """
+        if kind and severity > logging.DEBUG:
+            with self._lock:
+                note = self._admit(severity, text, kind)
+            if note is None:
+                return
+            text += note
+        self._emit(severity, text)
+
+    def flush(self) -> None:
+        """Write the last line of each kind that was limited, once its period has ended."""
+        now = self._clock()
+        with self._lock:
+            due = [name for name, kind in self._kinds.items() if now >= kind.since + PERIOD]
+            ended = [self._kinds.pop(name) for name in due]
+        for kind in ended:
+            if kind.left_out:
+                severity, text = kind.last
+                self._emit(severity, text + _note(kind.left_out - 1))
+
+    @property
+    def debugs(self) -> bool:
+        """Whether lines for debugging are shown."""
+        return self._logger.is_enabled_for(LoggingSeverity.DEBUG)
+
+    def _admit(self, severity: int, text: str, name: str) -> str | None:
+        """Return what to add to the line, None if the line must be left out."""
+        now = self._clock()
+        kind = self._kinds.get(name)
+        note = ''
+        if kind is None or now >= kind.since + PERIOD:
+            if kind is not None:
+                note = _note(kind.left_out)
+            elif len(self._kinds) >= MAX_KINDS:
+                return None
+            kind = self._kinds[name] = _Kind(now)
+        if kind.lines >= BURST:
+            kind.left_out += 1
+            kind.last = severity, text
+            return None
+        kind.lines += 1
+        return note
+
+    def _emit(self, severity: int, text: str) -> None:
+        # One call each: rclpy refuses another severity from the same line.
+        if severity >= logging.ERROR:
+            self._logger.error(text)
+        elif severity >= logging.WARNING:
+            self._logger.warning(text)
+        elif severity >= logging.INFO:
+            self._logger.info(text)
+        else:
+            self._logger.debug(text)
+
+
+class LogForwarder(logging.Handler):
+    """Shows what the modules without ROS log in the log of a node."""
+
+    def __init__(self, log: NodeLog) -> None:
+        super().__init__()
+        self._log = log
+
+    @classmethod
+    def install(cls, log: NodeLog) -> None:
+        """Forward the logger ``illuminator_ros``, in place of an earlier forwarder."""
+        logger = logging.getLogger('illuminator_ros')
+        for handler in list(logger.handlers):
+            logger.removeHandler(handler)
+        logger.addHandler(cls(log))
+        logger.propagate = False
+        logger.setLevel(logging.DEBUG if log.debugs else logging.INFO)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """See :meth:`logging.Handler.emit`."""
+        self._log.write(record.levelno, self.format(record), str(record.msg))
+
+
+def _note(left_out: int) -> str:
+    return f' ({left_out} similar lines left out)' if left_out > 0 else ''

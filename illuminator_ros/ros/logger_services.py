@@ -1,0 +1,75 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The logger services of a process, with bounded requests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import LoggerLevel, SetLoggerLevelsResult
+from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
+from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
+from rclpy.node import Node
+
+from .executor import DeferredService
+from .log import LogForwarder, NodeLog
+from .parameter_services import MAX_NAMES
+
+# rcl never forgets a logger whose level was set.
+MAX_LOGGERS = 200
+
+
+class LoggerServices:
+    """``~/get_logger_levels`` and ``~/set_logger_levels``, for all loggers of the process."""
+
+    def __init__(self, node: Node, log: NodeLog) -> None:
+        self._log = log
+        self._names: set[str] = set()
+        node.create_service(GetLoggerLevels, '~/get_logger_levels', DeferredService(self._get))
+        node.create_service(SetLoggerLevels, '~/set_logger_levels', DeferredService(self._set))
+
+    def _get(self, request: Any, respond: Callable[[Any], None]) -> None:
+        names = request.names if len(request.names) <= MAX_NAMES else []
+        respond(GetLoggerLevels.Response(
+            levels=[LoggerLevel(name=name, level=_level(name)) for name in names]))
+
+    def _set(self, request: Any, respond: Callable[[Any], None]) -> None:
+        levels = request.levels if len(request.levels) <= MAX_NAMES else []
+        results = []
+        for level in levels:
+            reason = self._set_one(level.name, level.level)
+            results.append(SetLoggerLevelsResult(successful=not reason, reason=reason))
+        LogForwarder.install(self._log)
+        respond(SetLoggerLevels.Response(results=results))
+
+    def _set_one(self, name: str, level: int) -> str:
+        if name not in self._names and len(self._names) >= MAX_LOGGERS:
+            return f'the levels of {MAX_LOGGERS} loggers were set already'
+        try:
+            set_logger_level(name, LoggingSeverity(level))
+        except ValueError:
+            return f'{level} is not a logger level'
+        except RuntimeError as error:
+            return str(error)
+        self._names.add(name)
+        return ''
+
+
+def _level(name: str) -> int:
+    try:
+        return int(get_logger_level(name))
+    except RuntimeError:
+        return int(LoggingSeverity.UNSET)

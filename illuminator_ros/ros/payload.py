@@ -1,0 +1,94 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The ROS half of a payload, as the bridge runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from rclpy.node import Node
+
+from .diagnostics_publisher import DiagnosticsPublisher
+from .log import NodeLog
+from .node_pool import NodePool
+from .parameters import LinkParameters, ParameterSpec
+from ..mavlink.command import CommandSender
+from ..mavlink.component import Payload
+from ..mavlink.link import Link
+
+# Takes the outcome of the shutdown of one device: its key, the severity (of logging) and a line.
+ShutdownReport = Callable[[Hashable, int, str], None]
+
+
+@dataclass(frozen=True)
+class Host:
+    """
+    What the bridge offers to the ROS half of one payload.
+
+    :param node: the payload's own node.
+    :param nodes: makes nodes of further devices.
+    :param values: of the payload's read-only parameters.
+    :param check_diagnostics: has levels compared at once; callable from any thread.
+    """
+
+    node: Node
+    link: Link
+    log: NodeLog
+    nodes: NodePool
+    diagnostics: DiagnosticsPublisher
+    link_parameters: LinkParameters
+    values: Mapping[str, Any]
+    check_diagnostics: Callable[[], None]
+
+
+class ServedPayload(Protocol):
+    """A payload that is served. All but :meth:`close` is called in the link's thread."""
+
+    def poll(self, now: float) -> None:
+        """Do what is due; called a few times a second."""
+
+    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+        """
+        Bring devices into the state in which they are left; the bridge ends.
+
+        :param report: called once for each device with what became of it, then or later.
+        :return: by the keys of the devices, the line for one that is not reported in time.
+        """
+
+    def close(self) -> None:
+        """Take back what others would go on to show, before the nodes are destroyed."""
+
+
+@dataclass(frozen=True)
+class RosPayload:
+    """
+    The ROS half of one kind of payload.
+
+    :param node_name: the default name of its first node.
+    :param parameters: its read-only parameters, beside those of the link.
+    :param device_parameters: those that devices have; for ``--help``.
+    :param make_client: returns the MAVLink side, given the command sender and the parameters.
+    :param serve: serves devices with nodes, given the client; may raise
+        :class:`~.parameters.ParameterError`.
+    """
+
+    node_name: str
+    make_client: Callable[[CommandSender, Mapping[str, Any]], Payload]
+    # The client is the one that make_client has returned.
+    serve: Callable[[Any, Host], ServedPayload]
+    parameters: tuple[ParameterSpec, ...] = ()
+    device_parameters: tuple[ParameterSpec, ...] = ()
