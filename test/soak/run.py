@@ -14,12 +14,12 @@
 # limitations under the License.
 
 """
-Runs the bridge and simulated lights for as long as is wanted, over a line that does its worst.
+Runs the bridge and simulated lights over a faulty line for a given time.
 
 Frames are lost, repeated, reordered, delayed and spoilt, the line is cut, the router between
 them is restarted, and so is one of two lights, while services, parameters and setpoints are used
-all the time. Every request must be answered in time, and at the end the bridge must serve as at
-the beginning, with no more memory, threads and descriptors than after its warm-up.
+all the time. Every request must be answered in time. At the end the bridge must serve as at the
+beginning, with no more memory, threads and descriptors than after its warm-up.
 
     python3 test/soak/run.py --seconds 3600 --seed 1
 
@@ -31,30 +31,28 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 import contextlib
-from dataclasses import dataclass
 import os
 from pathlib import Path
 import random
 import resource
 import sys
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
 from std_msgs.msg import Float32  # noqa: E402
-from std_srvs.srv import SetBool, Trigger  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 from support.fault_proxy import FaultProxy, NO_FAULTS  # noqa: E402
 from support.faulty_wire import Faults  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import Program, python  # noqa: E402
 from support.ros import own_domain, Parameters, Ros, start_bridge  # noqa: E402
 
-# Memory that a process may take more at the end than after its warm-up, MB.
-MAX_GROWTH_MB = 6.0
-# Descriptors likewise: the middleware opens some for who comes and goes. Threads: none.
-MAX_MORE_DESCRIPTORS = 4
+# Growth of a process after its warm-up: memory in MB, threads, descriptors. The middleware opens
+# some descriptors for participants that come and go.
+MAX_GROWTH = (6.0, 0, 4)
 # s; the slowest request is a refresh (5 s), behind others of its kind.
 ANSWER_LIMIT = 30.0
 # s; a light that has just restarted gets its configuration back before it is asked for more.
@@ -72,9 +70,8 @@ FAULTS = {
 }
 
 
-@dataclass
-class Usage:
-    """What a process takes."""
+class Usage(NamedTuple):
+    """The resources of a process: memory in MB, threads, descriptors."""
 
     memory_mb: float
     threads: int
@@ -82,7 +79,7 @@ class Usage:
 
     @classmethod
     def of(cls, pid: int) -> Usage:
-        """Look at a process."""
+        """Read the usage of a process."""
         pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
         return cls(pages * resource.getpagesize() / 1e6, len(os.listdir(f'/proc/{pid}/task')),
                    len(os.listdir(f'/proc/{pid}/fd')))
@@ -92,15 +89,10 @@ class Usage:
                 f'{self.descriptors} descriptors')
 
     def excess(self, before: Usage) -> list[str]:
-        """Return what a process takes more than before, beyond what it may."""
-        found = []
-        if self.memory_mb > before.memory_mb + MAX_GROWTH_MB:
-            found.append(f'{self.memory_mb - before.memory_mb:.1f} MB of memory more')
-        if self.threads > before.threads:
-            found.append(f'{self.threads - before.threads} threads more')
-        if self.descriptors > before.descriptors + MAX_MORE_DESCRIPTORS:
-            found.append(f'{self.descriptors - before.descriptors} descriptors more')
-        return found
+        """Return by how much this usage is above an earlier one, beyond the tolerance."""
+        return [f'{now - then:.1f} {what} more' for now, then, limit, what in zip(
+            self, before, MAX_GROWTH, ('MB of memory', 'threads', 'descriptors'), strict=True)
+            if now > then + limit]
 
 
 class Soak:
@@ -141,58 +133,52 @@ class Soak:
         """Return what the two programs take that run from the beginning to the end."""
         return {'bridge': Usage.of(self.bridge.pid), 'simulator': Usage.of(self.light.pid)}
 
-    # What is done
-
     def disturb(self) -> None:
-        """Do something to the line or the lights."""
-        what = self.random.choice([*FAULTS, 'router restart', 'light restart'])
-        self.counts[what] += 1
-        if what == 'router restart':
+        """Change the faults of the line, or restart the router or a light."""
+        fault = self.random.choice([*FAULTS, 'router restart', 'light restart'])
+        self.counts[fault] += 1
+        if fault == 'router restart':
             self.proxy.restart()
-        elif what == 'light restart':
+        elif fault == 'light restart':
             self.restarted.kill()
             self.restarted = self._simulator(244)
         else:
-            self.proxy.set(FAULTS[what])
+            self.proxy.set(FAULTS[fault])
 
     def request(self) -> None:
         """Begin one request of some kind."""
-        what = self.random.choice(('enable', 'refresh', 'set', 'setpoints'))
-        self.counts[what] += 1
-        if what == 'enable':
-            call = self.client.start(SetBool, '/illuminator/enable', SetBool.Request(
-                data=self.random.random() < 0.5))
-        elif what == 'refresh':
-            call = self.client.start(Trigger, '/illuminator/refresh', Trigger.Request())
-        elif what == 'set':
-            call = self.parameters.start_set(strobe_duty_cycle=self.random.uniform(0, 100))
-        else:
+        kind = self.random.choice(('enable', 'refresh', 'set', 'setpoints'))
+        self.counts[kind] += 1
+        if kind == 'setpoints':
             self.client.publish(Float32, '/illuminator/cmd/brightness',
                                 *(self.random.uniform(0, 100) for _ in range(10)))
             return
-        self._calls.append((time.monotonic(), what, call))
+        self._calls.append((time.monotonic(), kind, (
+            self.client.start_enable(self.random.random() < 0.5) if kind == 'enable' else
+            self.client.start(Trigger, '/illuminator/refresh', Trigger.Request())
+            if kind == 'refresh' else
+            self.parameters.start_set(strobe_duty_cycle=self.random.uniform(0, 100)))))
 
     def collect(self) -> None:
-        """Take the answers that are there, and miss those that should be."""
+        """Take the answers that have come, and note those that are overdue."""
         waiting = []
-        for begun, what, call in self._calls:
+        for begun, kind, call in self._calls:
             if call.answered:
                 response = call.result()
-                good = getattr(response, 'success', None)
-                good = response.results[0].successful if good is None else good
-                self.counts[f'{what}: {"success" if good else "refused"}'] += 1
+                good = (response.results[0].successful if kind == 'set' else response.success)
+                self.counts[f'{kind}: {"success" if good else "refused"}'] += 1
             elif time.monotonic() - begun > ANSWER_LIMIT:
-                self.problems.append(f'{what} got no answer within {ANSWER_LIMIT:g} s')
+                self.problems.append(f'{kind} got no answer within {ANSWER_LIMIT:g} s')
             else:
-                waiting.append((begun, what, call))
+                waiting.append((begun, kind, call))
         self._calls = waiting
 
-    def run(self, seconds: float, *, disturbed: bool = True) -> None:
-        """Go on for a time."""
+    def run(self, seconds: float) -> None:
+        """Disturb the line and send requests for a time, s."""
         until = time.monotonic() + seconds
         next_fault = next_report = time.monotonic()
         while time.monotonic() < until:
-            if disturbed and time.monotonic() >= next_fault:
+            if time.monotonic() >= next_fault:
                 next_fault = time.monotonic() + self.random.uniform(0.5, 4.0)
                 self.disturb()
             if len(self._calls) < 4:
@@ -205,7 +191,7 @@ class Soak:
                       flush=True)
 
     def calm_down(self) -> None:
-        """End the faults, and wait for what is under way."""
+        """End the faults, and wait for the requests that are under way."""
         self.proxy.set(NO_FAULTS)
         until = time.monotonic() + ANSWER_LIMIT + 1.0
         while self._calls and time.monotonic() < until:
@@ -214,36 +200,35 @@ class Soak:
         time.sleep(CALM)
 
     def check_service(self) -> None:
-        """Check that the light can be commanded as on the first day."""
+        """Check that the light can be commanded as at the beginning."""
         for on in (True, False):
             until = time.monotonic() + ANSWER_LIMIT
-            answer: Any = None
-            # Where the machine stands still meanwhile, one may come too late.
-            while (answer is None or not answer.success) and time.monotonic() < until:
-                answer = self.client.call(
-                    SetBool, '/illuminator/enable', SetBool.Request(data=on), ANSWER_LIMIT)
+            # On a machine that stands still meanwhile, a confirmation may come too late.
+            while not (answer := self.client.enable(on)).success and time.monotonic() < until:
+                pass
             if not answer.success:
                 self.problems.append(f'at the end: {answer.message}')
 
 
 def soak(seconds: float, seed: str) -> int:
-    """Run it and say what was found."""
+    """Run it, print what was found, and return the exit status."""
+    warm_up = min(max(seconds / 4, 6.0), 120.0)
     with own_domain() as domain, contextlib.ExitStack() as stack:
         one = Soak(seed, domain)
         stack.callback(one.close)
-        one.bridge.wait_for('connected', 30.0)
-        one.bridge.wait_for('is served by', 30.0)
-        # Each kind of request and fault once or more, so that all that is loaded late is there.
-        one.run(min(max(seconds / 4, 6.0), 120.0))
+        one.bridge.wait_for('connected')
+        one.bridge.wait_for('is served by')
+        # Modules that are imported late, and buffers, must be there before usage is compared.
+        one.run(warm_up)
         one.calm_down()
         before = one.usages()
-        one.run(seconds - min(max(seconds / 4, 6.0), 120.0))
+        one.run(seconds - warm_up)
         one.calm_down()
         one.check_service()
         after = one.usages()
     for name, usage in after.items():
         print(f'{name}: after the warm-up {before[name]}; at the end {usage}')
-        one.problems += [f'{name}: {what}' for what in usage.excess(before[name])]
+        one.problems += [f'{name}: {growth}' for growth in usage.excess(before[name])]
     print(', '.join(f'{name} {count}' for name, count in sorted(one.counts.items())))
     for problem in one.problems:
         print(f'PROBLEM: {problem}')
