@@ -12,18 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The real node, over real UDP, in a ROS domain of its own."""
+"""Fixtures of tests with ROS: the real node, over real UDP, in a domain of its own."""
 
-from support.fixtures import (  # noqa: F401
-    bridge,
-    domain,
-    light,
-    log_routes,
-    own_ros,
-    parameters,
-    port,
-    private_home,
-    ros,
-    settings,
-    shared_bridge,
-)
+from support.fixtures import *  # noqa: F401, F403

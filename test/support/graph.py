@@ -59,5 +59,6 @@ def interface(ros: Ros, node: str = 'illuminator', last: Sequence[str] = LAST) -
                       for lookup in lookups]
         return Interface(*parts) if set(last) <= set().union(*parts) else None
 
-    found_interface: Interface = eventually(found, 30.0)
-    return found_interface
+    interface = eventually(found)
+    assert interface is not None
+    return interface

@@ -20,7 +20,6 @@ from collections.abc import Callable
 import math
 import queue
 import threading
-import time
 from types import TracebackType
 from typing import Any
 
@@ -38,7 +37,7 @@ from illuminator_ros.mavlink.url import parse_url
 from support.fake_light import FakeLight
 from support.ports import free_port
 from support.slow import CLOCK, SlowLink, SPEED
-from support.waiting import PATIENCE
+from support.waiting import eventually, PATIENCE
 
 LIGHT = Address(1, 243)
 # s of the slow clock between statuses: ten in a real second.
@@ -221,15 +220,6 @@ class ServedLight:
 def params(message: Any) -> tuple[float, float, float, float]:
     """Return the four parameters of a command that the illuminator protocol uses."""
     return message.param1, message.param2, message.param3, message.param4
-
-
-def eventually(condition: Callable[[], Any], timeout: float = PATIENCE) -> Any:
-    """Wait for what announces itself by no event, and return it."""
-    until = time.monotonic() + timeout
-    while not (value := condition()):
-        assert time.monotonic() < until, f'not within {timeout} s'
-        time.sleep(0.005)
-    return value
 
 
 __all__ = ['CONFIGURE', 'eventually', 'free_port', 'MavCmd', 'MavResult', 'ON_OFF', 'params',

@@ -70,8 +70,8 @@ class Watching:
     def wait(self, condition: Callable[[Light], Any], name: str = '/illuminator',
              timeout: float = PATIENCE) -> Light:
         """Wait until a light is known, and as wanted; return it."""
-        eventually(lambda: name in self.names, timeout)
-        eventually(lambda: condition(self.light(name)), timeout)
+        eventually(lambda: name in self.names, within=timeout)
+        eventually(lambda: condition(self.light(name)), within=timeout)
         return self.light(name)
 
     def wait_names(self, *names: str) -> None:

@@ -64,10 +64,13 @@ class Log(Generic[T]):
             return found()[count - 1]
 
 
-def eventually(condition: Callable[[], object], what: str, within: float = PATIENCE) -> None:
-    """Wait for something that nobody tells."""
+def eventually(
+    condition: Callable[[], T], what: str = 'the condition', within: float = PATIENCE,
+) -> T:
+    """Wait for a condition that no event announces, and return its value."""
     until = time.monotonic() + within
     pause = threading.Event()
-    while not condition():
+    while not (value := condition()):
         assert time.monotonic() < until, f'not within {within} s: {what}'
-        pause.wait(0.01)
+        pause.wait(0.005)
+    return value

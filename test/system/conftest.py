@@ -12,18 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whole programs, as they are installed and run."""
+"""Fixtures of tests with ROS: whole programs, as they are installed and run."""
 
-from support.fixtures import (  # noqa: F401
-    bridge,
-    domain,
-    light,
-    log_routes,
-    own_ros,
-    parameters,
-    port,
-    private_home,
-    ros,
-    settings,
-    shared_bridge,
-)
+from support.fixtures import *  # noqa: F401, F403

@@ -181,7 +181,7 @@ def test_the_node_is_gone_from_the_graph_at_once(ros: Ros) -> None:
         program.end(signal.SIGTERM)
 
         # A participant that only fell silent would be listed for as long as its lease runs.
-        eventually(lambda: case.node not in ros.node.get_node_names(), LEASE / 2)
+        eventually(lambda: case.node not in ros.node.get_node_names(), within=LEASE / 2)
 
 
 def test_a_program_that_hangs_ends_all_the_same() -> None:
