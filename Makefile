@@ -3,7 +3,7 @@ PYTHON_IN_VENV := .venv/bin/python
 TESTS ?= test
 
 SECONDS ?= 60
-# Options of bench/run.py, such as '--json run.json --plot DIR'.
+# Options of bench/run.py, such as '--repeat 3 --json run.json'.
 BENCH ?=
 
 .PHONY: help demo test check lint unit fuzz soak bench clean environment

@@ -50,8 +50,6 @@ setup(
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
         'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich'],
-        # Plots of the benchmark.
-        'bench': ['matplotlib>=3.9'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',

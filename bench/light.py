@@ -12,39 +12,52 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A light in the benchmark's own process, which sends when it is told to."""
+"""A minimal light over UDP: it applies ON_OFF, acknowledges it and sends statuses."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import contextlib
+import select
 import socket
+import struct
+import threading
 import time
-from typing import Any
 
-from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
     CommandLong,
-    encode_payload,
     heartbeat,
     IlluminatorStatus,
-    LAYOUTS,
+    MavCmd,
     MavResult,
     MavType,
+    Message,
 )
+from support.frames import frame_of
 
-SOURCE = Address(1, 243)
+LIGHT = Address(1, 243)
+COMMAND_LONG = struct.Struct('<7fHBBB')
 
 
-class Sender:
+class MinimalLight:
     """
-    Sends statuses and heartbeats to a UDP port of loopback, and denies whatever it is asked.
+    Sends to a UDP port of the loopback interface.
 
-    :ivar sent: CLOCK_MONOTONIC just before each status was sent, s, by its uptime (ms).
+    :ivar silent: the commands that it does not acknowledge.
+    :ivar asked: set when such a command has arrived.
+    :ivar received: bytes.
+    :ivar sent: CLOCK_MONOTONIC just before each status was sent, s, by its uptime, ms.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, address: Address = LIGHT) -> None:
+        self.silent: set[int] = set()
+        self.asked = threading.Event()
+        self.received = 0
+        self.sent: dict[int, float] = {}
+        self._address = address
         self._socket = socket.socket(type=socket.SOCK_DGRAM)
         self._socket.connect(('127.0.0.1', port))
         self._socket.setblocking(False)
@@ -52,49 +65,77 @@ class Sender:
         self._sequence = 0
         self._began = time.monotonic() - 100.0
         self._heartbeat_due = 0.0
-        self.sent: dict[int, float] = {}
+        self._on = 0
 
     def close(self) -> None:
-        """Send no more."""
+        """Stop sending."""
         self._socket.close()
 
     def status(self) -> None:
-        """Send a status with a new uptime, and a heartbeat if it is due."""
+        """Send a status, with an uptime of its own, and a heartbeat if one is due."""
         now = time.monotonic()
         uptime = int((now - self._began) * 1000)
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + 1.0
             self._send(heartbeat(MavType.ILLUMINATOR))
             self._answer()
-        frame = self._frame(IlluminatorStatus(
-            uptime, 1, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
+        message = IlluminatorStatus(
+            uptime, self._on, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0)
         self.sent[uptime] = time.monotonic()
-        with contextlib.suppress(ConnectionError):
-            self._socket.send(frame)
+        self._send(message)
 
     def stream(self, seconds: float, interval: float) -> None:
-        """Send statuses for a time."""
+        """Send statuses for some time."""
         began = due = time.monotonic()
         while due < began + seconds:
             self.status()
             due += interval
             time.sleep(max(due - time.monotonic(), 0.0))
 
+    def serve(self, ended: threading.Event) -> None:
+        """Answer each command at once, and send a status once a second."""
+        while not ended.is_set():
+            if select.select([self._socket], [], [], 0.2)[0]:
+                self._answer()
+            if time.monotonic() >= self._heartbeat_due:
+                self.status()
+
     def _answer(self) -> None:
-        """Deny: who is not answered asks again, and that would be measured too."""
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while True:
-                for frame in self._decoder.feed(self._socket.recv(65536)):
+                data = self._socket.recv(65536)
+                self.received += len(data)
+                for frame in self._decoder.feed(data):
                     if frame.message_id == CommandLong.id:
-                        command = frame.payload[28] | frame.payload[29] << 8
-                        self._send(CommandAck(command, MavResult.UNSUPPORTED))
+                        self._command(bytes(frame.payload))
 
-    def _frame(self, message: Any) -> bytes:
+    def _command(self, payload: bytes) -> None:
+        values = COMMAND_LONG.unpack(payload.ljust(COMMAND_LONG.size, b'\0'))
+        command = int(values[7])
+        if command in self.silent:
+            self.asked.set()
+        elif command == MavCmd.ILLUMINATOR_ON_OFF:
+            self._on = int(values[0])
+            self._send(CommandAck(command, MavResult.ACCEPTED))
+            self.status()
+        else:
+            self._send(CommandAck(command, MavResult.UNSUPPORTED))
+
+    def _send(self, message: Message) -> None:
         self._sequence = (self._sequence + 1) & 0xFF
-        return encode_frame(
-            message.id, encode_payload(message), sequence=self._sequence, source=SOURCE,
-            crc_extra=LAYOUTS[message.id].crc_extra)
-
-    def _send(self, message: Any) -> None:
         with contextlib.suppress(ConnectionError):
-            self._socket.send(self._frame(message))
+            self._socket.send(frame_of(message, self._sequence, self._address))
+
+
+@contextlib.contextmanager
+def serving(port: int, address: Address = LIGHT) -> Iterator[MinimalLight]:
+    """Serve a light in a thread of this process."""
+    light, ended = MinimalLight(port, address), threading.Event()
+    thread = threading.Thread(target=light.serve, args=(ended,))
+    thread.start()
+    try:
+        yield light
+    finally:
+        ended.set()
+        thread.join()
+        light.close()

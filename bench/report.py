@@ -35,7 +35,7 @@ HEADER = ('| what | bridge | beside | ratio | target |', '|---|---|---|---|---|'
 
 
 def machine() -> dict[str, Any]:
-    """Return what the figures depend on."""
+    """Return the machine and the versions that the figures depend on."""
     models = [line.partition(':')[2].strip() for line in Path('/proc/cpuinfo').read_text()
               .splitlines() if line.startswith('model name')]
     versions = {}
@@ -65,12 +65,18 @@ def number(value: float) -> str:
 
 
 def figures(values: Figures, unit: str = '') -> str:
-    """Return one figure, or the quantiles with strokes between."""
+    """Return one figure, or quantiles separated by slashes."""
     text = ' / '.join(number(value) for value in values.values())
     return f'{text} {unit}'.strip()
 
 
-def promise(target: Target) -> str:
+def spread(row: Row) -> str:
+    """Return the ranges of the ratios over repeated runs, in brackets."""
+    ranges = (f'{number(low)} to {number(high)}' for low, high in row.spread.values())
+    return f' ({" / ".join(ranges)})' if row.spread else ''
+
+
+def judged(target: Target) -> str:
     """Return a target and whether it is met."""
     return f'{target.text}: {"met" if target.met else "MISSED"}'
 
@@ -83,10 +89,10 @@ def lines(row: Row) -> list[str]:
         result[0] += f'; {row.note}'
     result += [f'    {name}: {figures(values, row.unit)}' for name, values in row.peers.items()]
     if row.ratios:
-        result.append(f'    ratio: {figures(row.ratios)}')
+        result.append(f'    ratio: {figures(row.ratios)}{spread(row)}')
     for target in row.targets:
         shown = f'{number(target.value)}, limit {number(target.limit)}'
-        result.append(f'    {promise(target)} ({shown})')
+        result.append(f'    {judged(target)} ({shown})')
     return result
 
 
@@ -104,20 +110,19 @@ def markdown(rows: Iterable[Row], about: dict[str, Any]) -> str:
         about_row += [row.note] if row.note else []
         what = row.what + (f' ({"; ".join(about_row)})' if about_row else '')
         result.append(f'| {what} | {figures(row.ours, row.unit)} | {beside} | '
-                      f'{figures(row.ratios)} | {"<br>".join(map(promise, row.targets))} |')
+                      f'{figures(row.ratios)}{spread(row)} | '
+                      f'{"<br>".join(map(judged, row.targets))} |')
     # Two tildes would strike out what is between them.
     result = [re.sub(r'~/\w+', r'`\g<0>`', line) for line in result]
     return '\n'.join(result).replace(' |  |', ' | |').replace('|  |', '| |')
 
 
 def as_json(rows: Iterable[Row], about: dict[str, Any], took: dict[str, float]) -> dict[str, Any]:
-    """Return everything, with all samples; ``took``: s for each subject."""
+    """Return the run; ``took``: s for each subject."""
     listed = []
     for row in rows:
         values = asdict(row)
         values['ratios'] = row.ratios
-        values['samples'] = {name: [round(sample, 4) for sample in samples]
-                             for name, samples in row.samples.items()}
         values['targets'] = [{**asdict(target), 'met': target.met} for target in row.targets]
         listed.append(values)
     return {'machine': about, 'took': took, 'rows': listed}
@@ -131,6 +136,6 @@ def from_json(values: dict[str, Any]) -> list[Row]:
         given['targets'] = [
             Target(target['text'], target['value'], target['limit'])
             for target in listed['targets']]
-        given['curves'] = {name: (x, ys) for name, (x, ys) in listed['curves'].items()}
+        given['spread'] = {name: (low, high) for name, (low, high) in listed['spread'].items()}
         result.append(Row(**given))
     return result

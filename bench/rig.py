@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Programs to measure, a client to measure with, and what the kernel knows of a process."""
+"""Programs to measure, a ROS client to measure with, and the load of a process."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 import itertools
 import os
@@ -27,18 +28,27 @@ import socket
 import sys
 import threading
 import time
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
 
+from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool
 from support.processes import Program, python, ROOT
 from support.spun import SpunNode
 
-__all__ = ['Bench', 'bridge', 'Client', 'cpu', 'free_port', 'interleaved', 'memory',
-           'PATIENCE', 'peer', 'PEERS', 'Program', 'python', 'ROOT', 'running', 'settle',
-           'simulator', 'udp_queue']
+if TYPE_CHECKING:
+    from rclpy.client import Client as RosClient
+    from rclpy.task import Future
+    from rclpy.type_support import ServiceType
+
+Amount = TypeVar('Amount')
+Message = TypeVar('Message')
+Request = TypeVar('Request')
+Response = TypeVar('Response')
+
+__all__ = ['Program', 'python', 'ROOT']
 
 PEERS = Path(__file__).with_name('peers')
-# s; for whatever must come sooner or later.
+# s, the longest wait for anything that must happen.
 PATIENCE = 60.0
 _numbers = itertools.count()
 _ports: Iterator[int] = iter(())
@@ -49,9 +59,9 @@ class Bench:
     """
     The options of a run.
 
-    :param quick: take as few samples as possible, to test the benchmark.
+    :param quick: do as little as possible: a test of the benchmark itself.
     :param soak: s.
-    :param lights: numbers of lights with a node each.
+    :param lights: numbers of lights that get a node each.
     :param domain: the ROS domain of its own.
     """
 
@@ -60,8 +70,8 @@ class Bench:
     lights: Sequence[int] = (1, 10, 100)
     domain: int = 0
 
-    def amount(self, full: Any, quick: Any) -> Any:
-        """Return the number of samples to take."""
+    def amount(self, full: Amount, quick: Amount) -> Amount:
+        """Return the amount of work: the second one for a quick run."""
         return quick if self.quick else full
 
     def say(self, text: str) -> None:
@@ -71,7 +81,7 @@ class Bench:
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Yield a ROS domain that no other test or benchmark on this machine uses."""
+    """Yield a ROS domain that no test and no other benchmark on this machine uses."""
     global _ports
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     with socket.socket(socket.AF_UNIX) as claim:
@@ -81,15 +91,14 @@ def own_domain() -> Iterator[int]:
                 claim.bind(f'\0illuminator_ros_test_domain_{domain}')
                 break
         os.environ['ROS_DOMAIN_ID'] = str(domain)
-        # Ports of the participants 70 and up of the claimed domain (DDSI-RTPS, 9.6.1.1), which are
-        # never used.
+        # The ports of participants 70 and up of the domain (DDSI-RTPS, 9.6.1.1) are free.
         first = 7400 + 250 * domain
         _ports = itertools.cycle(range(first + 150, first + 250))
         yield domain
 
 
 def free_port() -> int:
-    """Return a free UDP port that the system does not assign to others."""
+    """Return an unused UDP port which the system gives to no other socket."""
     for port in itertools.islice(_ports, 100):
         with contextlib.suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
             probe.bind(('127.0.0.1', port))
@@ -99,7 +108,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def running(program: Program) -> Iterator[Program]:
-    """End a program, whatever happens."""
+    """End a program in any case."""
     try:
         yield program
         if program.running:
@@ -108,20 +117,23 @@ def running(program: Program) -> Iterator[Program]:
         program.kill()
 
 
-def bridge(url: str, **parameters: Any) -> Any:
-    """Run the bridge, once it has opened its link."""
+def bridge(
+    url: str, name: str = 'illuminator', **parameters: str | float,
+) -> AbstractContextManager[Program]:
+    """Run the bridge; enter when it has opened its link."""
     given = {'connection_url': url, **parameters}
-    overrides = [text for name, value in given.items() for text in ('-p', f'{name}:={value}')]
-    return _ready(python('illuminator_ros.bridge', '--ros-args', *overrides), 'link open')
+    overrides = [text for key, value in given.items() for text in ('-p', f'{key}:={value}')]
+    return _ready(python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={name}',
+                         *overrides), 'link open')
 
 
-def simulator(url: str, *arguments: str) -> Any:
+def simulator(url: str, *arguments: str) -> AbstractContextManager[Program]:
     """Run simulated lights."""
     return running(python('illuminator_ros.simulator', url, '--plain', *arguments))
 
 
-def peer(name: str, *arguments: str) -> Any:
-    """Run one of ``peers/``, once it has said that it is ready."""
+def peer(name: str, *arguments: str) -> AbstractContextManager[Program]:
+    """Run one of ``peers/``; enter when it is ready."""
     path = PEERS / f'{name}.py'
     return _ready(Program(sys.executable, str(path), *arguments), 'ready')
 
@@ -138,7 +150,7 @@ class Client(SpunNode):
 
     def __init__(self, domain: int) -> None:
         super().__init__(f'bench_{next(_numbers)}', domain)
-        self._clients: dict[str, Any] = {}
+        self._clients: dict[str, RosClient[SetBool.Request, SetBool.Response]] = {}
 
     def __enter__(self) -> Client:
         return self
@@ -146,26 +158,38 @@ class Client(SpunNode):
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def client(self, service: str) -> Any:
+    def client(self, service: str) -> RosClient[SetBool.Request, SetBool.Response]:
         """Return the client of a SetBool service, there or not."""
         if service not in self._clients:
             self._clients[service] = self.node.create_client(SetBool, service)
         return self._clients[service]
 
-    def call(self, service: str, on: bool, patience: float = PATIENCE) -> tuple[float, Any]:
+    def start(self, service: str, on: bool) -> Future[SetBool.Response]:
+        """Call a SetBool service without waiting."""
+        return self.client(service).call_async(SetBool.Request(data=on))
+
+    def call(
+        self, service: str, on: bool, patience: float = PATIENCE,
+    ) -> tuple[float, SetBool.Response | None]:
         """Return the s until the caller has the answer, and the answer; None if none came."""
-        client, answered = self.client(service), threading.Event()
-        began = time.perf_counter()
-        future = client.call_async(SetBool.Request(data=on))
-        future.add_done_callback(lambda future: answered.set())
-        found = answered.wait(patience)
-        return time.perf_counter() - began, future.result() if found else None
+        return _timed(self.client(service), SetBool.Request(data=on), patience)
+
+    def request(
+        self, type_: type[ServiceType[Request, Response]], service: str, request: Request,
+    ) -> tuple[float, Response | None]:
+        """Call a service of any type once; return as :meth:`call` does."""
+        client = self.node.create_client(type_, service)
+        try:
+            client.wait_for_service(PATIENCE)
+            return _timed(client, request, PATIENCE)
+        finally:
+            self.node.destroy_client(client)
 
     def meet(self, service: str, *, success: bool = True) -> None:
         """
         Wait until a service answers, and with success where that is wanted.
 
-        A first call may get lost: the server may hear of it before it knows who asks.
+        The first call may get lost: the server may receive it before it discovers the client.
         """
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
@@ -176,19 +200,33 @@ class Client(SpunNode):
             time.sleep(0.002)
         raise RuntimeError(f'{service} does not answer')
 
-    def subscribe(self, type_: Any, topic: str, take: Callable[[Any], None], qos: Any) -> None:
-        """Take what is published, in the client's thread."""
+    def subscribe(
+        self, type_: type[Message], topic: str, take: Callable[[Message], None],
+        qos: QoSProfile | int,
+    ) -> None:
+        """Call back with each message, in the client's thread."""
         self.node.create_subscription(type_, topic, take, qos)
 
 
+def _timed(
+    client: RosClient[Request, Response], request: Request, patience: float,
+) -> tuple[float, Response | None]:
+    answered = threading.Event()
+    began = time.perf_counter()
+    future = client.call_async(request)
+    future.add_done_callback(lambda future: answered.set())
+    found = answered.wait(patience)
+    return time.perf_counter() - began, future.result() if found else None
+
+
 def cpu(pid: int) -> float:
-    """Return the CPU time that all threads of a process have taken, s."""
+    """Return the CPU time of all threads of a process, s."""
     # The kernel's number for the CPU clock of a process, in nanoseconds; /proc has ticks of 10 ms.
     return time.clock_gettime((~pid << 3) | 2)
 
 
 def settle(pid: int) -> None:
-    """Wait until a process has nothing left to do."""
+    """Wait until a process is idle."""
     until = time.monotonic() + PATIENCE
     before = cpu(pid)
     while time.monotonic() < until:
@@ -196,26 +234,26 @@ def settle(pid: int) -> None:
         if cpu(pid) - before < 0.001:
             return
         before = cpu(pid)
-    raise RuntimeError('a program does not come to rest')
+    raise RuntimeError('a program does not become idle')
 
 
 def memory(pid: int) -> dict[str, float]:
-    """Return what a process takes, MB: Rss, Pss, and Private_Dirty, which is its own alone."""
+    """Return the memory of a process, MB: Rss, Pss, and Private_Dirty (not shared)."""
     lines = Path(f'/proc/{pid}/smaps_rollup').read_text().splitlines()[1:]
     values = {line.split(':')[0]: int(line.split()[1]) * 1024 / 1e6 for line in lines}
     return {name: values[name] for name in ('Rss', 'Pss', 'Private_Dirty')}
 
 
 def udp_queue(port: int) -> tuple[int, int]:
-    """Return the bytes that wait in the socket of a UDP port, and the datagrams it had to drop."""
+    """Return the bytes queued in the socket of a UDP port, and the datagrams that it dropped."""
     for line in Path('/proc/net/udp').read_text().splitlines()[1:]:
         fields = line.split()
         if fields[1].endswith(f':{port:04X}'):
             return int(fields[4].partition(':')[2], 16), int(fields[-1])
-    raise RuntimeError(f'no socket has UDP port {port}')
+    raise RuntimeError(f'UDP port {port} is not bound')
 
 
 def interleaved(names: Sequence[str], rounds: int) -> Iterator[str]:
-    """Yield each name once a round, in alternating order, so that drift affects all."""
+    """Yield each name once a round, in alternating order, so that drift affects all alike."""
     for number in range(rounds):
         yield from names if number % 2 == 0 else reversed(names)

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rows: figures of the bridge, figures of peers, and targets."""
+"""The result of a measurement: our figures, those of peers, and targets."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+import itertools
 import statistics
 
 # Statistic -> value; a single figure is called VALUE.
@@ -29,9 +30,9 @@ QUANTILES = {'p50': 0.5, 'p95': 0.95, 'p99': 0.99}
 @dataclass(frozen=True)
 class Target:
     """
-    A promise: a value that is not to exceed a limit.
+    A value that must not exceed a limit.
 
-    :param text: the promise in words.
+    :param text: the target in words.
     """
 
     text: str
@@ -40,7 +41,7 @@ class Target:
 
     @property
     def met(self) -> bool:
-        """Whether it is kept."""
+        """Whether the value is within the limit."""
         return self.value <= self.limit
 
 
@@ -49,9 +50,8 @@ class Row:
     """
     One measurement.
 
-    :param peers: the same of others, measured in the same run; ratios are to the first.
-    :param samples: all single values of what may be plotted as a distribution, in ``unit``.
-    :param curves: plot -> (x, curve -> y).
+    :param peers: the figures of others, measured in the same run; ratios are to the first.
+    :param spread: the least and the greatest ratio of repeated runs.
     """
 
     what: str
@@ -60,8 +60,7 @@ class Row:
     peers: Mapping[str, Figures] = field(default_factory=dict)
     targets: Sequence[Target] = ()
     note: str = ''
-    samples: Mapping[str, list[float]] = field(default_factory=dict)
-    curves: Mapping[str, tuple[float, Mapping[str, float]]] = field(default_factory=dict)
+    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def ratios(self) -> Figures:
@@ -73,7 +72,7 @@ class Row:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """Return the value that this share of them does not exceed."""
+    """Return the value that this share of the values does not exceed."""
     return sorted(values)[min(int(share * len(values)), len(values) - 1)]
 
 
@@ -92,13 +91,36 @@ def middle(values: Sequence[float]) -> Figures:
     return one(statistics.median(values))
 
 
-def times(ours: Figures, peer: Figures, limit: float, name: str = VALUE) -> Target:
-    """Promise that a figure is at most so many times the peer's."""
+def times(ours: Figures, peer: Figures, limit: float, name: str = VALUE,
+          whose: str = 'the peer') -> Target:
+    """Limit the ratio of a figure to the peer's."""
     ratio = f'1/{1 / limit:g} of' if limit < 1 else f'{limit:g} times'
     label = '' if name == VALUE else f'{name} '
-    return Target(f'{label}at most {ratio} the peer', ours[name] / peer[name], limit)
+    return Target(f'{label}at most {ratio} {whose}', ours[name] / peer[name], limit)
 
 
 def at_most(value: float, limit: float, unit: str) -> Target:
-    """Promise that a figure does not exceed a limit."""
+    """Limit a figure itself."""
     return Target(f'at most {limit:g} {unit}' if limit else f'0 {unit}', value, limit)
+
+
+def median_of(runs: Sequence[Sequence[Row]]) -> list[Row]:
+    """Return a row for each of repeated runs: medians, judged targets, and ranges of ratios."""
+    found: dict[str, list[Row]] = {}
+    for row in itertools.chain.from_iterable(runs):
+        found.setdefault(row.what, []).append(row)
+    return [_median(rows) if len(rows) > 1 else rows[0] for rows in found.values()]
+
+
+def _median(rows: Sequence[Row]) -> Row:
+    def figures(each: Iterable[Figures]) -> Figures:
+        listed = list(each)
+        return {name: statistics.median(one[name] for one in listed) for name in listed[0]}
+
+    return replace(
+        rows[0], ours=figures(row.ours for row in rows),
+        peers={name: figures(row.peers[name] for row in rows) for name in rows[0].peers},
+        targets=[replace(target, value=statistics.median(row.targets[at].value for row in rows))
+                 for at, target in enumerate(rows[0].targets)],
+        spread={name: (min(row.ratios[name] for row in rows),
+                       max(row.ratios[name] for row in rows)) for name in rows[0].ratios})

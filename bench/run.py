@@ -16,14 +16,15 @@
 """
 Measures the bridge beside its peers, and prints each figure with its target.
 
-    make bench                                  everything, 5 minutes; needs ROS (rclpy)
+    make bench                                  all of it, 5 minutes; needs ROS (rclpy)
     python3 bench/run.py --only enable status   these subjects
-    python3 bench/run.py --json run.json        keep every figure
-    python3 bench/run.py --from run.json --markdown --plot DIR    show a kept run
+    python3 bench/run.py --repeat 3             targets judged by the median of three runs
+    python3 bench/run.py --json run.json        and keep all figures
+    python3 bench/run.py --from run.json --markdown    show a run that was kept
 
 Exit status: 0; 1 if a measurement fails, or with --check if a target is missed; 2 if an argument
-is wrong. Other load on the machine distorts figures, so a missed target is
-reported, but is a failure only with --check.
+is wrong. Measure on a machine without other load. A missed target is printed; it is a failure
+with --check only.
 """
 
 from __future__ import annotations
@@ -44,20 +45,20 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 from bench.report import as_json, from_json, lines, machine, markdown  # noqa: E402
-from bench.rows import Row  # noqa: E402
+from bench.rows import median_of, Row  # noqa: E402
 from bench.subjects import SUBJECTS  # noqa: E402
 
 
 def measure(
-    names: Sequence[str], to: TextIO, **wanted: Any,
+    names: Sequence[str], to: TextIO, **options: Any,
 ) -> tuple[list[Row], dict[str, float], list[str]]:
     """
-    Return the rows of some subjects, the s that each took, and those that failed.
+    Return the rows of some subjects, the s that each took, and the subjects that failed.
 
-    :param to: where each row is printed at once.
-    :param wanted: see :class:`bench.rig.Bench`.
+    :param to: rows are printed here as they come.
+    :param options: see :class:`bench.rig.Bench`.
     """
-    # Slow, and not needed to show a kept run.
+    # Slow, and not needed to show a run that was kept.
     from bench.rig import Bench, own_domain
 
     rows: list[Row] = []
@@ -65,7 +66,7 @@ def measure(
     failed = []
     with tempfile.TemporaryDirectory() as home, own_domain() as domain:
         os.environ['ROS_HOME'] = home
-        bench = Bench(domain=domain, **wanted)
+        bench = Bench(domain=domain, **options)
         for number, name in enumerate(names, 1):
             bench.say(f'{number}/{len(names)} {name}: {SUBJECTS[name]}')
             began = time.monotonic()
@@ -74,7 +75,7 @@ def measure(
                     rows.append(row)
                     print('\n'.join(lines(row)), file=to, flush=True)
             except Exception as error:
-                # Measure the other subjects all the same.
+                # The other subjects are measured all the same.
                 failed.append(name)
                 print(f'{name} FAILED: {error!r}', file=sys.stderr, flush=True)
                 if bench.quick:
@@ -90,20 +91,20 @@ def parser() -> argparse.ArgumentParser:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog=f'subjects:\n{subjects}')
     result.add_argument('--only', nargs='+', choices=SUBJECTS, metavar='SUBJECT',
-                        help='measure only these')
+                        help='measure these only')
     result.add_argument('--quick', action='store_true',
-                        help='take as few samples as possible, to test the benchmark')
+                        help='do as little as possible, to test the benchmark itself')
+    result.add_argument('--repeat', type=int, default=1, metavar='N',
+                        help='measure N times: medians, and the range of each ratio')
     result.add_argument('--soak', type=float, default=15.0, metavar='SECONDS',
-                        help='length of the soak (default: %(default)g)')
+                        help='time in which memory must not grow (default: %(default)g)')
     result.add_argument('--lights', type=int, nargs='+', default=[1, 10, 100], metavar='N',
                         help='numbers of lights for the subject nodes (default: 1 10 100)')
     result.add_argument('--json', type=Path, metavar='FILE', help='write all figures here')
-    result.add_argument('--plot', type=Path, metavar='DIR',
-                        help='draw PNGs here; needs matplotlib (pip install .[bench])')
     result.add_argument('--markdown', action='store_true',
                         help='print the table of doc/performance.md')
     result.add_argument('--from', dest='stored', type=Path, metavar='FILE',
-                        help='show a file of --json instead of measuring')
+                        help='measure nothing, show the file that --json wrote')
     result.add_argument('--check', action='store_true',
                         help='exit with 1 if a target is missed')
     return result
@@ -112,9 +113,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run it; return the exit status."""
     options = parser().parse_args(arguments)
-    # A background shell has SIGINT ignored, which child processes would inherit.
+    # A shell that starts it in the background ignores SIGINT, for its children too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    # With --markdown only the table goes to stdout.
+    # With --markdown, stdout has the table only.
     to = sys.stderr if options.markdown else sys.stdout
     about: dict[str, Any]
     failed: list[str] = []
@@ -126,23 +127,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         about = machine()
         names = options.only or list(SUBJECTS)
-        rows, took, failed = measure(
-            names, to, quick=options.quick, soak=options.soak, lights=options.lights)
+        runs = []
+        for number in range(options.repeat):
+            if options.repeat > 1:
+                print(f'run {number + 1} of {options.repeat}', file=to)
+            rows, took, missing = measure(
+                names, to, quick=options.quick, soak=options.soak, lights=options.lights)
+            runs.append(rows)
+            failed += missing
+        rows = median_of(runs)
+        if options.repeat > 1:
+            print(f'median of {options.repeat} runs', file=to)
+            print('\n'.join(line for row in rows for line in lines(row)), file=to)
     if options.json:
         options.json.write_text(json.dumps(as_json(rows, about, took), indent=1) + '\n')
     if options.markdown:
         print(markdown(rows, about))
-    if options.plot:
-        from bench.plot import draw
-        for path in draw(rows, options.plot):
-            print(path)
     targets = [(row, target) for row in rows for target in row.targets]
     missed = [(row, target) for row, target in targets if not target.met]
     print(f'{len(targets) - len(missed)} of {len(targets)} targets met, {len(rows)} rows, '
           f'{sum(took.values()):.0f} s', *(f'FAILED: {name}' for name in failed), sep='; ',
           file=to)
     if options.quick:
-        print('  --quick: too little was measured for the figures to mean anything', file=to)
+        print('  --quick: the figures mean nothing', file=to)
     for row, target in missed:
         print(f'  missed: {row.what}: {target.text} ({target.value:.3g}, limit '
               f'{target.limit:.3g})', file=to)

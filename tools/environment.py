@@ -44,9 +44,7 @@ ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
 PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'rich>=13.3']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.5', 'hypothesis>=6.100',
         'pyyaml>=6', 'wheel>=0.38', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
-        'catkin_pkg>=0.5',
-        # Draws the plots of the benchmark, which would rot untested.
-        'matplotlib>=3.9']
+        'catkin_pkg>=0.5']
 # ROS's linters, which a ROS installation has, and the plugins for flake8 that rosdep and setup-ros
 # install with them. flake8-builtins as in Ubuntu 24.04: later ones have rules that ROS does not.
 LINT = ['ros-ament-lint>=0.17', 'ros-ament-flake8>=0.17', 'ros-ament-pep257>=0.17', 'flake8>=7',

@@ -14,30 +14,20 @@
 
 """One file for each subject, with a function ``measure`` that yields its rows."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
-# In the order of the runs.
+# In the order in which they are run.
 SUBJECTS = {
-    'enable': 'time of a call of ~/enable',
-    'status': 'time from a status to a subscriber',
-    'foreign': 'CPU for frames of others on the link',
-    'busy': '~/enable beside frames of others',
-    'burst': 'frames lost from a burst',
+    'enable': 'the time that ~/enable takes, and 50 clients at the same moment',
+    'status': 'the time from a status on the wire to a subscriber',
+    'foreign': 'CPU for the frames of others on the link',
+    'burst': 'frames lost of a burst',
     'noise': 'frames recovered from noise',
-    'memory': 'memory above that of an empty node',
-    'soak': 'whether memory stays flat',
-    'startup': 'time from the start of the process to an answer',
-    'overhead': 'bytes that the bridge adds to a link',
+    'memory': 'memory of the bridge above an empty node, and its growth',
+    'startup': 'the time from the start of the process to service',
+    'overhead': 'the bytes that the bridge adds to a link',
     'lights': 'CPU for a status with many lights on one link',
     'nodes': 'many nodes in one process',
-    'rates': 'CPU with a status at 1, 10 and 50 Hz',
-    'serial_line': 'a slow and a fast serial line, used by others too',
-    'reconnection': 'time until a link is open again',
+    'reconnection': 'the time until the link is up again',
     'loss': 'commands through loss',
-    'parallel': 'effect of a silent light on others',
+    'parallel': 'the delay that a silent light causes to others',
+    'limits': 'the documented time limits',
 }
-# Without promises.py its subject is left out.
-if Path(__file__).parents[1].joinpath('promises.py').exists():
-    SUBJECTS['promises'] = 'documented time limits'

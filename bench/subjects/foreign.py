@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-CPU time for a foreign frame, on a line that an autopilot uses too.
+CPU time for a frame of another component, on a link that an autopilot uses too.
 
-The peers are pymavlink's ``recv_match`` and a loop that only reads; the idle CPU time of each is
-subtracted.
+Of the bridge, of pymavlink's ``recv_match``, and of a loop that only reads; each
+without its CPU time at rest.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from ..traffic import frames, Line, SerialPort, TcpListener, udp_line
 
 OURS, RECV_MATCH, BARE = 'bridge', 'recv_match', 'bare receive loop'
 BAUD = 921_600
-# Frames a second (0: saturated), and frames in a block.
+# Frames a second (0: as many as the receiver takes) -> frames in a block.
 RATES = {500: 350, 5000: 2500, 0: 6000}
-# The rates with a target; at 500 a second waking up costs most.
+# The rates with targets: at 500 a second, waking up costs more than the frame.
 BUSY = (5000, 0)
 TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 8, 'serial': 1 / 8}
 
 
 class Receiver:
-    """A receiving program and its CPU times."""
+    """A receiver and its CPU time."""
 
     def __init__(self, program: Program, line: Line) -> None:
         self.program, self.line = program, line
@@ -47,18 +47,18 @@ class Receiver:
         self._idle = 0.0
 
     def rest(self, seconds: float) -> None:
-        """Note what it takes when nothing comes."""
+        """Measure the CPU time at rest."""
         before, began = cpu(self.program.pid), time.monotonic()
         time.sleep(seconds)
         self._idle = (cpu(self.program.pid) - before) / (time.monotonic() - began)
 
     @property
     def at_rest(self) -> float:
-        """Return what it takes when nothing comes, % of a core."""
+        """Return the CPU time at rest, % of a core."""
         return 100 * self._idle
 
     def measure(self, prepared: list[bytes], rate: int, count: int) -> None:
-        """Feed it and note what a frame takes."""
+        """Send frames and measure the CPU time of each."""
         before, began = cpu(self.program.pid), time.monotonic()
         self.line.feed(prepared, rate, count)
         settle(self.program.pid)
@@ -118,15 +118,10 @@ def over(bench: Bench, transport: str) -> Iterator[Row]:
                 fed[name].measure(prepared, rate, bench.amount(count, 20))
     rest = {name: receiver.at_rest for name, receiver in fed.items()}
     yield Row(f'CPU with nothing coming in, {transport}', '%', one(rest[OURS]),
-              {RECV_MATCH: one(rest[RECV_MATCH]), BARE: one(rest[BARE])},
-              curves={f'foreign {transport}': (0.0, rest)})
+              {RECV_MATCH: one(rest[RECV_MATCH]), BARE: one(rest[BARE])})
     for rate in RATES:
         ours, *others = (middle(receiver.costs[rate]) for receiver in fed.values())
         peers = dict(zip((RECV_MATCH, BARE), others, strict=True))
         speed = f'{rate:,} frames/s' if rate else 'saturated'
-        curves = {f'foreign {transport}': (float(rate), {
-            name: fed[name].at_rest + cost['value'] * rate / 1e4
-            for name, cost in ((OURS, ours), *peers.items())})} if rate else {}
         targets = [times(ours, peers[RECV_MATCH], TARGETS[transport])] if rate in BUSY else []
-        yield Row(f'CPU for a foreign frame, {transport}, {speed}', 'us', ours, peers, targets,
-                  curves=curves)
+        yield Row(f'CPU for a foreign frame, {transport}, {speed}', 'us', ours, peers, targets)

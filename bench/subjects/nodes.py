@@ -12,33 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""1, 10 and more lights, a node for each in one process, as another process sees them."""
+"""1, 10 and more lights, a node for each in one process, as other processes see them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 import time
 
 from ..rig import Bench, bridge, Client, cpu, free_port, memory, PATIENCE, simulator
-from ..rows import one, quantiles, Row
+from ..rows import at_most, Figures, one, quantiles, Row, times
 
 CALLS = 150
 MEASURED = 3.0
+# Limits for 100 lights and fewer: MB, threads, s.
+MEMORY, THREADS, DISCOVERY = 160.0, 20, 3.0
 
 
 def seen(client: Client, names: list[str]) -> float:
-    """Return the s until a participant knows the services of all nodes."""
+    """Return the s until a participant has discovered the services of all nodes."""
     began = time.monotonic()
     clients = [client.client(f'/{name}/enable') for name in names]
     while not all(one.service_is_ready() for one in clients):
         if time.monotonic() > began + PATIENCE:
-            raise RuntimeError('not all nodes are seen')
+            raise RuntimeError('not all nodes are discovered')
         time.sleep(0.02)
     return time.monotonic() - began
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Start a bridge for each number of lights."""
+    """Start the bridge anew for each number of lights."""
+    alone: Figures = {}
     for count in bench.amount(bench.lights, (2,)):
         port = free_port()
         names = ['illuminator', *(f'illuminator_2_{n}' for n in range(2, count + 1))]
@@ -46,23 +50,26 @@ def measure(bench: Bench) -> Iterator[Row]:
         with (simulator(f'udpout://127.0.0.1:{port}', *arguments),
               bridge(f'udpin://127.0.0.1:{port}', target_component=1) as program):
             with Client(bench.domain) as first:
-                there = seen(first, names)
+                seen(first, names)
             with Client(bench.domain) as newcomer:
-                late = seen(newcomer, names)
+                discovery = seen(newcomer, names)
             with Client(bench.domain) as client:
                 client.meet('/illuminator/enable')
                 time.sleep(bench.amount(2.0, 0.0))
                 before = cpu(program.pid)
                 time.sleep(bench.amount(MEASURED, 0.1))
                 share = 100 * (cpu(program.pid) - before) / bench.amount(MEASURED, 0.1)
-                calls = [client.call('/illuminator/enable', bool(number % 2))[0] * 1e3
-                         for number in range(bench.amount(CALLS, 3))]
+                calls = quantiles([client.call('/illuminator/enable', bool(number % 2))[0] * 1e3
+                                   for number in range(bench.amount(CALLS, 3))])
             taken = memory(program.pid)['Rss']
+            threads = len(list(Path(f'/proc/{program.pid}/task').iterdir()))
+        alone = alone or calls
         kind = f'nodes in one process: {count}'
-        yield Row(f'CPU, {kind}', '%', one(share), note='each light at 1 Hz',
-                  curves={'lights': (float(count), {'bridge': share})})
-        yield Row(f'memory, {kind}', 'MB', one(taken),
-                  curves={'memory': (float(count), {'bridge': taken})})
-        yield Row(f'~/enable of the first, {kind}', 'ms', quantiles(calls))
-        yield Row(f'until all are seen, {kind}', 's', one(there),
-                  note=f'by a newcomer in {late:.1f} s')
+        yield Row(f'CPU, {kind}', '%', one(share), note='each light at 1 Hz')
+        yield Row(f'memory, {kind}', 'MB', one(taken), targets=[at_most(taken, MEMORY, 'MB')])
+        yield Row(f'threads, {kind}', '', one(threads),
+                  targets=[at_most(threads, THREADS, 'threads')])
+        yield Row(f'~/enable of the first, {kind}', 'ms', calls, {'the smallest number': alone},
+                  [times(calls, alone, 1.2, 'p50')] if calls is not alone else [])
+        yield Row(f'discovery of all by a new participant, {kind}', 's', one(discovery),
+                  targets=[at_most(discovery, DISCOVERY, 's')])

@@ -58,10 +58,6 @@ def run_program(
 
 def explained(name: str, run: Callable[[], int]) -> int:
     """Run a program and return its exit status; name the package that is missing."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            # A name that the encoding lacks must not end the program.
-            stream.reconfigure(errors='backslashreplace')
     try:
         return run()
     except ModuleNotFoundError as error:

@@ -12,11 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The benchmark works: every subject yields its rows. What the figures are is not looked at."""
+"""The benchmark measures each subject; its figures are not checked."""
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 import json
 import math
 from pathlib import Path
@@ -28,8 +29,9 @@ from bench.subjects import SUBJECTS
 import pytest
 from support.processes import environment, ROOT
 
+Rows = list[dict[str, Any]]
 AT_ONCE = 4
-# Peers that must stand beside ours.
+# Peers that each subject must measure.
 BESIDE = {
     'enable': {'empty SetBool server', 'straightforward script'},
     'status': {'bare publisher and subscriber', 'a datagram in, a message out'},
@@ -51,16 +53,16 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope='module')
-def runs(tmp_path_factory):
-    """Return for each subject a run that is under way: most of it is waiting."""
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future[Rows]]]:
+    """Return for each subject a run that is in progress; most of a run is waiting."""
     directory = tmp_path_factory.mktemp('runs')
     with ThreadPoolExecutor(AT_ONCE) as pool:
         yield {subject: pool.submit(measured, subject, directory / f'{subject}.json')
                for subject in SUBJECTS}
 
 
-def measured(subject: str, path: Path) -> list[dict[str, Any]]:
-    """Return the rows of a subject, as they are written."""
+def measured(subject: str, path: Path) -> Rows:
+    """Return the rows of a subject, as the benchmark writes them."""
     result = run('--quick', '--only', subject, '--json', str(path))
     assert result.returncode == 0, result.stdout + result.stderr
     return list(json.loads(path.read_text())['rows'])
@@ -68,7 +70,9 @@ def measured(subject: str, path: Path) -> list[dict[str, Any]]:
 
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize('subject', SUBJECTS)
-def test_each_subject_is_measured(subject, runs):
+def test_subject_yields_rows_with_its_peers(
+    subject: str, runs: dict[str, Future[Rows]],
+) -> None:
     rows = runs[subject].result()
     assert rows
     for row in rows:
@@ -79,7 +83,7 @@ def test_each_subject_is_measured(subject, runs):
     assert BESIDE.get(subject, set()) <= {name for row in rows for name in row['peers']}
 
 
-def test_a_subject_that_does_not_exist_is_a_wrong_argument():
+def test_unknown_subject_is_a_usage_error() -> None:
     result = run('--only', 'nothing')
     assert result.returncode == 2
     assert "'nothing'" in result.stderr

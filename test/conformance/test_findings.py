@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A check that cannot fail is worth nothing: each fault is found, by the check that is for it."""
+"""Each fault of a light is found by the requirement that covers it, and by no other."""
 
 from dataclasses import replace
 import math
@@ -21,11 +21,9 @@ from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.model import Limits, Mode
-from illuminator_ros.illuminator.simulated_properties import (
-    IlluminatorBehaviour,
-    IlluminatorProperties,
-)
-from illuminator_ros.mavlink.messages import Address, MavCmd
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
+from illuminator_ros.illuminator.simulated_settings import properties
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
 import pytest
 from support.conformance_run import Run
@@ -35,7 +33,7 @@ ACCEPTED_CHANGES = {'on', 'off', 'mode-internal', 'mode-external', 'brightness',
 DENIED_VALUES = {'on-off-values', 'mode-values', 'brightness-values', 'strobe-values',
                  'duty-cycle-values', 'not-a-number'}
 
-# The fault, and exactly what is found.
+# Fault -> all requirements that fail.
 SEEDED = {
     'silence': {'heartbeat'},
     'reboot': {'uptime', 'interval-stop'},
@@ -45,7 +43,7 @@ SEEDED = {
     'progress': {'finished'},
     'busy': {'not-busy'},
     'slow': {'acknowledged-promptly'},
-    # It is off when it is told to be.
+    # It is already off when it is switched off.
     'lie': ACCEPTED_CHANGES - {'off'} | {'status-agrees'},
     'heartbeat': {'heartbeat-rate'},
     'type': {'heartbeat-type'},
@@ -70,13 +68,13 @@ SEEDED = {
     'flags=0x80': {'flags-at-rest'},
     'cold-throttling': {'thermal-flags'},
 }
-# What befalls messages by chance is found by the check that is for it, and may show elsewhere.
-BY_CHANCE = {
+# Random fault -> a requirement that fails; others may fail, too.
+RANDOM = {
     'drop': 'acknowledged', 'duplicate': 'acknowledged-once', 'delay': 'acknowledged-promptly',
     'corrupt': 'checksums',
 }
-# What no fault but the properties of a light bring about.
-BUILT_IN = {
+# Requirement -> a light that does not meet it, without a fault.
+PROPERTIES = {
     'address': IlluminatorProperties(address=Address(255, 0)),
     'status-stream': IlluminatorProperties(status_interval=0.0),
     'status-mode': IlluminatorProperties(mode_bitmask=0),
@@ -84,83 +82,98 @@ BUILT_IN = {
     'information-text': IlluminatorProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
     'mode-internal': IlluminatorProperties(modes=()),
 }
+# Profile -> all requirements that fail.
+DEVIATIONS = {
+    'default': set(),
+    'extended': set(),
+    'reference': {'address', 'information-terminated', 'other-target', 'command-int',
+                  'not-a-number', 'interval', 'uptime'},
+    'ardusub': {'heartbeat-type', 'heartbeat-autopilot', 'information-request', 'not-a-number'},
+}
 
 
 @pytest.mark.parametrize('fault', SEEDED)
-def test_a_fault_is_found_by_the_check_that_is_for_it_and_by_no_other(fault):
+def test_a_fault_fails_exactly_its_requirements(fault):
     assert Run(faults=(fault,)).finish().failed == SEEDED[fault]
 
 
-@pytest.mark.parametrize('fault', BY_CHANCE)
+@pytest.mark.parametrize('fault', RANDOM)
 @pytest.mark.parametrize('seed', range(3))
-def test_what_befalls_messages_by_chance_is_found_and_named(fault, seed):
+def test_a_random_fault_fails_its_requirement(fault, seed):
     run = Run(IlluminatorProperties(seed=seed), faults=(fault,)).finish()
-    assert BY_CHANCE[fault] in run.failed
+    assert RANDOM[fault] in run.failed
 
 
-@pytest.mark.parametrize('name', BUILT_IN)
-def test_what_a_light_is_made_like_is_found(name):
-    assert name in Run(BUILT_IN[name]).finish().failed
+@pytest.mark.parametrize('name', PROPERTIES)
+def test_properties_out_of_order_fail_their_requirement(name):
+    assert name in Run(PROPERTIES[name]).finish().failed
 
 
-def test_a_value_that_cannot_be_is_found():
+@pytest.mark.parametrize('profile', PROFILES)
+def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile):
+    run = Run(properties({'profile': profile}, PROFILES[profile].address)).finish()
+    assert run.failed == DEVIATIONS[profile]
+    assert run.suite.restored == 'the light is as it was'
+
+
+def test_every_fault_is_seeded_and_every_requirement_can_fail():
+    assert set(FAULTS) == {name.partition('=')[0] for name in SEEDED} | set(RANDOM)
+    assert {one.name for one in REQUIREMENTS} == set().union(
+        *SEEDED.values(), RANDOM.values(), PROPERTIES, {'status-content'})
+
+
+def test_a_status_with_nan_fails_status_content():
     run = Run()
     run.lamp.configuration = replace(run.lamp.configuration, brightness=math.nan)
     assert run.finish().failed == {'status-content'}
 
 
-def test_every_fault_is_seeded():
-    assert set(FAULTS) == {name.partition('=')[0] for name in SEEDED} | set(BY_CHANCE)
+def test_a_hot_light_without_faults_meets_every_requirement():
+    run = Run(IlluminatorProperties(time_scale=120.0)).finish()
+    assert run.names(Verdict.PASS) == {one.name for one in REQUIREMENTS}
+    assert run.suite.passed
+    assert 'thermal throttling from' in run.result('thermal-flags').detail
 
 
-def test_every_requirement_can_fail():
-    found = set().union(*SEEDED.values()) | set(BY_CHANCE.values()) | set(BUILT_IN)
-    assert {one.name for one in REQUIREMENTS} == found | {'status-content'}
-
-
-def test_a_restart_in_the_middle_of_a_run_is_found():
+def test_a_restart_during_the_run_fails_uptime():
     run = Run()
     run.link.run(12.0)
     run.light.restart(run.link.now)
     assert 'uptime' in run.finish().failed
 
 
-def test_a_light_that_falls_silent_in_the_middle_is_found_and_the_rest_is_skipped():
+def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped():
     run = Run()
     run.link.run(8.0)
-    run.light.behave(replace(run.light.behaviour, silence=math.inf), run.link.now)
+    run.fault('silence')
     run.finish()
     assert {'heartbeat-rate', 'acknowledged'} < run.failed
     assert run.result('thermal-flags').detail == 'the light has stopped sending'
 
 
-def test_a_light_that_has_accepted_what_it_must_not_is_set_right_before_the_next_try():
+def test_an_accepted_invalid_value_is_corrected_before_the_next_one():
     run = Run(faults=('anything',)).finish()
-    configured = [one for one in run.session.transactions if one.command == 406]
-    brightness = next(i for i, one in enumerate(configured) if one.text.endswith('1 -1 0 0'))
-    assert configured[brightness + 1].text.endswith(' 1 10 0 0')
+    configured = [one.text for one in run.session.transactions if one.command == 406]
+    invalid = next(i for i, text in enumerate(configured) if text.endswith('1 -1 0 0'))
+    assert configured[invalid + 1].endswith(' 1 10 0 0')
 
 
-def test_a_second_acknowledgement_is_not_taken_for_that_of_the_next_command():
+def test_a_duplicate_acknowledgement_is_not_counted_for_the_next_command():
     run = Run(faults=('duplicate=1',)).finish()
-    for one in run.session.transactions:
-        assert len(one.finals) <= 2
-    assert 'on-off-values' not in run.failed
-    assert all(len(one.finals) == 2 for one in run.session.transactions if one.expected)
+    assert {len(one.finals) for one in run.session.transactions if one.expected} == {2}
 
 
 @pytest.mark.parametrize(('name', 'contradiction'), [
     ('on', 'in enable: off'), ('mode-internal', 'in brightness: off'),
     ('mode-external', 'in mode and brightness: off'), ('brightness', 'in brightness: off')])
-def test_a_change_that_is_accepted_but_not_shown_is_found_where_it_was_asked_for(
-        name, contradiction):
+def test_an_accepted_change_that_the_status_contradicts_fails(name, contradiction):
     result = Run(faults=('lie',), only=(name,)).finish().result(name)
     assert result.verdict is Verdict.FAIL
     assert ('MAV_RESULT_ACCEPTED, but then the status differs ' + contradiction) in result.detail
     assert '< ILLUMINATOR_STATUS off' in result.exchange[-1]
 
 
-def test_a_light_that_cannot_be_brought_back_from_external_sync_does_not_take_internal_control():
+def test_a_light_that_stays_in_external_sync_fails_mode_internal():
     run = Run(only=('mode-internal', 'mode-external'))
     apply = run.light.apply
 
@@ -174,62 +187,37 @@ def test_a_light_that_cannot_be_brought_back_from_external_sync_does_not_take_in
     assert 'then the status differs in mode' in run.result('mode-internal').detail
 
 
-def test_a_light_that_knows_internal_control_only_takes_it():
-    run = Run(IlluminatorProperties(modes=(Mode.INTERNAL_CONTROL,)), only=('mode-internal',))
-    assert run.finish().result('mode-internal').verdict is Verdict.PASS
+@pytest.mark.parametrize(('light', 'only'), [
+    (IlluminatorProperties(modes=(Mode.INTERNAL_CONTROL,)), 'mode-internal'),
+    *((IlluminatorProperties(), name) for name in ('on', 'off', 'brightness'))])
+def test_one_requirement_alone_passes(light, only):
+    assert Run(light, only=(only,)).finish().names(Verdict.PASS) == {only}
 
 
-def test_a_light_that_stays_on_is_not_switched_off():
-    run = Run(faults=('lie',), only=('on', 'off'))
-    run.press(enabled=True)
+@pytest.mark.parametrize(('on', 'name', 'other'), [(True, 'on', 'off'), (False, 'off', 'on')])
+def test_a_state_that_cannot_be_left_does_not_count_as_reached(on, name, other):
+    run = Run(faults=('lie',), only=('on', 'off') if on else ('off',))
+    run.press(enabled=on)
     run.finish()
-    assert run.failed == {'off'}
-    assert 'could not be switched off before' in run.result('on').detail
+    assert run.failed == ({'off'} if on else set())
+    assert f'could not be switched {other} before' in run.result(name).detail
 
 
-def test_that_a_light_was_off_anyway_does_not_count_as_switched_off():
-    result = Run(faults=('lie',), only=('off',)).finish().result('off')
-    assert result.verdict is Verdict.SKIPPED
-    assert 'could not be switched on before' in result.detail
-
-
-@pytest.mark.parametrize('name', ['on', 'off', 'brightness'])
-def test_one_requirement_alone_is_met_by_a_light_that_meets_it(name):
-    assert Run(only=(name,)).finish().result(name).verdict is Verdict.PASS
-
-
-def test_what_a_light_accepts_counts_as_done_where_it_reports_no_status():
+def test_an_accepted_change_passes_where_the_light_reports_no_status():
     run = Run(IlluminatorProperties(status_interval=0.0), faults=('lie',), only=('on',))
-    asked = run.session.command
-
-    async def last_status_before(command, *params, **options):
-        if command == MavCmd.ILLUMINATOR_ON_OFF and params == (1.0,):
-            run.fault('no-request')
-        return await asked(command, *params, **options)
-    run.session.command = last_status_before
+    run.link.run_until(lambda: any(
+        one.text.endswith('ON_OFF 1') for one in run.session.transactions), within=60.0)
+    run.fault('no-request')
     assert run.finish().result('on').verdict is Verdict.PASS
 
 
-def test_thermal_flags_that_go_with_the_temperature_are_in_order():
-    run = Run(IlluminatorProperties(time_scale=60.0), heat=20.0).finish()
-    assert run.result('thermal-flags').verdict.value == 'PASS'
-    assert 'thermal throttling from' in run.result('thermal-flags').detail
-
-
-def test_the_reason_and_what_was_said_stand_in_the_finding():
-    run = Run(faults=('anything',)).finish()
-    result = run.result('brightness-values')
-    assert 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101 0 0: MAV_RESULT_ACCEPTED' in result.detail
-    sent, came = result.exchange[-2:]
-    assert '> COMMAND_LONG to 1/243: MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101' in sent
-    assert '< COMMAND_ACK MAV_CMD_DO_ILLUMINATOR_CONFIGURE: MAV_RESULT_ACCEPTED' in came
-
-
-def test_a_light_without_faults_behaves_as_the_protocol_says():
-    assert IlluminatorProperties().behaviour == IlluminatorBehaviour()
-
-
-def test_a_change_that_is_in_progress_for_ever_does_not_hold_up_the_run():
+def test_a_change_in_progress_for_ever_does_not_delay_the_run():
     run = Run(faults=('progress=3600',), only=('on', 'off')).finish()
     assert run.failed == {'on', 'off'}
     assert 'no acknowledgement' in run.result('on').detail
+
+
+def test_a_light_without_strobe_limits_is_not_made_to_strobe():
+    run = Run(properties({'profile': 'ardusub'}, PROFILES['ardusub'].address)).finish()
+    assert {'strobe', 'strobe-values', 'duty-cycle'} < run.names(Verdict.SKIPPED)
+    assert 'reports no strobe limits' in run.result('strobe').detail

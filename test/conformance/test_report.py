@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a run has found, for people and for programs."""
+"""The reports of a run: table, JSON, JUnit."""
 
 import json
 from xml.etree import ElementTree
@@ -45,7 +45,12 @@ def report(run):
                   tuple(run.suite.results), run.suite.restored, 12.5, run.suite.passed)
 
 
-def test_the_json_report_has_every_requirement_with_all_that_was_said(report):
+def shown(run):
+    table = Table()
+    return [line for one in run.suite.results for line in table.add(one)] + table.end()
+
+
+def test_the_json_report_has_every_requirement_with_its_messages(report):
     content = json.loads(as_json(report))
     assert [one['name'] for one in content['results']] == [one.name for one in REQUIREMENTS]
     (nan,) = [one for one in content['results'] if one['name'] == 'not-a-number']
@@ -56,19 +61,15 @@ def test_the_json_report_has_every_requirement_with_all_that_was_said(report):
     assert any('< COMMAND_ACK' in line for line in nan['exchange'])
     assert content['counts']['FAIL'] == 3
     assert content['passed'] is False
-    assert content['restored'] == 'the light is as it was'
+    assert (content['light'], content['restored']) == (report.device, 'the light is as it was')
 
 
-def test_the_junit_report_counts_as_the_run_did(report):
+def test_the_junit_report_has_counts_reasons_and_sections(report):
     suite = ElementTree.fromstring(as_junit(report))
-    assert suite.tag == 'testsuite'
+    assert (suite.tag, suite.get('name')) == ('testsuite', 'illuminator conformance')
     assert int(suite.get('tests')) == len(suite.findall('testcase')) == len(REQUIREMENTS)
     assert int(suite.get('failures')) == len(suite.findall('testcase/failure')) == 3
     assert int(suite.get('skipped')) == len(suite.findall('testcase/skipped')) == 1
-
-
-def test_the_junit_report_says_what_is_wrong_and_where_it_is_written(report):
-    suite = ElementTree.fromstring(as_junit(report))
     (case,) = [one for one in suite.findall('testcase')
                if one.get('name').startswith('other-target: ')]
     assert case.get('classname') == 'routing'
@@ -77,73 +78,54 @@ def test_the_junit_report_says_what_is_wrong_and_where_it_is_written(report):
     assert 'COMMAND_LONG to 1/200' in case.find('system-out').text
 
 
-def test_the_table_has_a_line_for_what_is_met(run):
+def test_the_table_has_reason_section_and_messages_of_a_failed_requirement(run):
     assert lines(run.result('off')) == ['PASS    off                    can be switched off']
-
-
-def test_the_table_says_of_what_is_not_met_what_is_wrong_what_was_said_and_the_section(run):
-    first, reason, section, *said = lines(run.result('other-target'))
+    first, reason, section, *messages = lines(run.result('other-target'))
     assert first.startswith('FAIL    other-target')
     assert 'switched on by a command for 1/200' in reason
     assert section.strip() == ('see routing, "Routing Detail": '
                                'https://mavlink.io/en/guide/routing.html')
-    assert '> COMMAND_LONG to 1/200: MAV_CMD_ILLUMINATOR_ON_OFF 1' in said[0]
-    assert not any(' HEARTBEAT ' in line for line in said)
+    assert '> COMMAND_LONG to 1/200: MAV_CMD_ILLUMINATOR_ON_OFF 1' in messages[0]
+    assert not any(' HEARTBEAT ' in line for line in messages)
+    assert 'set no flag; try a longer --heat' in lines(run.result('thermal-flags'))[1]
 
 
-def test_the_table_says_why_something_was_skipped(run):
-    assert 'no flag; try a longer --heat' in lines(run.result('thermal-flags'))[1]
+def test_a_finding_has_the_reason_and_the_messages():
+    result = Run(faults=('anything',)).finish().result('brightness-values')
+    assert 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101 0 0: MAV_RESULT_ACCEPTED' in result.detail
+    sent, received = result.exchange[-2:]
+    assert '> COMMAND_LONG to 1/243: MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101' in sent
+    assert '< COMMAND_ACK MAV_CMD_DO_ILLUMINATOR_CONFIGURE: MAV_RESULT_ACCEPTED' in received
 
 
-def shown(run):
-    table = Table()
-    return [line for one in run.suite.results for line in table.add(one)] + table.end()
+def test_requirements_that_were_not_reached_share_one_line():
+    absent = shown(Run(target=Address(9, 9)).finish())
+    assert len(absent) == 4
+    assert absent[-1] == 'SKIPPED 47 requirements: 9/9 was not heard within 10 s'
 
+    interrupted = Run(consent=False)
+    interrupted.link.run_until(lambda: len(interrupted.suite.results) == 10, within=100.0)
+    interrupted.interrupt()
+    assert shown(interrupted.finish())[-1] == 'SKIPPED 38 requirements: interrupted'
 
-def test_without_a_light_the_table_has_one_line_for_all_that_was_not_checked():
-    run = Run(target=Address(9, 9)).finish()
-    assert shown(run)[:2] == lines(run.result('heartbeat'))[:2]
-    assert shown(run)[-1] == 'SKIPPED 47 requirements: 9/9 was not heard within 10 s'
-    assert len(shown(run)) == 4
-    assert len(run.suite.results) == len(REQUIREMENTS)
-
-
-def test_after_an_interruption_the_table_has_one_line_for_the_rest():
-    run = Run(consent=False)
-    run.link.run_until(lambda: len(run.suite.results) == 10, within=100.0)
-    run.interrupt()
-    run.finish()
-    assert len(shown(run)) == 11
-    assert shown(run)[-1] == 'SKIPPED 38 requirements: interrupted'
-
-
-def test_a_light_that_falls_silent_leaves_one_line_for_what_was_not_checked():
-    run = Run()
-    run.link.run(8.0)
-    run.fault('silence')
-    run.finish()
-    (line,) = [line for line in shown(run) if 'requirements: ' in line]
+    lost = Run()
+    lost.link.run(8.0)
+    lost.fault('silence')
+    (line,) = [line for line in shown(lost.finish()) if 'requirements: ' in line]
     assert line.endswith('the light has stopped sending')
-    assert any('FAIL    acknowledged ' in line for line in shown(run))
 
 
-def test_what_was_skipped_for_a_reason_of_its_own_keeps_its_lines():
-    run = Run(consent=False).finish()
-    assert sum('not agreed to' in line for line in shown(run)) == 6
+def test_requirements_that_were_skipped_for_their_own_reason_keep_their_lines():
+    assert sum('not agreed to' in line for line in shown(Run(consent=False).finish())) == 6
+    alone = Run(target=Address(9, 9), only=('on',)).finish()
+    assert shown(alone) == lines(alone.result('on'))
 
 
-def test_one_requirement_that_was_not_checked_is_named():
-    run = Run(target=Address(9, 9), only=('on',)).finish()
-    assert shown(run) == lines(run.result('on'))
-
-
-def test_the_summary_counts(report):
+def test_the_summary_counts_verdicts(report):
     assert report.summary == '44 passed, 3 failed, 1 skipped in 12 s; the light is as it was'
 
 
-def test_the_catalogue_has_every_requirement_with_its_section():
-    text = catalogue(REQUIREMENTS, 'light')
-    assert len(text) == len(REQUIREMENTS)
-    for one, row in zip(REQUIREMENTS, text, strict=True):
+def test_the_catalogue_has_a_line_for_each_requirement_with_its_section():
+    for one, row in zip(REQUIREMENTS, catalogue(REQUIREMENTS, 'light'), strict=True):
         assert row.startswith(one.name)
         assert f'[{one.specification.title}, "{one.section}"' in row

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The light is afterwards as it was before, whatever happens."""
+"""After a run the light is as it was, also after an interruption, an error or a fault."""
 
 from dataclasses import replace
 
@@ -26,103 +26,80 @@ import pytest
 from support.conformance_run import Run
 
 BEFORE = Configuration(Mode.EXTERNAL_SYNC, 60.0, 0.5, 25.0)
-SHOULD_NOT_MATTER = sorted(set(FAULTS) - {
-    # These keep the light from doing what it is told, or from being heard.
+# Faults with which a light can be heard and does what it is told.
+RESTORABLE = sorted(set(FAULTS) - {
     'silence', 'refuse', 'lie', 'no-stop', 'reboot', 'toggle', 'no-resume'})
 
 
-def prepared(*faults, **options):
-    """Return a run against a light that somebody uses."""
+def used(*faults, **options):
+    """Return a run against a light that is on."""
     run = Run(faults=faults, **options)
     run.press(enabled=True)
     run.lamp.configuration = BEFORE
     return run
 
 
-def state(run):
-    return run.lamp.enabled, run.lamp.configuration
+def is_restored(run):
+    return run.lamp.enabled and run.lamp.configuration.differences(BEFORE) == []
 
 
-def test_switch_and_configuration_are_brought_back():
-    run = prepared().finish()
-    assert state(run) == (True, BEFORE)
+def test_switch_and_configuration_are_restored():
+    run = used().finish()
+    assert is_restored(run)
     assert run.suite.restored == 'the light is as it was'
 
 
-@pytest.mark.parametrize('fault', SHOULD_NOT_MATTER)
-def test_switch_and_configuration_are_brought_back_from_a_light_that_misbehaves(fault):
-    run = prepared(fault).finish()
-    assert run.lamp.enabled is True
-    assert run.lamp.configuration.differences(BEFORE) == []
+@pytest.mark.parametrize('fault', RESTORABLE)
+def test_a_light_with_a_fault_is_restored(fault):
+    assert is_restored(used(fault).finish())
 
 
-@pytest.mark.parametrize('interval', [0.2, 1.0, 3.0])
-def test_a_default_rate_is_brought_back(interval):
-    run = Run(IlluminatorProperties(status_interval=interval)).finish()
-    assert run.light.interval(STATUS_ID) == interval
+@pytest.mark.parametrize(('default', 'changed', 'after'), [
+    (0.2, None, 0.2), (1.0, None, 1.0), (3.0, None, 3.0), (0.0, None, 0.0), (1.0, 0.4, 0.4)])
+def test_the_status_interval_is_restored(default, changed, after):
+    run = Run(IlluminatorProperties(status_interval=default))
+    if changed:
+        run.set_interval(changed)
+    assert run.finish().light.interval(STATUS_ID) == pytest.approx(after)
 
 
-def test_a_rate_that_somebody_has_set_is_brought_back():
-    run = Run()
-    run.set_interval(0.4)
-    assert run.finish().light.interval(STATUS_ID) == pytest.approx(0.4)
-
-
-def test_a_stream_that_somebody_has_stopped_stays_so():
-    run = Run(IlluminatorProperties(status_interval=0.0)).finish()
-    assert run.light.interval(STATUS_ID) == 0.0
-
-
-@pytest.mark.parametrize('after', [0.5 + 0.7 * step for step in range(52)])
-def test_an_interrupted_run_brings_it_back(after):
-    run = prepared()
+@pytest.mark.parametrize('after', [0.0, *(0.5 + 0.7 * step for step in range(52))])
+def test_an_interrupted_run_restores_the_light_and_checks_nothing_more(after):
+    run = used()
     run.link.run(after)
+    checked = len(run.suite.results)
+    interrupted = run.link.now
     run.interrupt()
     run.finish()
-    assert state(run) == (True, BEFORE)
+    assert is_restored(run)
     assert len(run.suite.results) == len(REQUIREMENTS)
-
-
-def test_bringing_it_back_is_not_interrupted():
-    run = prepared()
-    run.link.run_until(lambda: run.session.runner.restoring, within=100.0)
-    assert state(run) != (True, BEFORE)
-    run.interrupt()
-    run.finish()
-    assert state(run) == (True, BEFORE)
-
-
-def test_an_interrupted_run_checks_nothing_more():
-    run = Run()
-    run.link.run(8.0)
-    run.interrupt()
-    assert run.finish().result('uptime').detail == 'interrupted'
+    assert {one.detail for one in run.suite.results[checked + 1:]} <= {'interrupted'}
     assert not run.suite.passed
-    assert run.link.now < 1000.0 + 8.0 + 5.0
+    assert run.link.now < interrupted + 5.0
 
 
-def test_a_run_that_is_interrupted_before_it_begins_ends():
-    run = Run()
+def test_restoring_is_not_interrupted():
+    run = used()
+    run.link.run_until(lambda: run.session.runner.restoring, within=100.0)
+    assert not is_restored(run)
     run.interrupt()
-    run.finish()
-    assert run.session.runner.interrupted
-    assert {one.detail for one in run.suite.results} == {'interrupted'}
+    assert is_restored(run.finish())
 
 
-def test_a_check_with_an_error_in_it_fails_and_the_light_is_brought_back():
+def test_a_check_with_an_internal_error_fails_and_the_light_is_restored():
     async def broken(tester):
         await tester.switch(False)
         raise ZeroDivisionError('oops')
 
-    run = prepared(requirements=[
+    run = used(requirements=[
         replace(one, check=broken) if one.name == 'on' else one for one in REQUIREMENTS]).finish()
     assert run.failed == {'on'}
     assert 'ZeroDivisionError' in run.result('on').detail
-    assert state(run) == (True, BEFORE)
+    assert is_restored(run)
 
 
-def test_a_light_that_cannot_be_brought_back_is_said_to_be_changed():
-    run = prepared()
+def test_a_light_that_cannot_be_restored_is_reported_with_its_former_state():
+    run = used()
     run.link.run(20.0)
     run.fault('refuse')
     run.finish()
@@ -131,20 +108,26 @@ def test_a_light_that_cannot_be_brought_back_is_said_to_be_changed():
     assert not run.suite.passed
 
 
-def test_a_light_that_is_silent_for_a_while_is_brought_back_when_it_is_heard_again():
-    run = prepared()
+def test_a_light_that_was_silent_for_a_while_is_restored():
+    run = used()
     run.link.run(20.0)
     run.light.behave(replace(run.light.behaviour, silence=14.0), run.link.now)
-    run.finish()
-    assert state(run) == (True, BEFORE)
+    assert is_restored(run.finish())
 
 
-def test_a_light_that_says_nothing_of_its_state_is_not_changed():
-    run = prepared()
+def test_a_light_that_reports_no_status_is_not_changed():
+    run = used()
     run.set_interval(-1)
     run.fault('no-request')
     run.light.behave(replace(run.light.behaviour, status_on_change=False), run.link.now)
     run.finish()
-    assert state(run) == (True, BEFORE)
+    assert is_restored(run)
     assert run.result('on').verdict is Verdict.SKIPPED
     assert 'could not be restored' in run.result('on').detail
+
+
+def test_requests_alone_change_nothing():
+    run = Run(only=('heartbeat', 'status-request', 'information-request'))
+    seen = run.watch()
+    assert run.finish().suite.restored == 'nothing was changed'
+    assert seen == []

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the monitor finds in a ROS graph, and what it asks of the lights there."""
+"""The monitor in a ROS graph: which lights it finds, what it shows and asks of them."""
 
 from collections.abc import Iterator
 import threading
@@ -23,11 +23,17 @@ from illuminator_ros.cli.monitor.model import Light, Outcome, State
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from std_srvs.srv import SetBool
-from support.light import Address, CONFIGURE, eventually, free_port, MavResult, ServedLight
+from support.light import Address, CONFIGURE, eventually, MavResult, ServedLight
 from support.monitors import Watching, watching
+from support.ports import free_port
 from support.ros import Ros, running_bridge, STATE
 from support.slow import pass_time_until
 from support.waiting import PATIENCE
+
+VALUES = {'temperature': 61.5, 'mode': 'external_sync', 'connected': True, 'enabled': True,
+          'brightness': 30.0, 'strobe_period': 0.5, 'strobe_duty_cycle': 20.0}
+SIGNATURE = {f'/bow/{topic}': type_name(TOPICS[topic])
+             for topic in ('connected', 'enabled', 'brightness', 'error_flags')}
 
 
 @pytest.fixture(scope='module')
@@ -41,7 +47,7 @@ def watched(ros: Ros, shared_bridge: object) -> Iterator[Watching]:
 def monitor(watched: Watching, light: ServedLight) -> Watching:
     """Return the monitor, which knows a light that is off, at 50 % and steady."""
     light.behave()
-    light.report(enable=0, brightness=50.0, strobe_period=0.0, strobe_duty_cycle=0.0,
+    light.report(enable=0, mode=1, brightness=50.0, strobe_period=0.0, strobe_duty_cycle=0.0,
                  error_status=0, temp_c=25.0)
     watched.wait(lambda light: light.value('brightness') == 50.0 and light.setpoint == 50.0
                  and light.value('enabled') is False and light.value('strobe_period') == 0.0
@@ -53,122 +59,107 @@ def darker(light: Light) -> Request | None:
     return dim(light, -10.0)
 
 
-class TestWhatItShows:
+def test_monitor_shows_values_flags_link_quality_and_identity_of_the_light(
+    light: ServedLight, monitor: Watching,
+) -> None:
+    assert monitor.names == ['/illuminator']
+    monitor.wait(lambda light: light.state(light.heard_at) is State.OFF)
 
-    def test_the_light_is_found_by_its_interface(self, monitor: Watching) -> None:
-        assert monitor.names == ['/illuminator']
-        monitor.wait(lambda light: light.state(light.heard_at) is State.OFF)
+    light.report(enable=1, brightness=30.0, temp_c=61.5, error_status=1, strobe_period=0.5,
+                 strobe_duty_cycle=20.0, mode=2)
 
-    def test_values_are_those_of_the_light(self, light: ServedLight, monitor: Watching) -> None:
-        light.report(enable=1, brightness=30.0, temp_c=61.5, error_status=1, strobe_period=0.5,
-                     strobe_duty_cycle=20.0, mode=2)
-
-        wanted = {'temperature': 61.5, 'mode': 'external_sync', 'connected': True,
-                  'enabled': True, 'brightness': 30.0, 'strobe_period': 0.5,
-                  'strobe_duty_cycle': 20.0}
-        monitor.wait(lambda light: all(light.value(name) == wanted[name] for name in wanted)
-                     and light.flags == ['thermal throttling'])
-        light.report(mode=1)
-
-    def test_link_quality_and_identity_are_those_of_the_diagnostics(
-        self, monitor: Watching,
-    ) -> None:
-        shown = monitor.wait(lambda light: light.link and light.lamp and light.link.number(
-            'round_trip_p50_ms') is not None)
-
-        assert shown.link is not None
-        assert shown.link.number('loss_percent') == 0.0
-        assert shown.lamp is not None
-        assert shown.lamp.values['vendor'] == 'maker'
-
-    def test_what_is_agreed_is_known_beside_what_is_shown(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        light.report(brightness=20.0, error_status=1)
-
-        shown = monitor.wait(lambda light: light.value('brightness') == 20.0)
-
-        assert shown.setpoint == 50.0
-
-    def test_a_light_that_is_lost_is_marked_and_one_that_returns_is_not(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        light.fake.silent = True
-        pass_time_until(lambda: monitor.light().value('connected') is False)
-        assert monitor.light().state(monitor.light().heard_at) is State.LOST
-
-        light.behave()
-        monitor.wait(lambda light: light.value('connected') is True)
+    shown = monitor.wait(
+        lambda light: light.flags == ['thermal throttling'] and light.link and light.lamp
+        and all(light.value(name) == value for name, value in VALUES.items())
+        and light.link.number('round_trip_p50_ms') is not None)
+    assert shown.link is not None and shown.link.number('loss_percent') == 0.0
+    assert shown.lamp is not None and shown.lamp.values['vendor'] == 'maker'
 
 
-class TestWhatItAsks:
-    def test_a_light_is_switched_and_the_answer_is_the_bridge_s(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        monitor.ask(switch)
+def test_throttled_light_keeps_its_setpoint(light: ServedLight, monitor: Watching) -> None:
+    light.report(brightness=20.0, error_status=1)
 
-        assert 'confirmed by ILLUMINATOR_STATUS' in monitor.outcome('on', Outcome.DONE)
-        assert light.fake.fields['enable'] == 1
-        monitor.wait(lambda light: light.value('enabled') is True)
+    assert monitor.wait(lambda light: light.value('brightness') == 20.0).setpoint == 50.0
 
-    def test_steps_add_up_however_fast_they_come(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        for _ in range(4):
-            monitor.ask(darker)
 
-        monitor.outcome('brightness 10 %', Outcome.DONE)
-        assert light.fake.fields['brightness'] == 10.0
-        assert len(light.commands(CONFIGURE)) <= 4
+def test_lost_light_is_marked_until_it_returns(light: ServedLight, monitor: Watching) -> None:
+    light.fake.silent = True
+    pass_time_until(lambda: monitor.light().value('connected') is False)
+    assert monitor.light().state(monitor.light().heard_at) is State.LOST
 
-    def test_a_refused_set_shows_its_reason_and_leaves_what_is_agreed(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        light.fake.results[CONFIGURE] = MavResult.DENIED
+    light.behave()
+    monitor.wait(lambda light: light.value('connected') is True)
+
+
+def test_switch_and_refresh_are_answered_by_the_bridge(
+    light: ServedLight, monitor: Watching,
+) -> None:
+    monitor.ask(switch)
+    assert 'confirmed by ILLUMINATOR_STATUS' in monitor.outcome('on', Outcome.DONE)
+    assert light.fake.fields['enable'] == 1
+    monitor.wait(lambda light: light.value('enabled') is True)
+
+    monitor.ask(refresh)
+    assert monitor.outcome('refresh', Outcome.DONE)
+
+
+def test_steps_add_up_and_a_strobe_is_one_command(light: ServedLight, monitor: Watching) -> None:
+    for _ in range(4):
         monitor.ask(darker)
+    monitor.outcome('brightness 10 %', Outcome.DONE)
+    assert light.fake.fields['brightness'] == 10.0
+    assert len(light.commands(CONFIGURE)) <= 4
+    light.forget()
 
-        assert 'MAV_RESULT_DENIED' in monitor.outcome('brightness 40 %', Outcome.FAILED)
-        assert monitor.light().setpoint == 50.0
+    monitor.ask(strobe)
+    monitor.outcome('strobe 1 s, 50 %', Outcome.DONE)
+    assert len(light.commands(CONFIGURE)) == 1
+    assert (light.fake.fields['strobe_period'], light.fake.fields['strobe_duty_cycle']) == (
+        1.0, 50.0)
 
-    def test_a_strobe_is_period_and_duty_cycle_in_one_command(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        monitor.ask(strobe)
 
-        monitor.outcome('strobe 1 s, 50 %', Outcome.DONE)
-        assert len(light.commands(CONFIGURE)) == 1
-        assert (light.fake.fields['strobe_period'], light.fake.fields['strobe_duty_cycle']) == (
-            1.0, 50.0)
+def test_refused_set_shows_its_reason_and_keeps_the_setpoint(
+    light: ServedLight, monitor: Watching,
+) -> None:
+    light.fake.results[CONFIGURE] = MavResult.DENIED
+    monitor.ask(darker)
 
-    def test_a_refresh_is_answered(self, monitor: Watching) -> None:
-        monitor.ask(refresh)
+    assert 'MAV_RESULT_DENIED' in monitor.outcome('brightness 40 %', Outcome.FAILED)
+    assert monitor.light().setpoint == 50.0
 
-        assert monitor.outcome('refresh', Outcome.DONE)
 
-    def test_off_gets_through_while_a_set_is_not_answered(
-        self, light: ServedLight, monitor: Watching,
-    ) -> None:
-        light.fake.results[CONFIGURE] = None
-        monitor.ask(darker)
-        monitor.outcome('brightness 40 %', Outcome.PENDING)
+def test_off_is_done_while_a_set_is_not_answered(light: ServedLight, monitor: Watching) -> None:
+    light.fake.results[CONFIGURE] = None
+    monitor.ask(darker)
+    monitor.outcome('brightness 40 %', Outcome.PENDING)
 
-        monitor.ask(switch_off)
+    monitor.ask(switch_off)
 
-        monitor.outcome('off', Outcome.DONE)
-        pass_time_until(lambda: not monitor.light().wanted, step=0.1)
+    monitor.outcome('off', Outcome.DONE)
+    pass_time_until(lambda: not monitor.light().wanted, step=0.1)
+
+
+def test_two_monitors_show_the_same(ros: Ros, monitor: Watching) -> None:
+    with watching(ros) as other:
+        other.wait(lambda light: light.setpoint == 50.0)
+
+        other.ask(darker)
+
+        other.outcome('brightness 40 %', Outcome.DONE)
+        monitor.wait(lambda light: light.setpoint == 40.0)
 
 
 class FakeBridge:
-    """The interface of a light, behind which nobody answers unless told to."""
+    """The topics of a light that is on at 10 %, without services."""
 
     def __init__(self, ros: Ros, name: str) -> None:
         self._node = ros.node
-        self._publishers = [
-            self._node.create_publisher(TOPICS[topic], f'{name}/{topic}', STATE)
-            for topic in ('connected', 'enabled', 'brightness', 'error_flags')]
-        for publisher, message in zip(self._publishers, (
-                Bool(data=True), Bool(data=True), Float32(data=10.0), UInt32()), strict=True):
-            publisher.publish(message)
+        self._publishers = []
+        for topic, message in (('connected', Bool(data=True)), ('enabled', Bool(data=True)),
+                               ('brightness', Float32(data=10.0)), ('error_flags', UInt32())):
+            self._publishers.append(
+                self._node.create_publisher(TOPICS[topic], f'{name}/{topic}', STATE))
+            self._publishers[-1].publish(message)
 
     def destroy(self) -> None:
         """Leave the graph."""
@@ -176,41 +167,38 @@ class FakeBridge:
             self._node.destroy_publisher(publisher)
 
 
-def test_a_service_that_does_not_answer_is_given_up(own_ros: Ros) -> None:
+def test_missing_service_is_reported_at_once_and_a_silent_one_after_a_time(
+    own_ros: Ros,
+) -> None:
     release = threading.Event()
     own_ros.node.create_service(
-        SetBool, '/dead/enable',
-        lambda request, response: release.wait(PATIENCE) and response)
+        SetBool, '/dead/enable', lambda request, response: release.wait(PATIENCE) and response)
     FakeBridge(own_ros, '/dead')
-    with watching(own_ros) as monitor:
-        monitor.wait(lambda light: light.value('enabled'), '/dead')
-        try:
-            # Until the service has been found there is nobody to ask.
-            def sent() -> bool:
-                monitor.ask(switch_off, '/dead')
-                action = monitor.light('/dead').action
-                return action is not None and action.outcome is Outcome.PENDING
-            eventually(sent)
+    FakeBridge(own_ros, '/mute')
 
-            def given_up() -> bool:
-                action = monitor.light('/dead').action
-                return action is not None and 'no answer from /dead' in action.answer
+    def asked() -> bool:
+        # Until the service has been found, the request fails at once.
+        monitor.ask(switch_off, '/dead')
+        action = monitor.light('/dead').action
+        return action is not None and action.outcome is Outcome.PENDING
+
+    def given_up() -> bool:
+        action = monitor.light('/dead').action
+        return action is not None and 'no answer from /dead' in action.answer
+
+    with watching(own_ros) as monitor:
+        try:
+            for name in ('/mute', '/dead'):
+                monitor.wait(lambda light: light.value('enabled'), name)
+            monitor.ask(switch_off, '/mute')
+            assert '/mute/enable' in monitor.outcome('off', Outcome.FAILED, '/mute')
+            eventually(asked)
             pass_time_until(given_up)
         finally:
             release.set()
 
 
-def test_what_has_no_service_is_told_at_once(own_ros: Ros) -> None:
-    FakeBridge(own_ros, '/mute')
-    with watching(own_ros) as monitor:
-        monitor.wait(lambda light: light.value('enabled'), '/mute')
-
-        monitor.ask(switch_off, '/mute')
-
-        assert monitor.outcome('off', Outcome.FAILED, '/mute') == 'nobody serves /mute/enable'
-
-
-def test_a_light_that_leaves_is_marked_and_can_be_cleared_and_can_return(own_ros: Ros) -> None:
+def test_light_that_leaves_is_marked_can_be_cleared_and_can_return(own_ros: Ros) -> None:
     with watching(own_ros) as monitor:
         first = FakeBridge(own_ros, '/one')
         FakeBridge(own_ros, '/two')
@@ -225,12 +213,13 @@ def test_a_light_that_leaves_is_marked_and_can_be_cleared_and_can_return(own_ros
         monitor.wait(lambda light: light.value('brightness') == 10.0, '/one')
 
 
-def test_two_bridges_with_nodes_of_one_name_are_told_apart(own_ros: Ros) -> None:
-    ports = {'/uav1': free_port(), '/uav2': free_port()}
-    with (running_bridge(own_ros.domain, ports['/uav1'], '-r', '__ns:=/uav1'),
-          running_bridge(own_ros.domain, ports['/uav2'], '-r', '__ns:=/uav2'),
-          ServedLight(ports['/uav1'], brightness=10.0),
-          ServedLight(ports['/uav2'], Address(9, 9), brightness=20.0),
+def test_bridges_of_one_node_name_in_two_namespaces_are_distinct(own_ros: Ros) -> None:
+    ports = [free_port(), free_port()]
+    often = {'diagnostics_period': 0.1}
+    with (running_bridge(own_ros.domain, ports[0], '-r', '__ns:=/uav1', **often),
+          running_bridge(own_ros.domain, ports[1], '-r', '__ns:=/uav2', **often),
+          ServedLight(ports[0], brightness=10.0),
+          ServedLight(ports[1], Address(9, 9), brightness=20.0),
           watching(own_ros) as monitor):
         monitor.wait_names('/uav1/illuminator', '/uav2/illuminator')
         for name, address, brightness in (('/uav1/illuminator', '1/243', 10.0),
@@ -240,38 +229,18 @@ def test_two_bridges_with_nodes_of_one_name_are_told_apart(own_ros: Ros) -> None
             assert (shown.lamp.values['address'], shown.setpoint) == (address, brightness)
 
 
-def test_two_monitors_see_and_do_the_same(ros: Ros, monitor: Watching) -> None:
-    with watching(ros) as other:
-        other.wait(lambda light: light.setpoint == 50.0)
+@pytest.mark.parametrize(('topics', 'publishers', 'found'), [
+    (SIGNATURE, {*SIGNATURE}, ['/bow']),
+    ({name.replace('/bow', '/a/b'): type_ for name, type_ in SIGNATURE.items()},
+     {name.replace('/bow', '/a/b') for name in SIGNATURE}, ['/a/b']),
+    *(({name: type_ for name, type_ in SIGNATURE.items() if name != missing}, {*SIGNATURE}, [])
+      for missing in SIGNATURE),
+    (dict.fromkeys(SIGNATURE, 'std_msgs/msg/String'), {*SIGNATURE}, []),
+    (SIGNATURE, {*SIGNATURE} - {'/bow/enabled'}, []),
+])
+def test_light_is_a_node_that_publishes_all_its_signature_topics_with_their_types(
+    topics: dict[str, str], publishers: set[str], found: list[str],
+) -> None:
+    listed = [(name, [type_]) for name, type_ in topics.items()]
 
-        other.ask(darker)
-
-        other.outcome('brightness 40 %', Outcome.DONE)
-        monitor.wait(lambda light: light.setpoint == 40.0)
-
-
-class TestWhatIsALight:
-    SIGNATURE = [(f'/bow/{topic}', [type_name(TOPICS[topic])])
-                 for topic in ('connected', 'enabled', 'brightness', 'error_flags')]
-
-    def test_it_is_whoever_publishes_what_a_light_does(self) -> None:
-        assert lights_among(self.SIGNATURE, lambda topic: 1) == ['/bow']
-
-    def test_its_name_and_namespace_do_not_matter(self) -> None:
-        topics = [(topic.replace('/bow', '/a/b/c'), types) for topic, types in self.SIGNATURE]
-
-        assert lights_among(topics, lambda topic: 1) == ['/a/b/c']
-
-    @pytest.mark.parametrize('missing', range(4))
-    def test_a_part_of_it_is_none(self, missing: int) -> None:
-        topics = self.SIGNATURE[:missing] + self.SIGNATURE[missing + 1:]
-
-        assert lights_among(topics, lambda topic: 1) == []
-
-    def test_other_types_are_none(self) -> None:
-        topics = [(topic, ['std_msgs/msg/String']) for topic, _ in self.SIGNATURE]
-
-        assert lights_among(topics, lambda topic: 1) == []
-
-    def test_what_only_has_subscribers_is_none(self) -> None:
-        assert lights_among(self.SIGNATURE, lambda topic: topic != '/bow/enabled') == []
+    assert lights_among(listed, lambda topic: int(topic in publishers)) == found

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is shown of simulated lights."""
+"""The views of simulated lights: plain lines, and a live view on a terminal."""
 
 import io
 import os
@@ -78,117 +78,84 @@ def terminal(monkeypatch):
     return Terminal()
 
 
-def test_a_line_has_all_that_a_light_does(device):
+@pytest.fixture
+def live(terminal, device):
+    view = LiveView(terminal)
+    view.show([look(device, 0.0)])
+    return view
+
+
+def test_a_line_has_the_actual_state_the_flags_and_the_faults(device):
     press(device, 0.0, enabled=True, brightness=60.0, strobe_period=0.5, strobe_duty_cycle=25.0,
-                 mode='external_sync')
+          mode='external_sync')
     device.device.lamp.heat_to(85.0, 0.0)
     device.behave(FAULTS.add(device.behaviour, 'drop'), 0.0)
-    line = str(look(device, 0.1))
-    assert re.split(r'  +', line) == [
+    assert re.split(r'  +', str(look(device, 0.1))) == [
         '1/243 bow', 'ON', '30 %', 'strobe 0.5 s, 25 %', '85.0 degC', 'external_sync',
         'thermal throttling', '[drop]']
-
-
-def test_the_line_shows_what_is_and_not_what_a_light_says(device):
     device.behave(FAULTS.add(IlluminatorBehaviour(), 'thermistor'), 0.0)
-    device.device.lamp.heat_to(70.0, 0.0)
-    assert '70.0 degC' in str(look(device, 0.0))
+    assert '85.0 degC' in str(look(device, 0.1))
 
 
-class TestPlainView:
-
-    def test_a_line_comes_when_a_light_does_something_else(self, device):
-        stream = io.StringIO()
-        view = PlainView(stream)
-        for now in range(5):
-            view.show([look(device, float(now))])
-        press(device, 5.0, enabled=True)
-        for now in range(5, 8):
-            view.show([look(device, float(now))])
-        off, on = stream.getvalue().splitlines()
-        assert ('off' in off, 'ON' in on) == (True, True)
-
-    def test_a_temperature_is_worth_a_line_every_few_degrees(self, device):
-        stream = io.StringIO()
-        view = PlainView(stream)
-        for temperature in range(30, 51):
-            device.device.lamp.heat_to(float(temperature), 0.0)
-            view.show([look(device, 0.0)])
-        assert len(stream.getvalue().splitlines()) == 5
-
-    def test_nothing_is_not_written(self):
-        stream = io.StringIO()
-        PlainView(stream).say('')
-        assert stream.getvalue() == ''
-
-    def test_it_is_plain(self, device):
-        stream = io.StringIO()
-        PlainView(stream).show([look(device, 0.0)])
-        assert '\x1b' not in stream.getvalue()
-
-
-class TestLiveView:
-
-    def test_a_light_has_one_line_that_is_always_up_to_date(self, device, terminal):
-        view = LiveView(terminal)
-        for temperature in (30.0, 31.0, 32.0):
-            device.device.lamp.heat_to(temperature, 0.0)
-            view.show([look(device, 0.0)])
-        line, prompt = terminal.screen()
-        assert '32.0 degC' in line
-        assert prompt == '> '
-
-    def test_a_light_that_dims_itself_is_seen_to_in_80_columns(self, device, terminal):
-        press(device, 0.0, enabled=True)
-        device.device.lamp.heat_to(85.0, 0.0)
-        LiveView(terminal).show([look(device, 0.0)])
-        assert terminal.screen()[0].endswith('  thermal throttling')
-
-    def test_what_is_being_typed_stays(self, device, terminal):
-        view = LiveView(terminal)
+def test_a_plain_line_is_written_when_the_state_changes(device):
+    stream = io.StringIO()
+    view = PlainView(stream)
+    for enabled in (False, False, True, True):
+        press(device, 0.0, enabled=enabled)
         view.show([look(device, 0.0)])
-        terminal.write('brightn')
-        device.device.lamp.heat_to(50.0, 0.0)
-        view.show([look(device, 0.0)])
-        terminal.write('ess')
-        line, prompt = terminal.screen()
-        assert '50.0 degC' in line
-        assert prompt == '> brightness'
+    view.say('')
+    off, on = stream.getvalue().splitlines()
+    assert ('off' in off, 'ON' in on, '\x1b' in stream.getvalue()) == (True, True, False)
 
-    def test_an_answer_stands_under_what_it_answers_and_the_lights_under_that(
-            self, device, terminal):
-        view = LiveView(terminal)
-        view.show([look(device, 0.0)])
-        terminal.write('faults\r\n')
-        view.say('1/243: no fault', typed='faults')
-        typed, answer, line, prompt = terminal.screen()
-        assert (typed, answer, prompt) == ('> faults', '1/243: no fault', '> ')
-        assert line.startswith('1/243 bow')
 
-    def test_an_event_leaves_no_old_lines_behind(self, device, terminal):
-        view = LiveView(terminal)
+def test_a_plain_line_is_written_when_the_temperature_changes_by_5_kelvins(device):
+    stream = io.StringIO()
+    view = PlainView(stream)
+    for temperature in range(30, 51):
+        device.device.lamp.heat_to(float(temperature), 0.0)
         view.show([look(device, 0.0)])
-        view.say('link open: somewhere')
-        event, line, _ = terminal.screen()
-        assert event == 'link open: somewhere'
-        assert line.startswith('1/243 bow')
+    assert len(stream.getvalue().splitlines()) == 5
 
-    def test_nothing_is_written_where_nothing_has_changed(self, device, terminal):
-        view = LiveView(terminal)
-        view.show([look(device, 0.0)])
-        before = terminal.getvalue()
-        view.show([look(device, 0.0)])
-        assert terminal.getvalue() == before
 
-    def test_more_lights_than_lines_are_counted(self, terminal):
-        lights = [simulated(address=Address(1, n)) for n in range(1, 21)]
-        LiveView(terminal).show([look(one, 0.0) for one in lights])
-        screen = terminal.screen()
-        assert len(screen) == 7
-        assert screen[5] == '... and 15 lights more'
+def test_a_fault_that_is_over_is_no_longer_shown(device):
+    device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'silence=2'), 'lie'), 0.0)
+    assert str(look(device, 0.0)).endswith('[silence, lie]')
+    device.poll(2.0)
+    assert str(look(device, 2.0)).endswith('[lie]')
 
-    def test_lines_are_no_longer_than_the_terminal_is_wide(self, device, terminal):
-        device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'cold-throttling'),
-                                 'no-terminator'), 0.0)
-        LiveView(terminal).show([look(device, 0.0)])
-        assert max(map(len, terminal.screen())) == 79
+
+def test_the_live_view_updates_the_line_and_keeps_what_is_typed(device, terminal, live):
+    terminal.write('brightn')
+    device.device.lamp.heat_to(50.0, 0.0)
+    live.show([look(device, 0.0)])
+    terminal.write('ess')
+    line, prompt = terminal.screen()
+    assert ('50.0 degC' in line, prompt) == (True, '> brightness')
+    before = terminal.getvalue()
+    live.show([look(device, 0.0)])
+    assert terminal.getvalue() == before
+
+
+def test_the_live_view_has_an_answer_below_its_line_and_an_event_above_the_lights(
+        terminal, live):
+    terminal.write('faults\r\n')
+    live.say('1/243: no fault', typed='faults')
+    live.say('link open: somewhere')
+    typed, answer, event, line, prompt = terminal.screen()
+    assert (typed, answer, event, prompt) == (
+        '> faults', '1/243: no fault', 'link open: somewhere', '> ')
+    assert line.startswith('1/243 bow')
+
+
+def test_the_live_view_fits_the_terminal(device, terminal):
+    press(device, 0.0, enabled=True)
+    device.device.lamp.heat_to(85.0, 0.0)
+    lights = [device, *(simulated(address=Address(1, n)) for n in range(1, 20))]
+    LiveView(terminal).show([look(one, 0.0) for one in lights])
+    screen = terminal.screen()
+    assert screen[0].endswith('  thermal throttling')
+    assert (len(screen), screen[5]) == (7, '... and 15 more')
+    device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'cold-throttling'),
+                             'no-terminator'), 0.0)
+    LiveView(terminal).show([look(device, 0.0)])
+    assert max(map(len, terminal.screen())) == 79

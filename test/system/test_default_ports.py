@@ -14,7 +14,6 @@
 
 """``bridge`` and ``simulator``, both without arguments, find each other."""
 
-from collections.abc import Iterator
 import socket
 
 import pytest
@@ -24,9 +23,12 @@ from support.ros import Parameters, Ros
 DEFAULT_PORT = 14590
 
 
-@pytest.fixture(autouse=True)
-def default_port() -> Iterator[None]:
-    """Claim the port that a bridge without arguments listens on."""
+@pytest.mark.parametrize('first', ['bridge', 'simulator'])
+def test_programs_without_arguments_find_each_other_whichever_starts_first(
+    own_ros: Ros, first: str,
+) -> None:
+    env = {'ROS_DOMAIN_ID': str(own_ros.domain)}
+    names = ['bridge', 'simulator'] if first == 'bridge' else ['simulator', 'bridge']
     with (socket.socket(socket.AF_UNIX) as claim,
           socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe):
         try:
@@ -35,15 +37,8 @@ def default_port() -> Iterator[None]:
         except OSError:
             pytest.skip(f'UDP port {DEFAULT_PORT} is taken')
         probe.close()
-        yield
+        with (ended(python(f'illuminator_ros.{names[0]}', env=env)) as one,
+              ended(python(f'illuminator_ros.{names[1]}', env=env)) as other):
+            (one if first == 'bridge' else other).wait_for('light 1/243 connected')
 
-
-@pytest.mark.parametrize('first', ['bridge', 'simulator'])
-def test_they_find_each_other(own_ros: Ros, first: str) -> None:
-    second = {'bridge': 'simulator', 'simulator': 'bridge'}[first]
-    env = {'ROS_DOMAIN_ID': str(own_ros.domain)}
-    with (ended(python(f'illuminator_ros.{first}', env=env)) as one,
-          ended(python(f'illuminator_ros.{second}', env=env)) as other):
-        {'bridge': one, 'simulator': other}[first].wait_for('light 1/243 connected')
-
-        Parameters(own_ros).wait(brightness=100.0)
+            Parameters(own_ros).wait(brightness=100.0)

@@ -12,92 +12,52 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Through MAVProxy, which knows no illuminators: the light is found and commanded all the same."""
+"""Through MAVProxy, which knows no illuminators, a light is found, commanded and found again."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator
 import importlib.util
+from pathlib import Path
 import sys
-from typing import Any
 
-from illuminator_ros.illuminator import operation
 import pytest
-from support.live_link import Bridge
 from support.ports import free_port
-from support.processes import ended, Program, python
-from support.waiting import PATIENCE
+from support.processes import Program
+from support.ros import Ros, running_bridge, running_simulator
+from support.slow import pass_time_until
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec('MAVProxy') is None,
     reason='MAVProxy is not installed: pip install pyserial; pip install --no-deps MAVProxy')
 
 
-@pytest.fixture(autouse=True)
-def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have no change fail because the machine stood still behind its acknowledgement."""
-    monkeypatch.setattr(operation, 'CONFIRMATION_TIMEOUT', PATIENCE)
+def start_router(near: int, far: int, directory: Path) -> Program:
+    """Start MAVProxy between the light's port and the bridge's."""
+    # Its other modules need far more than is installed for this.
+    router = Program(
+        sys.executable, '-u', '-m', 'MAVProxy.mavproxy', '--daemon', '--non-interactive',
+        '--no-state', '--mav20', '--default-modules=output',
+        f'--master=udpin:127.0.0.1:{near}', f'--out=udpout:127.0.0.1:{far}', cwd=directory)
+    router.wait_for('Waiting for heartbeat')
+    return router
 
 
-@pytest.fixture
-def ports() -> tuple[int, int]:
-    """Return the port of the light's side of the router, and that of the drone's."""
-    return free_port(), free_port()
+def test_light_behind_mavproxy_is_commanded_and_so_it_is_after_a_restart_of_mavproxy(
+    own_ros: Ros, tmp_path: Path,
+) -> None:
+    near, far = free_port(), free_port()
+    router = start_router(near, far, tmp_path)
+    try:
+        with (running_bridge(own_ros.domain, far) as bridge,
+              running_simulator(f'udpout://127.0.0.1:{near}', '--status-interval', '0.01')):
+            pass_time_until(lambda: bridge.count('light 1/243 connected'), step=0.1)
+            for on in (True, False):
+                response = own_ros.enable(on)
+                assert response.success
+                assert 'confirmed by ILLUMINATOR_STATUS' in response.message
 
-
-@pytest.fixture
-def start_router(ports: tuple[int, int], tmp_path: Any) -> Iterator[Callable[[], Program]]:
-    """Return a function that starts MAVProxy between the two ports."""
-    started = []
-
-    def start() -> Program:
-        # Its other modules need far more than is installed for this.
-        started.append(Program(
-            sys.executable, '-u', '-m', 'MAVProxy.mavproxy', '--daemon', '--non-interactive',
-            '--no-state', '--mav20', '--default-modules=output',
-            f'--master=udpin:127.0.0.1:{ports[0]}', f'--out=udpout:127.0.0.1:{ports[1]}',
-            cwd=tmp_path))
-        started[-1].wait_for('Waiting for heartbeat', 30.0)
-        return started[-1]
-
-    yield start
-    for router in started:
+            router.kill()
+            pass_time_until(lambda: bridge.count('light 1/243 lost'))
+            router = start_router(near, far, tmp_path)
+            pass_time_until(lambda: bridge.count('light 1/243 connected') == 2, step=0.1)
+            assert own_ros.enable().success
+    finally:
         router.kill()
-
-
-@pytest.fixture
-def bridge(ports: tuple[int, int]) -> Iterator[Bridge]:
-    """Return the drone's side, without ROS."""
-    one = Bridge(f'udpin://127.0.0.1:{ports[1]}')
-    yield one
-    one.stop()
-
-
-@pytest.fixture
-def simulator(ports: tuple[int, int]) -> Iterator[Program]:
-    """Run a simulated light."""
-    with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{ports[0]}')) as one:
-        yield one
-
-
-def test_a_light_behind_mavproxy_is_found_and_commanded(
-    start_router: Callable[[], Program], simulator: Program, bridge: Bridge,
-) -> None:
-    start_router()
-    light = bridge.wait_connected()
-    for on in (True, False):
-        result = bridge.enable(on, light)
-        assert result.success, result.message
-        assert 'confirmed by ILLUMINATOR_STATUS' in result.message
-
-
-def test_a_light_is_back_after_a_restart_of_mavproxy(
-    start_router: Callable[[], Program], simulator: Program, bridge: Bridge,
-) -> None:
-    router = start_router()
-    bridge.wait_connected()
-    router.kill()
-    bridge.lights.wait_for(lambda entry: entry[0] == 'lost')
-    start_router()
-    light = bridge.wait_connected(2)
-    assert bridge.enable(True, light).success

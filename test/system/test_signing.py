@@ -12,25 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""MAVLink 2 signing between the programs: who has the key is heard (DESIGN.md, 3.7)."""
+"""MAVLink 2 signing between the programs: only a sender that has the key is heard."""
 
-from collections.abc import Callable, Iterator
-import contextlib
+from collections.abc import Callable
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.ports import free_port
-from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
 from support.slow import pass_time_until
 
+SECRET, OTHER_SECRET = 'correct horse', 'battery staple'
 KeyFile = Callable[[str], str]
 
 
 @pytest.fixture
 def key_file(tmp_path: Path) -> KeyFile:
-    """Return what makes key files that only their owner can read."""
+    """Return a function that makes key files that only their owner can read."""
     def make(passphrase: str) -> str:
         path = tmp_path / passphrase.replace(' ', '_')
         path.write_text(passphrase)
@@ -39,40 +38,41 @@ def key_file(tmp_path: Path) -> KeyFile:
     return make
 
 
-@contextlib.contextmanager
-def simulator(port: int, *options: str) -> Iterator[Program]:
-    with running_simulator(f'udpout://127.0.0.1:{port}', *options) as it:
-        yield it
-
-
 def link_value(key: str) -> Callable[[DiagnosticArray], int]:
-    """Return what reads a value of the link from diagnostics."""
+    """Return a function that reads a value of the link from diagnostics."""
     def read(array: DiagnosticArray) -> int:
         return int({entry.key: entry.value for entry in array.status[0].values}[key])
     return read
 
 
-def test_two_with_the_same_key_find_each_other(own_ros: Ros, key_file: KeyFile) -> None:
-    port, key = free_port(), key_file('correct horse')
-    with (running_bridge(own_ros.domain, port, signing_mode='require', signing_key_file=key),
-          simulator(port, '--signing-mode', 'require', '--signing-key-file', key)):
-        Parameters(own_ros).wait(brightness=100.0)
+def test_programs_with_the_same_key_find_each_other_and_show_it_nowhere(
+    own_ros: Ros, key_file: KeyFile,
+) -> None:
+    port, key = free_port(), key_file(SECRET)
+    with (running_bridge(own_ros.domain, port, signing_mode='require',
+                         signing_key_file=key) as bridge,
+          running_simulator(f'udpout://127.0.0.1:{port}', '--signing-mode', 'require',
+                            '--signing-key-file', key) as simulator):
+        parameters = Parameters(own_ros)
+        parameters.wait(brightness=100.0)
+        assert parameters.set(brightness=20)[0].successful
 
-        assert Parameters(own_ros).set(brightness=20)[0].successful
+        values = parameters.get(*parameters.names())
+        assert SECRET not in map(str, values)
+        assert SECRET not in bridge.log + simulator.log
 
 
-@pytest.mark.parametrize(('options', 'counter'), [
-    ((), 'unsigned_frames'),
-    (('--signing-mode', 'sign', '--signing-key-file'), 'signatures_bad'),
-], ids=['no key', 'another key'])
-def test_who_has_not_the_key_is_not_heard_and_counted(
-    own_ros: Ros, key_file: KeyFile, options: tuple[str, ...], counter: str,
+@pytest.mark.parametrize(('mode', 'simulator_mode', 'counter'), [
+    ('require', 'off', 'unsigned_frames'), ('require', 'sign', 'signatures_bad')])
+def test_sender_without_the_key_is_not_heard_and_its_frames_are_counted(
+    own_ros: Ros, key_file: KeyFile, mode: str, simulator_mode: str, counter: str,
 ) -> None:
     port = free_port()
-    other = (*options, key_file('battery staple')) if options else ()
-    with (running_bridge(own_ros.domain, port, signing_mode='require',
-                         signing_key_file=key_file('correct horse')) as bridge,
-          simulator(port, *other)):
+    options = () if simulator_mode == 'off' else (
+        '--signing-mode', simulator_mode, '--signing-key-file', key_file(OTHER_SECRET))
+    with (running_bridge(own_ros.domain, port, signing_mode=mode,
+                         signing_key_file=key_file(SECRET)) as bridge,
+          running_simulator(f'udpout://127.0.0.1:{port}', *options)):
         diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
 
         pass_time_until(lambda: any(map(link_value(counter), list(diagnostics.messages))))
@@ -80,13 +80,17 @@ def test_who_has_not_the_key_is_not_heard_and_counted(
         assert bridge.count('light 1/243 connected') == 0
 
 
-def test_the_key_stands_in_no_parameter_and_no_log(own_ros: Ros, key_file: KeyFile) -> None:
-    secret = 'correct horse'
-    with running_bridge(own_ros.domain, free_port(), signing_mode='require',
-                        signing_key_file=key_file(secret)) as bridge:
-        parameters = Parameters(own_ros)
+def test_light_that_requires_signing_is_recognised_while_signing_is_off(
+    own_ros: Ros, key_file: KeyFile,
+) -> None:
+    port = free_port()
+    with (running_bridge(own_ros.domain, port) as bridge,
+          running_simulator(f'udpout://127.0.0.1:{port}', '--signing-mode', 'require',
+                            '--signing-key-file', key_file(SECRET))):
+        bridge.wait_for('light 1/243 connected')
+        diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
 
-        values = [value for name in parameters.names() for value in parameters.get(name)]
-
-        assert secret not in map(str, values)
-        assert secret not in bridge.log
+        pass_time_until(lambda: any(
+            'commands go unanswered' in array.status[0].message
+            and 'signing_mode is off' in array.status[0].message
+            for array in list(diagnostics.messages)))

@@ -17,7 +17,6 @@
 from collections.abc import Iterator
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from support.machines import CannotBeMade, Machine, two_machines
@@ -28,7 +27,7 @@ pytestmark = pytest.mark.timeout(300)
 
 @pytest.fixture(scope='module')
 def machines() -> Iterator[tuple[Machine, Machine]]:
-    """Return a robot's machine, and the one of somebody who watches it."""
+    """Return a robot's machine, and an operator's."""
     try:
         with two_machines() as (robot, station):
             yield robot, station
@@ -36,64 +35,32 @@ def machines() -> Iterator[tuple[Machine, Machine]]:
         pytest.skip(f'two machines cannot be made here: {reason}')
 
 
-@pytest.fixture(scope='module', params=['robot', 'station'])
-def seen(
-    request: pytest.FixtureRequest, machines: tuple[Machine, Machine], domain: int,
-) -> Any:
-    """Have the bridge used from afar, with the light on either machine; return what came of it."""
+@pytest.mark.parametrize('place', ['robot', 'station'])
+def test_client_on_another_machine_uses_topics_services_and_parameters_of_the_bridge(
+    machines: tuple[Machine, Machine], domain: int, place: str,
+) -> None:
+    """The light is on the robot's machine, or on the other."""
     robot, station = machines
     env = {
         'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
         # Two machines have no memory in common, though these have.
         'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
-    if request.param == 'robot':
-        light, listening, sending = robot, '127.0.0.1', '127.0.0.1'
-    else:
-        light, listening, sending = station, '0.0.0.0', robot.address
+    light, listening, sending = ((robot, '127.0.0.1', '127.0.0.1') if place == 'robot' else
+                                 (station, '0.0.0.0', robot.address))
     with (ended(robot.python('illuminator_ros.bridge', '--ros-args', '-p',
                              f'connection_url:=udpin://{listening}:14590', env=env)) as bridge,
           ended(light.python('illuminator_ros.simulator', f'udpout://{sending}:14590'))):
-        bridge.wait_for('light 1/243 connected', timeout=30.0)
-        tests = str(Path(__file__).parents[1])
-        client = station.python('support.distant_client', str(domain),
-                                env={**env, 'PYTHONPATH': tests})
+        bridge.wait_for('light 1/243 connected')
+        client = station.python('support.distant_client', str(domain), env={
+            **env, 'PYTHONPATH': str(Path(__file__).parents[1])})
         try:
             assert client.wait(120.0) == 0, f'{client.log}\n{bridge.log}'
         finally:
             client.kill()
-        yield json.loads(client.lines[-1])
+    seen = json.loads(client.lines[-1])
+    (enabled, message), (refused, reason) = seen.pop('enable'), seen.pop('refused')
 
-
-def test_a_late_subscriber_gets_the_state(seen: Any) -> None:
-    assert seen['connected'] is True
-
-
-def test_a_service_is_answered(seen: Any) -> None:
-    success, message = seen['enable']
-
-    assert (success, message.startswith('on, confirmed')) == (True, True), message
-
-
-def test_a_parameter_is_set_on_the_light(seen: Any) -> None:
-    assert seen['set'] == [True, '']
-    assert seen['brightness'] == 60.0
-
-
-def test_a_parameter_is_refused_with_its_reason(seen: Any) -> None:
-    success, reason = seen['refused']
-
-    assert not success
-    assert '100' in reason
-
-
-def test_topics_show_what_was_done(seen: Any) -> None:
-    assert (seen['enabled topic'], seen['brightness topic']) == (True, 60.0)
-
-
-def test_nothing_is_left_of_the_machines(machines: tuple[Machine, Machine]) -> None:
-    with two_machines() as others:
-        keepers = [machine.pid for machine in others]
-        assert 'cable' in others[0].run('ip', '-brief', 'link')
-
-    assert [Path(f'/proc/{pid}').exists() for pid in keepers] == [False, False]
-    assert not Path('/sys/class/net/cable').exists()
+    assert seen == {'connected': True, 'set': [True, ''], 'brightness': 60.0,
+                    'enabled topic': True, 'brightness topic': 60.0}
+    assert enabled and message.startswith('on, confirmed'), message
+    assert not refused and '100' in reason

@@ -30,9 +30,6 @@ from ...payload.checks.payload_checks import PayloadChecks
 FIND_TIMEOUT = 10.0
 DEFAULT_PAYLOAD = 'illuminator'
 
-DESCRIPTION = """\
-Checks whether a {device} follows its MAVLink protocol, and the heartbeat and command protocols
-that it builds on."""
 EPILOG = """\
 examples:
   conformance serial:///dev/ttyACM0:57600
@@ -40,8 +37,8 @@ examples:
   conformance udpin://127.0.0.1:14590 --yes   the simulator, started without arguments
   conformance udp://:14541@127.0.0.1:14540    the emulator of the MAVLink guide
 
-The checks switch and configure the {device}; afterwards its state is restored.
-exit status: 0 if all that was checked is met, 1 if not or if there is no {device},
+The checks change the state of the device; afterwards it is restored.
+exit status: 0 if all that was checked is met, 1 if not or if no device was found,
 2 if an argument is wrong or this computer cannot open the link."""
 
 
@@ -52,17 +49,6 @@ def _address(text: str) -> Address:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def _checks(args: Sequence[str] | None) -> tuple[Parser, PayloadChecks[Any]]:
-    """Return a parser of ``--payload``, and the checks of the payload."""
-    payload = Parser(prog='conformance', add_help=False)
-    payload.add_argument(
-        '--payload', default=DEFAULT_PAYLOAD, help='the kind of device (default: %(default)s)',
-        choices=[one.name for one in PAYLOADS.values() if one.checks])
-    found, _ = payload.parse_known_args(args)
-    checks: PayloadChecks[Any] = PAYLOADS[found.payload].load('checks')
-    return payload, checks
-
-
 def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks[Any]]:
     """
     Return the options, and the checks of the payload that they name.
@@ -70,41 +56,44 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks
     :param args: the command line without the program's name; None takes that of the process.
     :raises SystemExit: if an argument is wrong, with status 2.
     """
-    payload, checks = _checks(args)
-    device = checks.device
-    result = Parser(
-        prog='conformance', formatter_class=argparse.RawDescriptionHelpFormatter,
-        parents=[payload], description=DESCRIPTION.format(device=device),
-        epilog=EPILOG.format(device=device))
-    result.add_argument('url', nargs='?', help='connection URL: UDP, TCP or serial')
-    result.add_argument('--version', action='version', version=__version__)
-    result.add_argument('--list', action='store_true', help='list the requirements and exit')
-    result.add_argument('--yes', action='store_true', help=(
-        f'let the {device} {checks.risk}, without asking').replace('%', '%%'))
-    result.add_argument('--target', type=_address, metavar='SYS/COMP',
-                        help=f'address of the {device} (default: the first that is heard)')
-    result.add_argument('--only', action='append', default=[], metavar='NAME',
-                        choices=[one.name for one in checks.requirements],
-                        help='check this requirement only; may be repeated')
+    payload = Parser(prog='conformance', add_help=False)
+    payload.add_argument(
+        '--payload', default=DEFAULT_PAYLOAD, help='the kind of device (default: %(default)s)',
+        choices=[one.name for one in PAYLOADS.values() if one.checks])
+    checks: PayloadChecks[Any] = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
+    parser = Parser(
+        prog='conformance', formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EPILOG,
+        description=f'Checks whether a {checks.device} follows its MAVLink protocols.',
+        parents=[payload])
+    add = parser.add_argument
+    add('url', nargs='?', help='connection URL: UDP, TCP or serial')
+    add('--version', action='version', version=__version__)
+    add('--list', action='store_true', help='list the requirements and exit')
+    add('--yes', action='store_true', help=f'allow it to {checks.risk}, without asking'.replace(
+        '%', '%%'))
+    add('--target', type=_address, metavar='SYS/COMP',
+        help=f'address of the {checks.device} (default: the first that is heard)')
+    add('--only', action='append', default=[], metavar='NAME',
+        choices=[one.name for one in checks.requirements],
+        help='check this requirement only; may be repeated')
     for one in checks.options:
-        result.add_argument(f'--{one.name}', type=number(one.low, one.high), default=one.default,
-                            metavar=one.metavar, help=f'{one.help} (default: %(default)g)')
-    result.add_argument('--wait', type=number(0.1, 3600), default=FIND_TIMEOUT, metavar='S',
-                        help=f'how long to wait for the {device} (default: %(default)g)')
-    result.add_argument('--system-id', type=integer(1, 255), default=255, metavar='ID',
-                        help='our MAVLink system ID (default: 255)')
-    result.add_argument('--component-id', type=integer(1, 255), default=190, metavar='ID',
-                        help='our component ID (default: 190)')
-    result.add_argument('--junit', metavar='FILE', help='also write a JUnit report')
-    result.add_argument('--json', metavar='FILE',
-                        help='also write a JSON report with all messages')
-    result.add_argument('-v', '--verbose', action='store_true',
-                        help='show the messages for requirements that are met, too')
-    add_signing(result)
-    options = result.parse_args(args)
+        add(f'--{one.name}', type=number(one.low, one.high), default=one.default,
+            metavar=one.metavar, help=f'{one.help} (default: %(default)g)')
+    add('--wait', type=number(0.1, 3600), default=FIND_TIMEOUT, metavar='S',
+        help=f'how long to wait for the {checks.device} (default: %(default)g)')
+    add('--system-id', type=integer(1, 255), default=255, metavar='ID',
+        help='our MAVLink system ID (default: 255)')
+    add('--component-id', type=integer(1, 255), default=190, metavar='ID',
+        help='our component ID (default: 190)')
+    add('--junit', metavar='FILE', help='also write a JUnit report')
+    add('--json', metavar='FILE', help='also write a JSON report with all messages')
+    add('-v', '--verbose', action='store_true',
+        help='show the messages for requirements that are met, too')
+    add_signing(parser)
+    options = parser.parse_args(args)
     if options.url is None and not options.list:
-        result.error('the connection URL is missing')
+        parser.error('the connection URL is missing')
     for path in filter(None, (options.junit, options.json)):
         if not Path(path).absolute().parent.is_dir():
-            result.error(f'{path}: there is no such directory')
+            parser.error(f'{path}: there is no such directory')
     return options, checks

@@ -97,7 +97,7 @@ class LiveView:
         room = max(size.lines - SPARE_LINES, 1)
         lines = [str(one) for one in looks[:room]]
         if len(looks) > room:
-            lines[-1] = f'... and {len(looks) - room + 1} lights more'
+            lines[-1] = f'... and {len(looks) - room + 1} more'
         lines = [line[:size.columns - 1] for line in lines]
         if len(lines) != self._height:
             self._lines = lines

@@ -19,18 +19,11 @@ from __future__ import annotations
 from .specification import ILLUMINATOR
 from .tester import LightTester
 from ...mavlink.messages import Address, MavCmd, MavResult
-from ...payload.checks.requirement import (
-    COMMAND,
-    fail_if,
-    Failed,
-    MESSAGES,
-    requirement,
-    ROUTING,
-    Skipped,
-)
+from ...payload.checks import requirement as base
+from ...payload.checks.requirement import fail_if, Failed, requirement, Skipped
 
 
-@requirement('other-target', 'ignores commands for other components and systems', ROUTING,
+@requirement('other-target', 'ignores commands for other components and systems', base.ROUTING,
              'Routing Detail', changes=True)
 async def other_target(tester: LightTester) -> None:
     """Send ON to addresses that do not exist: another component, and another system."""
@@ -38,10 +31,10 @@ async def other_target(tester: LightTester) -> None:
     session = tester.session
     taken = session.heard | {session.address, session.device}
     system, component = session.device
-    others = [
+    systems = {one.system for one in taken}
+    others = (
         next(one for one in (Address(system, n) for n in range(200, 256)) if one not in taken),
-        next(one for one in (Address(n, component or 200) for n in range(240, 0, -1))
-             if one.system not in {source.system for source in taken})]
+        next(Address(n, component or 200) for n in range(240, 0, -1) if n not in systems))
     findings = []
     for other in others:
         one = await session.send_to_other(other, MavCmd.ILLUMINATOR_ON_OFF, 1)
@@ -55,7 +48,7 @@ async def other_target(tester: LightTester) -> None:
 
 
 @requirement('command-int', 'accepts COMMAND_INT, or answers MAV_RESULT_COMMAND_LONG_ONLY',
-             COMMAND, 'Use COMMAND_INT or COMMAND_LONG?', changes=True)
+             base.COMMAND, 'Use COMMAND_INT or COMMAND_LONG?', changes=True)
 async def command_int(tester: LightTester) -> str:
     """Switch it on with COMMAND_INT."""
     await tester.ensure_dim()
@@ -67,7 +60,7 @@ async def command_int(tester: LightTester) -> str:
     return one.answer
 
 
-@requirement('repeated', 'handles a repeated command like the first one', COMMAND,
+@requirement('repeated', 'handles a repeated command like the first one', base.COMMAND,
              'COMMAND_LONG sequence', changes=True)
 async def repeated(tester: LightTester) -> None:
     """Repeat ON, as after a lost acknowledgement."""
@@ -109,11 +102,10 @@ async def _switch(tester: LightTester, on: bool) -> None:
     fail_if([change.unmet('enable')])
     if before is not None and before.enabled is on:
         state, other = ('on', 'off') if on else ('off', 'on')
-        raise Skipped(f'accepted, but it was already {state} and could not be switched {other} '
-                      'before')
+        raise Skipped(f'accepted, but it was {state} and could not be switched {other} before')
 
 
-@requirement('on-off-values', 'rejects ON_OFF values other than 0 and 1', MESSAGES,
+@requirement('on-off-values', 'rejects ON_OFF values other than 0 and 1', base.MESSAGES,
              'MAV_CMD_ILLUMINATOR_ON_OFF', changes=True)
 async def values(tester: LightTester) -> None:
     """Send values below, between and above."""

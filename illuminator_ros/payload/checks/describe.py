@@ -16,17 +16,8 @@
 
 from __future__ import annotations
 
-from ...mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    MavCmd,
-    MavResult,
-    Message,
-    result_name,
-)
+from ...mavlink import messages
+from ...mavlink.messages import Address, CommandAck, CommandInt, CommandLong, MavCmd, MavResult
 
 
 def command_name(command: int) -> str:
@@ -37,15 +28,14 @@ def command_name(command: int) -> str:
         return f'MAV_CMD {command}'
 
 
-def describe(message: Message) -> str:
+def describe(message: messages.Message) -> str:
     """Return a message in one line; only the name of one that is not of these protocols."""
     if isinstance(message, CommandLong | CommandInt):
         return _command(message)
     if isinstance(message, CommandAck):
         return _ack(message)
-    if isinstance(message, Heartbeat):
-        return (f'HEARTBEAT type {message.type}, autopilot {message.autopilot}, '
-                f'system_status {message.system_status}')
+    if isinstance(message, messages.Heartbeat):
+        return f'HEARTBEAT type {message.type}, autopilot {message.autopilot}'
     return str(message.msgname)
 
 
@@ -53,15 +43,15 @@ def _command(message: CommandLong | CommandInt) -> str:
     params = [message.param1, message.param2, message.param3, message.param4]
     while len(params) > 1 and params[-1] == 0:
         params.pop()
-    target = Address(message.target_system, message.target_component)
+    to = Address(message.target_system, message.target_component)
     confirmation = getattr(message, 'confirmation', 0)
-    return (f'{message.msgname} to {target}: {command_name(message.command)} '
-            + ' '.join(f'{param:g}' for param in params)
+    numbers = ' '.join(f'{param:g}' for param in params)
+    return (f'{message.msgname} to {to}: {command_name(message.command)} {numbers}'
             + (f', confirmation {confirmation}' if confirmation else ''))
 
 
 def _ack(message: CommandAck) -> str:
-    text = f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
+    text = f'COMMAND_ACK {command_name(message.command)}: {messages.result_name(message.result)}'
     if message.result == MavResult.IN_PROGRESS:
         text += f', progress {message.progress}'
     target = Address(message.target_system, message.target_component)

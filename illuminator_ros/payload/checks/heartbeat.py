@@ -16,15 +16,7 @@
 
 from __future__ import annotations
 
-from .requirement import (
-    Failed,
-    HEARTBEAT,
-    Requirement,
-    requirement,
-    ROUTING,
-    Skipped,
-    Tester,
-)
+from .requirement import Failed, HEARTBEAT, Requirement, requirement, ROUTING, Skipped, Tester
 from ...mavlink import messages
 from ...mavlink.messages import MAV_AUTOPILOT_INVALID, MavType
 
@@ -73,6 +65,5 @@ async def address(tester: Tester) -> str:
     """Read the address of the device; 0 is the broadcast address."""
     device = tester.session.device
     if 0 in device:
-        raise Failed(f'it sends from {device}: 0 is the broadcast address, so routers cannot '
-                     'find it')
+        raise Failed(f'it sends from {device}: 0 means broadcast, so routers cannot find it')
     return f'{device}'

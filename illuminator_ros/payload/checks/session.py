@@ -25,19 +25,8 @@ from .coroutine import CoroutineRunner
 from .describe import command_name, describe
 from .history import History
 from .transaction import Ack, Transaction
-from ...mavlink.component import Endpoint
-from ...mavlink.component import Heartbeat as HeartbeatTimer
-from ...mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    MavCmd,
-    MavResult,
-    MavType,
-    Message,
-)
+from ...mavlink import component, messages
+from ...mavlink.messages import Address, CommandAck, MavCmd, MavResult, Message
 
 M = TypeVar('M', bound=Message)
 
@@ -61,7 +50,7 @@ class DeviceLost(Exception):
     """The device has stopped sending."""
 
 
-class Session(Endpoint):
+class Session(component.Endpoint):
     """
     Sends commands to one device and records its messages.
 
@@ -69,7 +58,7 @@ class Session(Endpoint):
     and every acknowledgement, which a component handles or drops.
 
     :param address: our own address.
-    :param messages: the classes of the payload's messages.
+    :param payload_messages: the classes of the payload's messages.
     :param is_device: whether a message identifies its sender as a device of this payload.
     :param describe: text of a message of the payload.
     :param target: the device; None selects the first that is heard.
@@ -82,13 +71,13 @@ class Session(Endpoint):
     """
 
     def __init__(
-        self, address: Address, messages: Sequence[type[Message]], *,
+        self, address: Address, payload_messages: Sequence[type[Message]], *,
         is_device: Callable[[Message], bool], describe: Callable[[Message], str] = describe,
         target: Address | None = None,
     ) -> None:
         super().__init__()
         self.address = address
-        self.messages = (Heartbeat, CommandAck, *messages)
+        self.messages = (messages.Heartbeat, CommandAck, *payload_messages)
         self.target = target
         self.runner = CoroutineRunner()
         self.found: Address | None = None
@@ -104,7 +93,7 @@ class Session(Endpoint):
         self._began: float | None = None
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
-        self._heartbeat = HeartbeatTimer(address, MavType.GCS)
+        self._heartbeat = component.Heartbeat(address, messages.MavType.GCS)
         self._open = False
 
     # The endpoint
@@ -265,10 +254,10 @@ class Session(Endpoint):
         target: Address,
     ) -> None:
         values = [*map(float, params), *[0.0] * (7 - len(params))]
-        message = (
-            CommandInt(*target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3],
-                       0, 0, 0.0) if as_int
-            else CommandLong(*target, one.command, min(confirmation, 255), *values))
+        message = messages.CommandInt(
+            *target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3], 0, 0, 0.0,
+        ) if as_int else messages.CommandLong(
+            *target, one.command, min(confirmation, 255), *values)
         one.sent.append(self.now)
         self.outgoing.append((self.address, message))
         self._note('>', message)

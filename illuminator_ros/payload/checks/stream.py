@@ -16,21 +16,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 import math
 
-from .requirement import (
-    Failed,
-    median,
-    MESSAGES,
-    periods,
-    Requirement,
-    requirement,
-    Skipped,
-    Specification,
-    Tester,
-)
+from . import requirement as base
+from .requirement import Failed, median, MESSAGES, periods, Requirement, requirement
 from .session import Session
-from .transaction import Transaction
 from ...mavlink.messages import MavCmd, Message
 
 # s
@@ -42,8 +33,8 @@ MESSAGE_INTERVAL = 'MAV_CMD_SET_MESSAGE_INTERVAL'
 
 
 def stream_requirements(
-    status: type[Message], specification: Specification, stream: str, request: str,
-) -> tuple[Requirement[Tester], Requirement[Tester]]:
+    status: type[Message], specification: base.Specification, stream: str, request: str,
+) -> tuple[Requirement[base.Tester], Requirement[base.Tester]]:
     """
     Return the requirements ``status-stream`` and ``status-request``.
 
@@ -52,7 +43,7 @@ def stream_requirements(
     """
     @requirement('status-stream', f'sends {status.msgname} at a regular rate', specification,
                  stream)
-    async def regular(tester: Tester) -> str:
+    async def regular(tester: base.Tester) -> str:
         times = periods([at for at, _ in tester.session.idle(status)])
         if not times:
             raise Failed('it sends at most one without a request')
@@ -61,7 +52,7 @@ def stream_requirements(
         return f'every {median(times):.2f} s'
 
     @requirement('status-request', f'sends {status.msgname} on request', specification, request)
-    async def on_request(tester: Tester) -> None:
+    async def on_request(tester: base.Tester) -> None:
         session = tester.session
         before = session.received(status).count
         one = await session.command(MavCmd.REQUEST_MESSAGE, status.id)
@@ -74,68 +65,61 @@ def stream_requirements(
     return regular, on_request
 
 
-def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], ...]:
+def interval_requirements(status: type[Message]) -> tuple[Requirement[base.Tester], ...]:
     """Return the requirements ``interval``, ``interval-stop`` and ``interval-default``."""
     @requirement('interval', f'sends {status.msgname} at the requested interval', MESSAGES,
                  MESSAGE_INTERVAL, changes=True)
-    async def honoured(tester: Tester) -> str:
+    async def honoured(tester: base.Tester) -> str:
         await _accepted(tester.session, status, INTERVAL * 1e6)
         # No device has this default.
         times = periods([at for at, _ in await tester.session.receive_more(
             status, WATCH_TIME, round(10 * WATCH_TIME / INTERVAL))])
         if not times:
-            raise Failed(f'{INTERVAL:g} s was accepted, but at most one message was received '
-                         f'in {WATCH_TIME:g} s')
+            raise Failed(f'accepted, but at most one was received in {WATCH_TIME:g} s')
+        text = f'requested {INTERVAL:g} s, received every {median(times):.2f} s'
         if not 0.6 * INTERVAL < median(times) < 1.6 * INTERVAL:
-            raise Failed(f'{INTERVAL:g} s was accepted, but the interval is '
-                         f'{median(times):.2f} s')
-        return f'requested {INTERVAL:g} s, received every {median(times):.2f} s'
+            raise Failed(text)
+        return text
 
     @requirement('interval-stop', 'stops the stream on interval -1', MESSAGES, MESSAGE_INTERVAL,
                  changes=True)
-    async def stopped(tester: Tester) -> None:
+    async def stopped(tester: base.Tester) -> None:
         await _accepted(tester.session, status, -1)
         # A message may be under way.
         await tester.session.runner.sleep(0.3)
         before = tester.session.received(status).count
         await tester.session.runner.sleep(WATCH_TIME)
         if count := tester.session.received(status).count - before:
-            raise Failed(f'-1 was accepted, but messages were received in {WATCH_TIME:g} s: '
-                         f'{count}')
+            raise Failed(f'accepted, but still received in {WATCH_TIME:g} s: {count}')
 
     @requirement('interval-default', 'returns to its default rate on interval 0', MESSAGES,
                  MESSAGE_INTERVAL, changes=True)
-    async def default(tester: Tester) -> None:
+    async def default(tester: base.Tester) -> None:
         await _accepted(tester.session, status, 0)
         if len(await tester.session.receive_more(status, DEFAULT_TIMEOUT, 2)) >= 2:
             return
         if not tester.session.idle(status):
-            raise Skipped('no message was received, and none before the first command')
-        raise Failed(f'0 was accepted, but at most one message was received in '
-                     f'{DEFAULT_TIMEOUT:g} s')
+            raise base.Skipped('none was received, before the first command either')
+        raise Failed(f'accepted, but at most one was received in {DEFAULT_TIMEOUT:g} s')
 
     return honoured, stopped, default
 
 
 async def _accepted(session: Session, status: type[Message], interval: float) -> None:
-    one = await _set_interval(session, status, interval)
+    one = await session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
     if not one.accepted:
         raise Failed(f'{one.text}: {one.answer}')
 
 
-async def _set_interval(session: Session, status: type[Message], interval: float) -> Transaction:
-    return await session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
-
-
 async def restore_stream(session: Session, status: type[Message]) -> None:
     """Restore the interval that the status had before the first command."""
+    set_interval = partial(session.command, MavCmd.SET_MESSAGE_INTERVAL, status.id)
     before = periods([at for at, _ in session.idle(status)])
     if not before:
-        await _set_interval(session, status, -1)
+        await set_interval(-1)
         return
     period = median(before)
-    await _set_interval(session, status, 0)
-    times = periods(
-        [at for at, _ in await session.receive_more(status, 3.5 * period + 0.5, 3)])
+    await set_interval(0)
+    times = periods([at for at, _ in await session.receive_more(status, 3.5 * period + 0.5, 3)])
     if not times or not math.isclose(median(times), period, rel_tol=0.25, abs_tol=0.02):
-        await _set_interval(session, status, round(period, 3) * 1e6)
+        await set_interval(round(period, 3) * 1e6)

@@ -16,20 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from .requirement import (
-    COMMAND,
-    Failed,
-    HEARTBEAT,
-    median,
-    periods,
-    requirement,
-    SERIALIZATION,
-    Skipped,
-    Tester,
-)
-from .session import Session
+from . import requirement as base
+from .requirement import Failed, median, periods, Requirement, requirement, Skipped, Tester
 from .transaction import Finding, Transaction
 from ...mavlink.messages import Heartbeat, MavResult, result_name
 
@@ -41,7 +31,7 @@ FINISHED = 2.0
 MAX_QUOTED = 3
 
 
-@requirement('heartbeat-rate', 'sends HEARTBEAT at about 1 Hz', HEARTBEAT,
+@requirement('heartbeat-rate', 'sends HEARTBEAT at about 1 Hz', base.HEARTBEAT,
              'HEARTBEAT Broadcast Frequency', whole_run=True)
 async def heartbeat_rate(tester: Tester) -> str:
     """Measure all intervals, and the time since the latest."""
@@ -64,102 +54,96 @@ def none_of(findings: Sequence[Finding], total: int, objects: str) -> str:
     """
     if findings:
         more = len(findings) - MAX_QUOTED
-        raise Failed(
-            f'{len(findings)} of {total} {objects}: '
-            + '; '.join(one.text for one in findings[:MAX_QUOTED])
-            + (f'; and {more} more' if more > 0 else ''),
-            [line for one in findings[:MAX_QUOTED] for line in one.lines])
+        texts = '; '.join(one.text for one in findings[:MAX_QUOTED])
+        raise Failed(f'{len(findings)} of {total} {objects}: {texts}'
+                     + (f'; and {more} more' if more > 0 else ''),
+                     [line for one in findings[:MAX_QUOTED] for line in one.lines])
     return f'{total} {objects}'
 
 
-def _expected(session: Session) -> list[Transaction]:
-    expected = [one for one in session.transactions if one.expected]
-    if not expected:
-        raise Skipped('no command was sent')
-    return expected
+def _for_each_command(
+    name: str, title: str, section: str, deviation: Callable[[Transaction, Tester], str],
+    measurement: Callable[[Sequence[Transaction]], str] = lambda every: '',
+) -> Requirement[Tester]:
+    """
+    Return a requirement on the acknowledgements of every command.
+
+    :param deviation: returns what is wrong, '' if nothing.
+    :param measurement: returns a text that follows the number of commands.
+    """
+    @requirement(name, title, base.COMMAND, section, whole_run=True)
+    async def check(tester: Tester) -> str:
+        every = [one for one in tester.session.transactions if one.expected]
+        if not every:
+            raise Skipped('no command was sent')
+        return none_of([Finding(f'{one.text} ({wrong})', one.lines) for one in every
+                        if (wrong := deviation(one, tester))],
+                       len(every), 'commands') + measurement(every)
+    return check
 
 
-@requirement('acknowledged', 'acknowledges every command at the first attempt', COMMAND,
-             'COMMAND_LONG sequence', whole_run=True)
-async def acknowledged(tester: Tester) -> str:
-    """Count the attempts; on a lossy link they show the link's loss."""
-    every = _expected(tester.session)
-    return none_of([Finding(f'{one.text} ({len(one.sent)} attempts, {one.answer})', one.lines)
-                    for one in every if len(one.sent) > 1 or not one.acks],
-                   len(every), 'commands')
+def _not_at_first(one: Transaction, tester: Tester) -> str:
+    # On a lossy link the attempts show the link's loss.
+    return f'{len(one.sent)} attempts, {one.answer}' if len(one.sent) > 1 or not one.acks else ''
 
 
-@requirement('acknowledged-once', 'acknowledges every command once', COMMAND,
-             'COMMAND_LONG sequence', whole_run=True)
-async def acknowledged_once(tester: Tester) -> str:
-    """Count the acknowledgements."""
-    every = _expected(tester.session)
-    return none_of([Finding(f'{one.text} ({len(one.finals)} acknowledgements)', one.lines)
-                    for one in every if len(one.finals) > len(one.sent)],
-                   len(every), 'commands')
+def _more_than_once(one: Transaction, tester: Tester) -> str:
+    return f'{len(one.finals)} acknowledgements' if len(one.finals) > len(one.sent) else ''
 
 
-@requirement('acknowledged-promptly', f'acknowledges every command within {PROMPT:g} s', COMMAND,
-             'COMMAND_INT sequence', whole_run=True)
-async def acknowledged_promptly(tester: Tester) -> str:
-    """Measure those that were sent once."""
-    every = [(one, one.acks[0].at - one.sent[0]) for one in _expected(tester.session)
-             if len(one.sent) == 1 and one.acks]
-    if not every:
-        raise Skipped('no command was acknowledged at the first attempt')
-    count = none_of([Finding(f'{one.text} ({seconds:.2f} s)', one.lines)
-                     for one, seconds in every if seconds > PROMPT], len(every), 'commands')
-    return f'{count}, the slowest {max(seconds for _, seconds in every) * 1000:.0f} ms'
+def _delay(one: Transaction) -> float:
+    # After a repetition it is not known which attempt was acknowledged.
+    return one.acks[0].at - one.sent[0] if len(one.sent) == 1 and one.acks else 0.0
 
 
-@requirement('acknowledged-to-us',
-             'addresses acknowledgements to the sender, or leaves their target 0', COMMAND,
-             'Message/Enum Summary', whole_run=True)
-async def acknowledged_to_us(tester: Tester) -> str:
-    """Read the target fields, which are extensions and may be missing."""
+def _late(one: Transaction, tester: Tester) -> str:
+    return f'{_delay(one):.2f} s' if _delay(one) > PROMPT else ''
+
+
+def _to_others(one: Transaction, tester: Tester) -> str:
+    # The target fields are extensions, so they may be missing.
     system, component = tester.session.address
-    every = [(one, ack.target) for one in _expected(tester.session) for ack in one.acks]
-    return none_of([Finding(f'{one.text} (to {target})', one.lines) for one, target in every
-                    if target.system not in (0, system) or target.component not in (0, component)],
-                   len(every), 'acknowledgements')
+    return ', '.join(f'to {ack.target}' for ack in one.acks if ack.target.system not in (0, system)
+                     or ack.target.component not in (0, component))
 
 
-@requirement('finished', f'completes every change within {FINISHED:g} s', COMMAND,
-             'Long Running Commands', whole_run=True)
-async def finished(tester: Tester) -> str:
-    """Measure those that were reported to be in progress."""
-    every = _expected(tester.session)
-    findings = []
-    for one in every:
-        reports = [ack for ack in one.acks if ack.result == MavResult.IN_PROGRESS]
-        if not reports:
-            continue
-        if not one.finals:
-            findings.append(Finding(f'{one.text} never', one.lines))
-        elif (seconds := one.finals[-1].at - one.sent[0]) > FINISHED:
-            findings.append(Finding(f'{one.text} after {seconds:.1f} s', one.lines))
-        elif any(100 < ack.progress < 255 for ack in reports):
-            findings.append(Finding(f'{one.text} with a progress above 100 %', one.lines))
-    return none_of(findings, len(every), 'commands')
+def _unfinished(one: Transaction, tester: Tester) -> str:
+    reports = [ack for ack in one.acks if ack.result == MavResult.IN_PROGRESS]
+    if not reports:
+        return ''
+    if not one.finals:
+        return 'never'
+    if (seconds := one.finals[-1].at - one.sent[0]) > FINISHED:
+        return f'after {seconds:.1f} s'
+    return 'progress above 100 %' if any(100 < ack.progress < 255 for ack in reports) else ''
 
 
-@requirement('not-busy', 'never rejects a command temporarily while it is idle', COMMAND,
-             'Long Running Commands', whole_run=True)
-async def not_busy(tester: Tester) -> str:
-    """Read the results; commands are never sent in parallel here."""
-    every = _expected(tester.session)
-    return none_of([Finding(f'{one.text}: {result_name(ack.result)}', one.lines)
-                    for one in every for ack in one.acks
-                    if ack.result == MavResult.TEMPORARILY_REJECTED], len(every), 'commands')
+def _busy(one: Transaction, tester: Tester) -> str:
+    # Commands are never sent in parallel here.
+    return ', '.join(result_name(ack.result) for ack in one.acks
+                     if ack.result == MavResult.TEMPORARILY_REJECTED)
 
 
-@requirement('checksums', 'sends frames with correct checksums', SERIALIZATION, 'Checksum',
+ACKNOWLEDGEMENTS = (
+    _for_each_command('acknowledged', 'acknowledges every command at the first attempt',
+                      'COMMAND_LONG sequence', _not_at_first),
+    _for_each_command('acknowledged-once', 'acknowledges every command once',
+                      'COMMAND_LONG sequence', _more_than_once),
+    _for_each_command('acknowledged-promptly', f'acknowledges every command within {PROMPT:g} s',
+                      'COMMAND_INT sequence', _late, lambda every:
+                      f', the slowest {max(map(_delay, every)) * 1000:.0f} ms'),
+    _for_each_command('acknowledged-to-us', 'addresses acknowledgements to the sender, or leaves '
+                      'their target 0', 'Message/Enum Summary', _to_others),
+    _for_each_command('finished', f'completes every change within {FINISHED:g} s',
+                      'Long Running Commands', _unfinished),
+    _for_each_command('not-busy', 'never rejects a command temporarily while it is idle',
+                      'Long Running Commands', _busy),
+)
+
+
+@requirement('checksums', 'sends frames with correct checksums', base.SERIALIZATION, 'Checksum',
              whole_run=True)
 async def checksums(tester: Tester) -> None:
     """Count the frames that the link has dropped; noise on a line counts, too."""
     if count := tester.conditions.checksum_errors():
         raise Failed(f'{count} {"frame" if count == 1 else "frames"} with a wrong checksum')
-
-
-ACKNOWLEDGEMENTS = (acknowledged, acknowledged_once, acknowledged_promptly, acknowledged_to_us,
-                    finished, not_busy)

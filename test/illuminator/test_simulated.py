@@ -1,0 +1,262 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated light follows the illuminator, heartbeat, command and interval protocols."""
+
+from illuminator_ros.illuminator.identity import Identity
+from illuminator_ros.illuminator.simulated import simulated_lights
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.thermal import ThermalProperties
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    ComponentInformationBasic,
+    encode_payload,
+    Heartbeat,
+    IlluminatorStatus,
+    INFORMATION_ID,
+    MavCmd,
+    MavResult,
+    MavType,
+    STATUS_ID,
+)
+import pytest
+from support.light_bench import GROUND, LightBench
+
+NAN, INF = float('nan'), float('inf')
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+REQUEST, SET_INTERVAL = MavCmd.REQUEST_MESSAGE, MavCmd.SET_MESSAGE_INTERVAL
+ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
+HOT = ThermalProperties(ambient=40.0, rise=80.0, time_constant=10.0)
+
+
+@pytest.fixture
+def bench():
+    bench = LightBench()
+    bench.run(0.5)
+    bench.sent.clear()
+    return bench
+
+
+def statuses(messages):
+    return [message for message in messages if isinstance(message, IlluminatorStatus)]
+
+
+def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start():
+    beats = [m for m in LightBench().run(4.5) if isinstance(m, Heartbeat)]
+    assert {(m.type, m.autopilot) for m in beats} == {(MavType.ILLUMINATOR, 8)}
+    assert len(beats) == 5
+
+
+@pytest.mark.parametrize(('interval', 'expected'), [(1.0, 5), (0.5, 9), (0.1, 45), (0.0, 0)])
+def test_statuses_are_sent_at_the_interval_of_the_properties(interval, expected):
+    assert len(statuses(LightBench(status_interval=interval).run(4.45))) == expected
+
+
+def test_a_stream_keeps_its_rate_when_polled_late_and_leaves_out_what_it_missed():
+    bench = LightBench(status_interval=0.1)
+    for turn in range(101):
+        bench.component.poll(turn * 0.1 + 0.03)
+    for now in (60.2, 60.21):
+        bench.component.poll(now)
+    assert len(statuses(message for _, message in bench.component.outgoing)) == 102
+
+
+def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench):
+    assert bench.lamp.uptime_ms(1.234) == 1234
+    assert bench.lamp.uptime_ms(2 ** 32 / 1000 + 1.5) == 1500
+
+
+def test_a_requested_message_follows_its_acknowledgement(bench):
+    ack, status = bench.command(REQUEST, STATUS_ID)
+    assert (type(ack), ack.result, ack.command) == (CommandAck, ACCEPTED, REQUEST)
+    assert (ack.target_system, ack.target_component) == GROUND
+    assert (status.uptime_ms, status.enable, status.mode, status.brightness) == (500, 0, 1, 100.0)
+    ack, information = bench.command(REQUEST, INFORMATION_ID)
+    assert (ack.result, type(information)) == (ACCEPTED, ComponentInformationBasic)
+    assert Identity.from_message(information).serial_number == 'SIM-1-243'
+
+
+def test_strings_that_are_too_long_are_cut_and_terminated():
+    bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
+    _, information = bench.command(REQUEST, INFORMATION_ID)
+    assert encode_payload(information)[16:] == (
+        b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
+        + b'n' * 31 + b'\0')
+
+
+@pytest.mark.parametrize(('command', 'params', 'result'), [
+    *((REQUEST, (message_id,), DENIED) for message_id in (0, 1, 33, NAN, INF, -1, 440.5)),
+    *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, INFORMATION_ID, NAN)),
+    *((SET_INTERVAL, (STATUS_ID, interval), DENIED) for interval in (NAN, INF, -INF, -2, -0.5)),
+    *((command, (), MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
+    *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
+def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
+        bench, command, params, result):
+    (ack,) = bench.command(command, *params)
+    assert ack.result == result
+    assert bench.status().enable == 0
+    assert len(statuses(bench.run(3.0))) == 3
+
+
+@pytest.mark.parametrize(('microseconds', 'expected'), [
+    (250_000, 8), (2_000_000, 1), (0, 2), (-1, 0), (1, 200)])
+def test_the_interval_of_the_status_can_be_set_within_what_the_light_offers(
+        bench, microseconds, expected):
+    assert bench.result(SET_INTERVAL, STATUS_ID, microseconds) == ACCEPTED
+    assert len(statuses(bench.run(2.001))) == expected
+
+
+def test_the_default_interval_starts_a_stopped_stream_again(bench):
+    bench.command(SET_INTERVAL, STATUS_ID, -1)
+    bench.command(SET_INTERVAL, STATUS_ID, 0)
+    assert len(statuses(bench.run(3.0))) == 3
+
+
+@pytest.mark.parametrize(('target', 'enabled'), [
+    ((0, 0), True), ((1, 0), True), ((1, 243), True), ((0, 243), True),
+    ((1, 244), False), ((2, 243), False), ((2, 0), False), ((255, 190), False)])
+def test_a_command_is_obeyed_only_by_its_target(bench, target, enabled):
+    assert bool(bench.command(ON_OFF, 1, target=target)) is enabled
+    assert bench.lamp.enabled is enabled
+
+
+@pytest.mark.parametrize(('target', 'enabled'), [((1, 244), [False, True]), ((0, 0), [True] * 2)])
+def test_lights_on_one_link_obey_only_their_own_commands(target, enabled):
+    lights = simulated_lights(
+        [IlluminatorProperties(address=Address(1, one)) for one in (243, 244)], 0.0)
+    lights.receive(GROUND, CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
+    assert [light.device.lamp.enabled for light in lights.components] == enabled
+    assert len({source for source, _ in lights.outgoing}) == sum(enabled)
+
+
+def test_messages_that_are_not_commands_are_not_answered(bench):
+    for message in (Heartbeat(18, 8, 0, 0, 4, 3), CommandAck(405, 0, 0, 0, 1, 243)):
+        bench.component.receive(GROUND, message, bench.now)
+    assert not bench.component.outgoing
+
+
+@pytest.mark.parametrize('form', [CommandLong, CommandInt])
+def test_a_change_is_acknowledged_then_applied_then_reported(bench, form):
+    for value in (1, 0):
+        ack, status = bench.command(ON_OFF, value, form=form)
+        assert (ack.result, status.enable) == (ACCEPTED, value)
+    for params in ((1, 100, 0, 0), (2, 0, 0, 100), (1, 50, 1, 50), (1, 33.3, 10, 0)):
+        ack, status = bench.command(CONFIGURE, *params, form=form)
+        assert (ack.result, bench.shown()) == (ACCEPTED, params)
+        assert status.brightness == params[1]
+
+
+@pytest.mark.parametrize(('position', 'value'), [
+    *((0, value) for value in (0, -1, 3, 1.5, 255, NAN, INF)),
+    *((1, value) for value in (-1, -0.001, 100.001, 101, NAN, INF, -INF)),
+    *((2, value) for value in (-1, 0.04, 10.01, 1e30, NAN, INF, -INF)),
+    *((3, value) for value in (-1, -0.001, 100.001, 101, NAN, INF, -INF))])
+def test_one_wrong_value_denies_the_whole_configuration(bench, position, value):
+    before, params = bench.shown(), [2, 50, 1, 25]
+    params[position] = value
+    (ack,) = bench.command(CONFIGURE, *params)
+    assert (ack.result, bench.shown()) == (DENIED, before)
+
+
+def test_a_change_sends_no_status_while_the_stream_is_off():
+    assert len(LightBench(status_interval=0.0).command(ON_OFF, 1)) == 1
+
+
+def test_switching_and_configuring_do_not_affect_each_other(bench):
+    bench.command(CONFIGURE, 2, 50, 1, 25)
+    bench.command(ON_OFF, 1)
+    assert bench.shown() == (2, 50, 1, 25)
+    bench.command(CONFIGURE, 1, 60, 0, 0)
+    assert bench.lamp.enabled
+
+
+def test_a_restart_resets_the_settings_and_keeps_the_temperature():
+    bench = LightBench()
+    bench.command(ON_OFF, 1)
+    bench.command(CONFIGURE, 2, 50, 1, 10)
+    bench.lamp.heat_to(60.0, 0.0)
+    bench.now = 100.0
+    bench.component.restart(bench.now)
+    assert isinstance(bench.run(0.0)[0], Heartbeat)
+    status = bench.status()
+    assert (status.uptime_ms, status.enable, status.temp_c) == (0, 0, 60.0)
+    assert bench.shown() == (1, 100.0, 0, 0)
+
+
+# The tests of the developer guide's emulator, by their names there: the commands before, the
+# command, its result, and the state that the light reports then: enable or its configuration.
+GUIDE = {
+    'on_off_lowerbound': ([], (ON_OFF, -1), DENIED, 0),
+    'on_off_upperbound': ([], (ON_OFF, 2), DENIED, 0),
+    'turning_on': ([], (ON_OFF, 1), ACCEPTED, 1),
+    'turning_off': ([(ON_OFF, 1)], (ON_OFF, 0), ACCEPTED, 0),
+    'mode_internal_control': ([(CONFIGURE, 2, 100, 0, 0)], (CONFIGURE, 1, 100, 0, 0), ACCEPTED,
+                              (1, 100, 0, 0)),
+    'mode_external_sync': ([], (CONFIGURE, 2, 100, 0, 0), ACCEPTED, (2, 100, 0, 0)),
+    'mode_lowerbound': ([], (CONFIGURE, -1, 100, 0, 0), DENIED, (1, 100, 0, 0)),
+    'mode_upperbound': ([], (CONFIGURE, 3, 100, 0, 0), DENIED, (1, 100, 0, 0)),
+    'brightness': ([], (CONFIGURE, 1, 50, 0, 0), ACCEPTED, (1, 50, 0, 0)),
+    'brightness_lowerbound': ([], (CONFIGURE, 1, -1, 0, 0), DENIED, (1, 100, 0, 0)),
+    'brightness_upperbound': ([], (CONFIGURE, 1, 101, 0, 0), DENIED, (1, 100, 0, 0)),
+    'strobe': ([(CONFIGURE, 1, 100, 0.5, 25)], (CONFIGURE, 1, 100, 1, 50), ACCEPTED,
+               (1, 100, 1, 50)),
+    'strobe_period_lowerbound': ([], (CONFIGURE, 1, 100, -1, 50), DENIED, (1, 100, 0, 0)),
+    'strobe_duty_lowerbound': ([], (CONFIGURE, 1, 100, 1, -1), DENIED, (1, 100, 0, 0)),
+    'strobe_duty_upperbound': ([], (CONFIGURE, 1, 100, 1, 101), DENIED, (1, 100, 0, 0)),
+}
+
+
+@pytest.mark.parametrize(('before', 'command', 'result', 'state'), GUIDE.values(), ids=GUIDE)
+def test_the_light_passes_the_tests_of_the_developer_guide(before, command, result, state):
+    bench = LightBench()
+    for step in before:
+        assert bench.result(*step) == ACCEPTED
+    assert bench.result(*command) == result
+    assert state == (bench.shown() if isinstance(state, tuple) else bench.status().enable)
+
+
+def test_a_light_that_is_on_heats_and_dims_and_recovers():
+    bench = LightBench(thermal=HOT, status_interval=0.0)
+    bench.now = 100.0
+    assert bench.status().temp_c == pytest.approx(40.0)
+    bench.command(ON_OFF, 1)
+    bench.run(3.0)
+    assert bench.status().temp_c > 45.0
+    bench.run(5.0)
+    status = bench.status()
+    assert (status.error_status, status.brightness, status.enable) == (1, 50.0, 1)
+    bench.command(ON_OFF, 0)
+    bench.run(52.0)
+    assert (bench.status().error_status, bench.status().brightness) == (0, 100.0)
+
+
+@pytest.mark.parametrize(('brightness', 'period', 'duty_cycle', 'rise'), [
+    (100, 1, 10, 8.0), (50, 1, 50, 20.0), (40, 0, 10, 32.0), (40, 0, 0, 32.0), (100, 1, 0, 0.0)])
+def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
+        brightness, period, duty_cycle, rise):
+    bench = LightBench(thermal=HOT)
+    bench.command(ON_OFF, 1)
+    bench.command(CONFIGURE, 1, brightness, period, duty_cycle)
+    bench.now = 100.0
+    assert bench.status().temp_c == pytest.approx(40.0 + rise, abs=0.1)
+
+
+def test_heating_can_be_faster_than_real_time():
+    bench = LightBench(thermal=HOT, time_scale=8.0)
+    bench.command(ON_OFF, 1)
+    bench.now = 1.0
+    assert bench.status().error_status == 1

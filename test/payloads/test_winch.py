@@ -1,0 +1,119 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A winch beside a light: one link, one address, no change to what payloads share."""
+
+from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.cli.simulator.console import execute
+from illuminator_ros.cli.simulator.options import parser, payload_types
+from illuminator_ros.cli.simulator.scenario import components, Scenario, scenario
+from illuminator_ros.cli.simulator.view import look
+from illuminator_ros.illuminator.client import IlluminatorClient
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import Address, Heartbeat
+from illuminator_ros.payload.simulated import SimulatedComponents
+from payloads.winch import WINCH, WinchClient, WinchReport
+import pytest
+
+PAYLOAD_TYPES = {**PAYLOADS, 'winch': WINCH}
+BRIDGE, LIGHT, DECK = Address(1, 194), Address(1, 243), Address(1, 169)
+
+
+def simulated(*arguments, file=None):
+    """Return what ``simulator --payload illuminator,winch`` simulates with more arguments."""
+    args = ['--payload', 'illuminator,winch', *arguments]
+    types = payload_types(args, PAYLOAD_TYPES)
+    options = parser(types, PAYLOAD_TYPES).parse_args(args)
+    content = scenario(file, 'f.yaml', types) if file else Scenario()
+    return SimulatedComponents(components(options, content, types), 0.0)
+
+
+class Vehicle:
+    """A light and a winch on one link, and one component that is a client of both."""
+
+    def __init__(self):
+        self.devices = simulated()
+        commands = CommandSender(BRIDGE)
+        self.lights = IlluminatorClient(commands, Settings())
+        self.winches = WinchClient(commands)
+        self.reports, self.results, self.sent = [], [], []
+        self.winches.events.subscribe(self.reports.append)
+        self.component = Component(commands, [self.lights, self.winches])
+        self.now = 0.0
+        self.component.link_opened(self.now)
+        self.run(3.5)
+
+    def done(self, result, now):
+        self.results.append(result)
+
+    def run(self, seconds):
+        end = self.now + seconds
+        while self.now < end:
+            for side, other in ((self.devices, self.component), (self.component, self.devices)):
+                side.poll(self.now)
+                while side.outgoing:
+                    source, message = side.outgoing.popleft()
+                    self.sent.append((source, message))
+                    other.receive(source, message, self.now)
+            self.now += 0.01
+
+
+@pytest.fixture
+def vehicle():
+    return Vehicle()
+
+
+def test_one_component_with_one_heartbeat_finds_both(vehicle):
+    assert (set(vehicle.lights.lights), vehicle.winches.winches) == ({LIGHT}, {DECK})
+    beats = [one for one, message in vehicle.sent if isinstance(message, Heartbeat)]
+    assert beats.count(BRIDGE) == beats.count(LIGHT) == beats.count(DECK) == 4
+
+
+def test_each_payload_gets_the_result_of_its_own_command(vehicle):
+    lit = []
+    vehicle.lights.lights[LIGHT].enable(True, vehicle.now, lambda result, now: lit.append(result))
+    vehicle.winches.release(DECK, 5.0, vehicle.now, vehicle.done)
+    vehicle.winches.release(DECK, -9.0, vehicle.now, vehicle.done)
+    vehicle.run(1.0)
+    assert [one.success for one in lit] == [True]
+    assert [one.describe() for one in vehicle.results] == [
+        'MAV_RESULT_ACCEPTED', 'MAV_RESULT_DENIED']
+    assert vehicle.reports[-1] == WinchReport(DECK, 5.0)
+
+
+def test_the_faults_of_every_component_are_those_of_the_winch_too():
+    vehicle = Vehicle()
+    for component in vehicle.devices.components:
+        component.behave(component.device.faults.add(component.behaviour, 'refuse=failed'), 0.0)
+    vehicle.winches.release(DECK, 5.0, vehicle.now, vehicle.done)
+    vehicle.run(1.0)
+    assert [one.describe() for one in vehicle.results] == ['MAV_RESULT_FAILED']
+
+
+def test_the_console_gives_each_command_to_the_components_that_have_it():
+    devices = simulated('--light', '1/9=bow', '--winch', '1/8=deck').components
+    assert execute('deck release 2.5', devices, 0.0) == 'done'
+    assert execute('on', devices, 0.0) == 'done'
+    assert 'no command' in execute('bow release 1', devices, 0.0)
+    assert [str(look(one, 0.0)).split()[:3] for one in devices] == [
+        ['1/9', 'bow', 'ON'], ['1/8', 'deck', '2.5']]
+    assert 'release M' in execute('help', devices, 0.0)
+
+
+def test_a_file_lists_components_of_each_payload():
+    file = {'lights': [{'id': '1/9'}], 'winches': [{'id': '1/8', 'name': 'deck'}], 'seed': 4}
+    assert [(str(one.address), one.name) for one in simulated(file=file).components] == [
+        ('1/9', ''), ('1/8', 'deck')]

@@ -1,0 +1,148 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A winch: a second payload, the worked example of doc/design.md.
+
+It is found by its heartbeat, takes MAV_CMD_DO_WINCH, and reports WINCH_STATUS.
+https://mavlink.io/en/messages/common.html#WINCH_STATUS
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from illuminator_ros.mavlink.command import Command, CommandSender, Done
+from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, Heartbeat, MavResult
+from illuminator_ros.payload.events import Listeners
+from illuminator_ros.payload.faults import Behaviour
+from illuminator_ros.payload.registry import PayloadType
+from illuminator_ros.payload.simulated import (
+    Change,
+    CommandReply,
+    ConsoleCommand,
+    SimulatedDevice,
+    SimulatedType,
+    Snapshot,
+)
+from pymavlink.dialects.v20 import common
+
+WINCH = PayloadType('winch', simulated='payloads.winch:SIMULATED')
+
+MAV_TYPE_WINCH = 42
+DO_WINCH = 42600
+WINCH_RELATIVE_LENGTH_CONTROL = 1
+WinchStatus = common.MAVLink_winch_status_message
+
+
+@dataclass(frozen=True)
+class WinchReport:
+    """The released line of a winch, m."""
+
+    address: Address
+    line_length: float
+
+
+class WinchClient:
+    """
+    Finds winches on a link and releases their line.
+
+    :ivar events: a :class:`WinchReport` for each status.
+    """
+
+    messages = (Heartbeat, WinchStatus)
+
+    def __init__(self, commands: CommandSender) -> None:
+        self.events: Listeners[WinchReport] = Listeners()
+        self.winches: set[Address] = set()
+        self._commands = commands
+
+    def release(self, winch: Address, length: float, now: float, done: Done) -> None:
+        """Release line, m, or wind it in if negative; ``done`` gets the outcome."""
+        self._commands.start(
+            Command(winch, DO_WINCH, (1, WINCH_RELATIVE_LENGTH_CONTROL, length)), now, done)
+
+    def receive(self, source: Address, message: object, now: float) -> None:
+        """See :meth:`Payload.receive`."""
+        if isinstance(message, Heartbeat) and message.type == MAV_TYPE_WINCH:
+            self.winches.add(source)
+        elif isinstance(message, WinchStatus) and source in self.winches:
+            self.events.emit(WinchReport(source, message.line_length))
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Payload.link_opened`."""
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return float('inf')
+
+
+class SimulatedWinch(SimulatedDevice):
+    """A winch that releases and winds in at once."""
+
+    changes = frozenset({DO_WINCH})
+
+    def __init__(self) -> None:
+        super().__init__(Behaviour(heartbeat_type=MAV_TYPE_WINCH))
+        self.line_length = 0.0
+
+    def restart(self, now: float) -> None:
+        """See :meth:`SimulatedDevice.restart`; the line stays where it is."""
+
+    def streams(self) -> Mapping[int, float]:
+        """See :meth:`SimulatedDevice.streams`."""
+        return {WinchStatus.id: 1.0}
+
+    def message(self, message_id: int, now: float) -> object:
+        """See :meth:`SimulatedDevice.message`."""
+        if message_id == WinchStatus.id:
+            return WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
+        return None
+
+    def execute(self, command: CommandLong | CommandInt, now: float) -> CommandReply | None:
+        """See :meth:`SimulatedDevice.execute`."""
+        if command.command != DO_WINCH:
+            return None
+        length = self.line_length + command.param3
+        if command.param2 != WINCH_RELATIVE_LENGTH_CONTROL or not length >= 0:
+            return CommandReply(MavResult.DENIED)
+        return CommandReply(MavResult.ACCEPTED, partial(self.set_length, length))
+
+    def set_length(self, length: float) -> None:
+        """Release or wind in until so much of the line is released, m."""
+        self.line_length = length
+
+    def snapshot(self, now: float) -> Snapshot:
+        """See :meth:`SimulatedDevice.snapshot`."""
+        text = f'{self.line_length:.1f} m released'
+        return Snapshot(text, (text,))
+
+    def _release(self, words: list[str], now: float) -> Change:
+        return partial(self.set_length, self.line_length + float(words[0]))
+
+    commands = {'release': ConsoleCommand('release M', 'release line', _release, (1,))}
+
+
+SIMULATED = SimulatedType(
+    'winch', 'winches', SimulatedWinch,
+    make=lambda settings, address, several: SimulatedWinch(),
+    address=lambda settings: Address(1, 169))

@@ -1,0 +1,95 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A simulated light on a bench: commands in, messages out, time as an argument."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.simulated import describe, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+)
+from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, MavResult
+from illuminator_ros.payload.simulated import SimulatedComponent
+
+GROUND = Address(255, 190)
+
+
+class LightBench:
+    """
+    One simulated light.
+
+    :ivar now: s.
+    :ivar sent: each message that it has sent, with its time, since it was last cleared.
+    """
+
+    def __init__(
+        self, *faults: str, properties: IlluminatorProperties | None = None, **fields: Any,
+    ) -> None:
+        behaviour = fields.pop('behaviour', IlluminatorBehaviour())
+        for fault in faults:
+            behaviour = FAULTS.add(behaviour, fault)
+        self.component: SimulatedComponent[SimulatedIlluminator] = SimulatedComponent(
+            describe(properties or IlluminatorProperties(behaviour=behaviour, **fields)), 0.0)
+        self.lamp = self.component.device.lamp
+        self.now = 0.0
+        self.sent: list[tuple[float, Any]] = []
+
+    def run(self, seconds: float) -> list[Any]:
+        """Let time pass and return the messages that are sent meanwhile."""
+        before, end = len(self.sent), self.now + seconds
+        while (due := self.component.next_deadline()) <= end:
+            self.now = max(self.now, due)
+            self.component.poll(self.now)
+            self._collect()
+        self.now = end
+        return [message for _, message in self.sent[before:]]
+
+    def _collect(self) -> None:
+        self.sent += [(self.now, message) for _, message in self.component.outgoing]
+        self.component.outgoing.clear()
+
+    def command(
+        self, command: int, *params: float, target: tuple[int, int] | None = None,
+        form: type = CommandLong,
+    ) -> list[Any]:
+        """Send a command and return the messages that answer it at once."""
+        before, to = len(self.sent), target or self.component.address
+        values = [*params, *[0.0] * (7 - len(params))]
+        self.component.receive(GROUND, (
+            CommandInt(*to, 0, command, 0, 0, *values[:4], 0, 0, 0.0) if form is CommandInt
+            else CommandLong(*to, command, 0, *values)), self.now)
+        self._collect()
+        return [message for _, message in self.sent[before:]]
+
+    def result(self, command: int, *params: float, **options: Any) -> MavResult:
+        """Send a command and return the MAV_RESULT that answers it."""
+        return MavResult(self.command(command, *params, **options)[0].result)
+
+    def of(self, kind: type) -> list[tuple[float, Any]]:
+        """Return the messages of one class that were sent, with their times."""
+        return [(at, message) for at, message in self.sent if isinstance(message, kind)]
+
+    def status(self) -> Any:
+        """Return the ILLUMINATOR_STATUS of this moment."""
+        return self.component.device.status(self.now)
+
+    def shown(self) -> tuple[float, ...]:
+        """Return mode, brightness, strobe period and duty cycle as the status reports them."""
+        status = self.status()
+        return (status.mode, status.brightness, status.strobe_period, status.strobe_duty_cycle)
