@@ -48,7 +48,8 @@ def run_program(
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # A text that the encoding lacks must not end the program.
+            # A text that the encoding lacks must not end the program. Not later: the queue
+            # makes a pipe of a file, which cannot be reconfigured.
             stream.reconfigure(errors='backslashreplace')
     termination = Termination(more, queued)
     status = explained(name, lambda: run(termination))

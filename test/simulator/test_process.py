@@ -87,6 +87,17 @@ def test_the_help_on_a_full_disk_ends_without_a_traceback():
     assert (done.returncode, done.stderr) == (0, b'')
 
 
+def test_output_to_a_file_is_written(tmp_path):
+    """A console that quits at once; both streams of the process are one file."""
+    output = tmp_path / 'output'
+    with output.open('wb') as file:
+        done = subprocess.run([*SIMULATOR, f'udpout://127.0.0.1:{free_port()}'], input=b'quit\n',
+                              env=environment(), cwd=ROOT, stdout=file, stderr=file,
+                              preexec_fn=prepare_child, timeout=PATIENCE, check=False)
+    assert done.returncode == 0
+    assert output.read_text().startswith('1 light: 1/243\n')
+
+
 @pytest.mark.parametrize('closed', ['<&-', '>&-', '<&- >&- 2>&-'])
 def test_lights_are_served_while_standard_streams_are_closed(closed):
     port = free_port()
