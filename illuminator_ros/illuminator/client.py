@@ -58,6 +58,8 @@ class IlluminatorClient:
     :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
     """
 
+    messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic)
+
     def __init__(
         self, commands: CommandSender, settings: Settings, *,
         wanted: Callable[[Address], bool] = lambda source: True,

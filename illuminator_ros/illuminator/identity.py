@@ -17,9 +17,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from ..mavlink.messages import wire_value
+from ..mavlink.messages import ComponentInformationBasic
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +32,11 @@ class Identity:
     serial_number: str = ''
 
     @classmethod
-    def from_message(cls, message: Any) -> Identity:
+    def from_message(cls, message: ComponentInformationBasic) -> Identity:
         """Read a message; a field that is full has no terminator, and some have odd bytes."""
-        return cls(*(text(wire_value(message, name)) for name in (
-            'vendor_name', 'model_name', 'software_version', 'hardware_version',
-            'serial_number')))
+        return cls(*map(text, (
+            message.vendor_name, message.model_name, message.software_version,
+            message.hardware_version, message.serial_number)))
 
 
 def text(field: bytes) -> str:

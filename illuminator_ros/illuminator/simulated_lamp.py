@@ -16,37 +16,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import math
-import struct
 from typing import Any
 
 from .error_flags import ErrorFlag
 from .model import Configuration, Limits, Mode
-from .simulated_properties import Extension, IlluminatorBehaviour, IlluminatorProperties
+from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
 from .thermal import ThermalModel
-from ..mavlink.messages import ComponentInformationBasic, IlluminatorStatus
+from ..mavlink.messages import (
+    ComponentInformationBasic,
+    define,
+    IlluminatorStatus,
+    STATUS_ID,
+    UInt8,
+)
 
 
-class ExtendedIlluminatorStatus(IlluminatorStatus):  # type: ignore[misc]
+@define(STATUS_ID, 'ILLUMINATOR_STATUS', extensions=3)
+@dataclass(slots=True)
+class ExtendedIlluminatorStatus(IlluminatorStatus):
     """
-    A vendor's ILLUMINATOR_STATUS of 38 bytes, to be sent.
-
-    The CRC_EXTRA is that of the common 35 bytes, and receivers ignore the further three, as with
-    any extension.
+    A vendor's ILLUMINATOR_STATUS of 38 bytes, to be sent; receivers ignore the last three.
 
     :ivar zoom_level: %.
     :ivar color_mode: 0 white, 1 red, 2 blue, 255 not applicable.
     :ivar gimbal_device_id: component id or gimbal number, 0 for none.
     """
 
-    ordered_fieldnames = [*IlluminatorStatus.ordered_fieldnames, *Extension._fields]
-    unpacker = struct.Struct(IlluminatorStatus.unpacker.format + '3B')
-
-    def __init__(self, *values: Any, extension: Extension) -> None:
-        super().__init__(*values)
-        for name, value in extension._asdict().items():
-            setattr(self, name, value)
+    zoom_level: UInt8
+    color_mode: UInt8
+    gimbal_device_id: UInt8
 
 
 class SimulatedLamp:
@@ -106,7 +106,7 @@ class SimulatedLamp:
             self.thermal.reading if behaviour.measures else 0.0,
             limits.min_strobe_period, limits.max_strobe_period)
         if behaviour.extension is not None:
-            return ExtendedIlluminatorStatus(*fields, extension=behaviour.extension)
+            return ExtendedIlluminatorStatus(*fields, *behaviour.extension)
         return IlluminatorStatus(*fields)
 
     def information(self, behaviour: IlluminatorBehaviour, now: float) -> Any:

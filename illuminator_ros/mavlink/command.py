@@ -230,6 +230,9 @@ class RttEstimator:
         self._samples: deque[float] = deque()
         self._sorted: list[float] = []
 
+    def __len__(self) -> int:
+        return len(self._sorted)
+
     def add(self, seconds: float) -> None:
         """Add a sample, s."""
         self._samples.append(seconds)

@@ -20,10 +20,10 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 import math
-from typing import Any, Protocol
+from typing import Protocol
 
 from .command import CommandSender, CommandStatus
-from .messages import Address, CommandAck, heartbeat, MavType
+from .messages import Address, CommandAck, Heartbeat, heartbeat, MavType, Message
 
 # s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0
@@ -37,11 +37,14 @@ class Endpoint(ABC):
 
     A :class:`~.link.Link` calls it from its thread only and sends what it leaves in ``outgoing``.
 
+    :ivar messages: the classes of the messages that it receives; the link decodes no others.
     :ivar outgoing: messages to send, each with the address that sends it.
     """
 
+    messages: Sequence[type[Message]]
+
     def __init__(self) -> None:
-        self.outgoing: deque[tuple[Address, Any]] = deque()
+        self.outgoing: deque[tuple[Address, Message]] = deque()
 
     @abstractmethod
     def link_opened(self, now: float) -> None:
@@ -55,8 +58,8 @@ class Endpoint(ABC):
         """Note that nothing can be sent any more, and why."""
 
     @abstractmethod
-    def receive(self, source: Address, message: Any, now: float) -> None:
-        """Take a message."""
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        """Receive a message of one of the classes of ``messages``."""
 
     @abstractmethod
     def poll(self, now: float) -> None:
@@ -68,7 +71,15 @@ class Endpoint(ABC):
 
 
 class Payload(Protocol):
-    """What a component carries: the client of a light, a winch, a camera ..."""
+    """
+    A part of a component: the client of a light, a winch, a camera ...
+
+    :ivar messages: the classes of the messages that it receives, HEARTBEAT included if needed.
+    """
+
+    @property
+    def messages(self) -> Sequence[type[Message]]:
+        """See above."""
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
@@ -76,8 +87,8 @@ class Payload(Protocol):
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Endpoint.link_closed`; all commands have ended by then."""
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
-        """Take a message from another address; COMMAND_ACK goes to the command sender instead."""
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        """Receive a message from another address, of one of the classes of ``messages``."""
 
     def poll(self, now: float) -> None:
         """Do everything that is due."""
@@ -86,7 +97,7 @@ class Payload(Protocol):
         """Return when :meth:`poll` is due, infinity if never."""
 
 
-class Heartbeat:
+class HeartbeatTimer:
     """
     The heartbeat of one component (heartbeat protocol).
 
@@ -101,12 +112,12 @@ class Heartbeat:
         self.mav_type = mav_type
         self.due = 0.0
 
-    def poll(self, now: float, outgoing: deque[tuple[Address, Any]]) -> None:
+    def poll(self, now: float, outgoing: deque[tuple[Address, Message]]) -> None:
         """Send a heartbeat if one is due."""
         if now >= self.due:
             self.send(now, outgoing)
 
-    def send(self, now: float, outgoing: deque[tuple[Address, Any]]) -> None:
+    def send(self, now: float, outgoing: deque[tuple[Address, Message]]) -> None:
         """Send a heartbeat now; the next is due an interval later."""
         outgoing.append((self.address, heartbeat(self.mav_type)))
         self.due = now + HEARTBEAT_INTERVAL
@@ -129,7 +140,12 @@ class Component(Endpoint):
         self.commands = commands
         self.address = commands.address
         self._payloads = tuple(payloads)
-        self._heartbeat = Heartbeat(self.address, mav_type)
+        # HEARTBEAT and COMMAND_ACK show an address conflict where no payload needs them.
+        self.messages = tuple(dict.fromkeys(
+            (Heartbeat, CommandAck, *(cls for one in payloads for cls in one.messages))))
+        self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)
+                           for cls in self.messages}
+        self._heartbeat = HeartbeatTimer(self.address, mav_type)
         self._link_open = False
         self._conflict_at = -math.inf
 
@@ -151,7 +167,7 @@ class Component(Endpoint):
         for payload in self._payloads:
             payload.link_closed(now, reason)
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         if not source.system:
             # A component with system id 0 cannot be addressed: 0 is the broadcast address.
@@ -162,7 +178,7 @@ class Component(Endpoint):
             return
         if isinstance(message, CommandAck):
             self.commands.acknowledge(source, message, now)
-        for payload in self._payloads:
+        for payload in self._receivers.get(type(message), ()):
             payload.receive(source, message, now)
 
     def poll(self, now: float) -> None:

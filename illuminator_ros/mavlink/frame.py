@@ -15,7 +15,7 @@
 """
 MAVLink frames from and to bytes; no I/O and no clock.
 
-Reads MAVLink 1 and 2 and writes MAVLink 2 (MAVLink guide, "Packet Serialization"). A frame
+MAVLink 1 and 2 (MAVLink guide, "Packet Serialization"). A frame
 counts only when its checksum is right. After anything else the search goes on one byte later,
 never behind the length that a bad header claims: whatever stands between good frames, no good
 frame is lost.
@@ -23,13 +23,13 @@ frame is lost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 import re
 
 from fastcrc.crc16 import mcrf4xx
 
-from .messages import Address, FOREIGN, HANDLED_IDS, Layout, LAYOUTS
+from .messages import Address, Layout, LAYOUTS
 
 STX_V1 = 0xFE
 STX_V2 = 0xFD
@@ -38,13 +38,10 @@ HEADER_V2 = 10
 CHECKSUM = 2
 SIGNATURE = 13
 FLAG_SIGNED = 0x01
+MAX_ID_V1 = 255
 MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
 STARTS = (b'\xfd', b'\xfe')
-# The sources whose foreign frames are passed over: what to call with the sequence number of each
-# one, by the two bytes that hold the address in a frame.
-Known = Mapping[bytes, Callable[[int], None]]
-NOBODY: Known = {}
 _START = re.compile(b'[\xfd\xfe]')
 
 
@@ -80,19 +77,28 @@ class DecoderCounters:
 
 def encode_frame(
     message_id: int, payload: bytes, *, sequence: int, source: Address, crc_extra: int,
-    signed: bool = False,
+    signed: bool = False, version: int = 2,
 ) -> bytes:
     """
-    Return a MAVLink 2 frame, without the signature that a signed one still needs.
+    Return a frame, without the signature that a signed one still needs.
 
-    :param payload: at most 255 bytes; its trailing zeros are cut, all but the first byte.
+    :param payload: at most 255 bytes. MAVLink 2 cuts its trailing zeros, all but the first byte;
+        MAVLink 1 needs it whole and without extension fields.
     :param sequence: 0..255.
+    :param version: 1 or 2.
+    :raises ValueError: if the payload is too long, or MAVLink 1 cannot carry the message.
     """
-    body = payload.rstrip(b'\0') or payload[:1]
-    frame = bytes((
-        STX_V2, len(body), FLAG_SIGNED if signed else 0, 0, sequence, source.system,
-        source.component, message_id & 0xFF, message_id >> 8 & 0xFF, message_id >> 16,
-    )) + body
+    if version == 1:
+        if message_id > MAX_ID_V1 or signed:
+            raise ValueError(f'MAVLink 1 carries no message {message_id}' if not signed else
+                             'MAVLink 1 frames cannot be signed')
+        head: tuple[int, ...] = (
+            STX_V1, len(payload), sequence, source.system, source.component, message_id)
+    else:
+        payload = payload.rstrip(b'\0') or payload[:1]
+        head = (STX_V2, len(payload), FLAG_SIGNED if signed else 0, 0, sequence, source.system,
+                source.component, message_id & 0xFF, message_id >> 8 & 0xFF, message_id >> 16)
+    frame = bytes(head) + payload
     checksum = mcrf4xx(frame[1:] + bytes((crc_extra,)))
     return frame + checksum.to_bytes(CHECKSUM, 'little')
 
@@ -131,12 +137,8 @@ class Decoder:
             frames += self.feed(rest)
         return frames
 
-    def feed(self, data: bytes, known: Known = NOBODY) -> list[Frame]:
-        """
-        Return the frames that ``data`` completes, in order.
-
-        Foreign ones of known sources are checked, counted and passed over.
-        """
+    def feed(self, data: bytes) -> list[Frame]:
+        """Return the frames that ``data`` completes, in order."""
         self.taken += len(data)
         data = self._rest + data if self._rest else data
         frames: list[Frame] = []
@@ -144,12 +146,6 @@ class Decoder:
         signature_end = self._signature_end
         while match := _START.search(data, position):
             start = match.start()
-            if known and start >= signature_end:
-                passed = self._pass_over(data, start, known)
-                if passed > start:
-                    self.counters.skipped_bytes += start - end
-                    position = end = passed
-                    continue
             found = self._read(data, start)
             if found is None:
                 if start < signature_end and self._is_frame(data, signature_end):
@@ -177,42 +173,6 @@ class Decoder:
         self._rest = data[start:]
         self._signature_end = max(signature_end - start, 0)
         return frames
-
-    def _pass_over(self, data: bytes, start: int, known: Known) -> int:
-        """
-        Pass over whole, unsigned and foreign frames of known sources, if they are good.
-
-        Most of what a busy link carries is of this kind, so it is made nothing of. What cannot be
-        checked, since its id is unknown, is searched for a beginning as everywhere.
-
-        :param start: where a frame may begin.
-        :return: where something else begins.
-        """
-        size = len(data)
-        passed = 0
-        while (start_of_payload := start + HEADER_V2) < size and data[start] == STX_V2:
-            id_ = data[start + 7:start_of_payload]
-            crc_extra = FOREIGN.get(id_)
-            if crc_extra is None:
-                if id_ in HANDLED_IDS:
-                    break
-                match = _START.search(data, start + 1)
-                begin = match.start() if match else size
-                self.counters.unknown_ids += 1
-                self.counters.skipped_bytes += begin - start
-                start = begin
-                continue
-            count = known.get(data[start + 5:start + 7])
-            end = start_of_payload + CHECKSUM + data[start + 1]
-            if (count is None or data[start + 2] or end > size
-                    or mcrf4xx(data[start + 1:end - CHECKSUM] + crc_extra)
-                    != data[end - 2] | data[end - 1] << 8):
-                break
-            count(data[start + 4])
-            passed += 1
-            start = end
-        self.counters.frames += passed
-        return start
 
     def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
         """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""

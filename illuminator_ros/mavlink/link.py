@@ -26,11 +26,10 @@ from typing import Any
 
 from .component import Endpoint
 from .connector import Connector
-from .crowd import COLLECTION, Crowd
 from .frame import Frame
 from .frame_writer import FrameWriter
 from .link_state import LinkEvent, LinkState
-from .messages import decode_payload, HANDLED
+from .messages import decode_payload
 from .receiver import Receiver
 from .router import Router
 from .signing import Signing
@@ -43,6 +42,10 @@ from .worker import Worker
 
 # s; the loop looks around this often even where nothing is due.
 IDLE = 1.0
+# A busy link rests for REST s after a turn with more frames than this, so that one turn reads
+# many of them: each turn costs as much as several frames. A call waits no longer than that.
+MAX_FRAMES_BEFORE_REST = 16
+REST = 0.0005
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
 # s that a channel stays open, or a frame over it, until it counts as one that leads somewhere.
@@ -76,6 +79,7 @@ class Link(Worker):
     ) -> None:
         super().__init__('mavlink-link', clock)
         self.endpoint = endpoint
+        self._classes = {cls.id: cls for cls in endpoint.messages}
         self._signing = signing or Signing()
         self._timestamps = TimestampKeeper(self._signing, store)
         self._store_due = 0.0
@@ -97,9 +101,8 @@ class Link(Worker):
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
         self._stirred = False
-        # Good frames that had come when it was last looked, and those for us since.
+        # Good frames received before this turn.
         self._frames_seen = 0
-        self._crowd = Crowd()
 
     # From any thread
 
@@ -141,19 +144,14 @@ class Link(Worker):
         now = self.clock()
         wait = min(max(due - now, self._pause), IDLE)
         self._pause = 0.0
-        if self._crowd.collects(now) and wait > COLLECTION:
-            # A call ends it.
-            self._calls_only.poll(1000 * COLLECTION)
-            wait = 0.0
         for handle, events in self._ready(wait):
             if self._channel is not None:
                 self._serve(handle, events)
         now = self.clock()
         frames = self._reception.counters.frames
-        if frames > self._frames_seen:
-            more = self._channel is not None and self._channel.more
-            self._crowd.passed(frames - self._frames_seen, now, more=more)
-            self._frames_seen = frames
+        if frames > self._frames_seen + MAX_FRAMES_BEFORE_REST:
+            time.sleep(REST)
+        self._frames_seen = frames
         if self._stirred or self._calls or now >= due:
             self._work()
 
@@ -201,18 +199,16 @@ class Link(Worker):
             self._opener.answered()
             self._believe(channel, now)
         self._knock_at = now + SILENCE
-        counter = self._traffic.count(frame.source, frame.sequence)
+        self._traffic.count(frame.source, frame.sequence)
         if channel.heard(peer, now):
             self._stirred = True
             self._guarded(self.endpoint.link_opened, now)
         self._routes.heard(frame.source, peer, now)
-        if frame.message_id in HANDLED:
-            self._frames_seen += 1
+        cls = self._classes.get(frame.message_id)
+        if cls is not None:
             self._stirred = True
             self._guarded(self.endpoint.receive, frame.source,
-                          decode_payload(frame.message_id, frame.payload), now)
-        if counter is not None:
-            self._reception.know(peer, frame.source, counter.add)
+                          decode_payload(cls, frame.payload), now)
 
     def _look_after(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
@@ -238,8 +234,6 @@ class Link(Worker):
             while outgoing and self._routes.towards(outgoing[0][1], all_peers, now) == peers:
                 source, message = outgoing.popleft()
                 frames.append(self._departure.frame(source, message, now, self._wall_clock()))
-                if getattr(message, 'target_system', 0):
-                    self._crowd.asked(now)
             try:
                 self._send(channel, frames, peers)
             except OSError as error:

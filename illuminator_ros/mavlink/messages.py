@@ -13,28 +13,38 @@
 # limitations under the License.
 
 """
-The MAVLink messages that this package reads and writes.
+Message classes: the fields of a MAVLink message, and its payload's bytes.
 
-The classes are pymavlink's, from its ``common`` dialect. The published wheels are built from
-ArduPilot's fork of the definitions, which has neither ILLUMINATOR_STATUS (440) nor
-COMPONENT_INFORMATION_BASIC (396); both are added here in pymavlink's own form, and only where
-the installed pymavlink lacks them.
+A class is defined from its fields, as the XML definition lists them; the layout and CRC_EXTRA
+follow from those (MAVLink guide, "Packet Serialization"). The classes here belong to services
+that every component has. A payload defines its own, and names those that it handles. Frames of
+all other messages of pymavlink's ``common`` dialect are checked, but not decoded.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from enum import IntEnum
+from operator import attrgetter, itemgetter
 import struct
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
 
-from pymavlink.dialects.v20 import common as _common
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import common
 
-Message = _common.MAVLink_message
-
-# https://mavlink.io/en/messages/common.html#ILLUMINATOR_STATUS
-STATUS_ID = 440
-# https://mavlink.io/en/messages/common.html#COMPONENT_INFORMATION_BASIC
-INFORMATION_ID = 396
+UInt8 = Annotated[int, 'B']
+UInt16 = Annotated[int, 'H']
+UInt32 = Annotated[int, 'I']
+UInt64 = Annotated[int, 'Q']
+Int16 = Annotated[int, 'h']
+Int32 = Annotated[int, 'i']
+Float = Annotated[float, 'f']
+# The bytes of a string as they are on the wire, with or without a terminator.
+Char24 = Annotated[bytes, '24s']
+Char32 = Annotated[bytes, '32s']
+_C_NAMES = {'B': 'uint8_t', 'H': 'uint16_t', 'I': 'uint32_t', 'Q': 'uint64_t', 'h': 'int16_t',
+            'i': 'int32_t', 'f': 'float', 's': 'char'}
 
 
 class Address(NamedTuple):
@@ -45,6 +55,102 @@ class Address(NamedTuple):
 
     def __str__(self) -> str:
         return f'{self.system}/{self.component}'
+
+
+class Layout(NamedTuple):
+    """The values that check a frame: CRC_EXTRA, and the longest payload known of the message."""
+
+    crc_extra: int
+    size: int
+
+
+class _Codec(NamedTuple):
+    pack: Callable[..., bytes]
+    unpack: Callable[[bytes], tuple[Any, ...]]
+    # Of the fields of a message, in the order of the wire.
+    values: Callable[[Message], tuple[Any, ...]]
+    # Of the values on the wire, in the order of the fields.
+    arguments: Callable[[tuple[Any, ...]], tuple[Any, ...]]
+    size: int
+
+
+class Message:
+    """
+    A message; its fields are as on the wire, and float32 is not rounded before it is sent.
+
+    :cvar id: message id, 0..2^24 - 1.
+    :cvar name: name in the XML definition.
+    :cvar crc_extra: seeds the checksum, so that both sides have the same definition.
+    :cvar base_size: bytes of the payload without extension fields, as MAVLink 1 sends it.
+    """
+
+    id: ClassVar[int]  # noqa: A003 - the term of the specification
+    name: ClassVar[str]
+    crc_extra: ClassVar[int]
+    base_size: ClassVar[int]
+    codec: ClassVar[_Codec]
+
+
+M = TypeVar('M', bound=Message)
+# Every message that can be checked, by message id.
+LAYOUTS: dict[int, Layout] = {
+    id_: Layout(cls.crc_extra, cls.unpacker.size) for id_, cls in common.mavlink_map.items()}
+
+
+def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], type[M]]:
+    """
+    Complete a dataclass whose fields are those of a message, in the order of its definition.
+
+    :param extensions: how many of the fields, the last ones, are extension fields.
+    """
+    def complete(cls: type[M]) -> type[M]:
+        hints = get_type_hints(cls, include_extras=True)
+        names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
+        codes = {one: get_args(hints[one])[1] for one in names}
+        base = names[:len(names) - extensions]
+        # "Field reordering": by size, largest first; extension fields are not reordered.
+        base.sort(key=lambda one: -struct.calcsize('<' + codes[one][-1]))
+        order = [*base, *names[len(base):]]
+        layout = struct.Struct('<' + ''.join(codes[one] for one in order))
+        seed = name.encode() + b' '
+        for field in base:
+            length, code = codes[field][:-1], codes[field][-1]
+            seed += f'{_C_NAMES[code]} {field} '.encode()
+            seed += bytes((int(length),)) if length else b''
+        crc = mcrf4xx(seed)
+        cls.id, cls.name, cls.crc_extra = id_, name, crc & 0xFF ^ crc >> 8
+        cls.base_size = struct.calcsize('<' + ''.join(codes[one] for one in base))
+        cls.codec = _Codec(
+            layout.pack, layout.unpack, attrgetter(*order),
+            itemgetter(*map(order.index, names)), layout.size)
+        LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
+        return cls
+    return complete
+
+
+def encode_payload(message: Message) -> bytes:
+    """
+    Return the payload of a message, extension fields included, trailing zeros not yet cut.
+
+    :raises struct.error: if a value does not fit into its field.
+    """
+    codec = message.codec
+    return codec.pack(*codec.values(message))
+
+
+def decode_payload(cls: type[M], payload: bytes) -> M:
+    """
+    Return the message of a checked payload.
+
+    A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension
+    fields). Bytes beyond the known fields are ignored, as extensions must be: there is a 38-byte
+    ILLUMINATOR_STATUS in the field.
+    """
+    codec = cls.codec
+    size = codec.size
+    if len(payload) != size:
+        payload = payload[:size].ljust(size, b'\0')
+    return cls(*codec.arguments(codec.unpack(payload)))
 
 
 class MavCmd(IntEnum):
@@ -98,172 +204,107 @@ def result_name(result: int) -> str:
         return f'MAV_RESULT {result} (unknown)'
 
 
-class _Field(NamedTuple):
-    name: str
-    type: str  # noqa: A003
-    code: str
-    units: str = ''
-    enum: str = ''
-    display: str = ''
+@define(0, 'HEARTBEAT')
+@dataclass(slots=True)
+class Heartbeat(Message):
+    """https://mavlink.io/en/messages/common.html#HEARTBEAT."""
+
+    type: UInt8  # noqa: A003 - the field's name
+    autopilot: UInt8
+    base_mode: UInt8
+    custom_mode: UInt32
+    system_status: UInt8
+    mavlink_version: UInt8
 
 
-def _define(name: str, id_: int, crc_extra: int, fields: list[_Field], order: list[str]) -> Any:
-    """
-    Make a message class in the form that pymavlink's generator gives to its own.
+@define(75, 'COMMAND_INT')
+@dataclass(slots=True)
+class CommandInt(Message):
+    """https://mavlink.io/en/messages/common.html#COMMAND_INT."""
 
-    :param fields: the fields in the order of the XML definition.
-    :param order: their names in the order on the wire: by size, largest first (MAVLink
-        serialization, "Field reordering").
-    """
-    by_name = {field.name: field for field in fields}
-    names = [field.name for field in fields]
-    strings = [field.name for field in fields if field.type == 'char']
-    layout = struct.Struct('<' + ''.join(by_name[n].code for n in order))
-
-    def __init__(self: Any, *values: Any, **named: Any) -> None:
-        Message.__init__(self, id_, name)
-        self._fieldnames = names
-        self._instance_field = None
-        self._instance_offset = -1
-        given = dict(zip(names, values, strict=False), **named)
-        if len(values) > len(names) or given.keys() != by_name.keys():
-            raise TypeError(f'{name} takes exactly the fields {", ".join(names)}')
-        for field in strings:
-            value = given[field]
-            setattr(self, f'_{field}_raw', value)
-            given[field] = value.partition(b'\0')[0].decode('ascii', errors='replace')
-        self.__dict__.update(given)
-
-    def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> Any:
-        return self._pack(mav, crc_extra, encode_payload(self), force_mavlink1=force_mavlink1)
-
-    return type(f'MAVLink_{name.lower()}_message', (Message,), {
-        '__doc__': f'{name} of the MAVLink common message set.',
-        '__init__': __init__,
-        'pack': pack,
-        'id': id_,
-        'msgname': name,
-        'fieldnames': names,
-        'ordered_fieldnames': order,
-        'fieldtypes': [field.type for field in fields],
-        'fielddisplays_by_name': {field.name: field.display for field in fields if field.display},
-        'fieldenums_by_name': {field.name: field.enum for field in fields if field.enum},
-        'fieldunits_by_name': {field.name: field.units for field in fields if field.units},
-        # The types alone, without the lengths of arrays.
-        'native_format': bytearray(
-            b'<' + b''.join(b'c' if by_name[n].type == 'char' else by_name[n].code.encode()
-                            for n in order)),
-        'orders': [order.index(n) for n in names],
-        'lengths': [1] * len(names),
-        'array_lengths': [int(by_name[n].code[:-1] or 0) for n in order],
-        'crc_extra': crc_extra,
-        'unpacker': layout,
-        'instance_field': None,
-        'instance_offset': -1,
-    })
+    target_system: UInt8
+    target_component: UInt8
+    frame: UInt8
+    command: UInt16
+    current: UInt8
+    autocontinue: UInt8
+    param1: Float
+    param2: Float
+    param3: Float
+    param4: Float
+    x: Int32
+    y: Int32
+    z: Float
 
 
-def _installed(id_: int, name: str, crc_extra: int, fields: list[_Field], order: list[str]) -> Any:
-    return _common.mavlink_map.get(id_) or _define(name, id_, crc_extra, fields, order)
+@define(76, 'COMMAND_LONG')
+@dataclass(slots=True)
+class CommandLong(Message):
+    """https://mavlink.io/en/messages/common.html#COMMAND_LONG."""
+
+    target_system: UInt8
+    target_component: UInt8
+    command: UInt16
+    confirmation: UInt8
+    param1: Float
+    param2: Float
+    param3: Float
+    param4: Float
+    param5: Float
+    param6: Float
+    param7: Float
 
 
-IlluminatorStatus = _installed(STATUS_ID, 'ILLUMINATOR_STATUS', 66, [
-    _Field('uptime_ms', 'uint32_t', 'I', 'ms'),
-    _Field('enable', 'uint8_t', 'B'),
-    _Field('mode_bitmask', 'uint8_t', 'B', enum='ILLUMINATOR_MODE'),
-    _Field('error_status', 'uint32_t', 'I', enum='ILLUMINATOR_ERROR_FLAGS', display='bitmask'),
-    _Field('mode', 'uint8_t', 'B', enum='ILLUMINATOR_MODE'),
-    _Field('brightness', 'float', 'f', '%'),
-    _Field('strobe_period', 'float', 'f', 's'),
-    _Field('strobe_duty_cycle', 'float', 'f', '%'),
-    _Field('temp_c', 'float', 'f'),
-    _Field('min_strobe_period', 'float', 'f', 's'),
-    _Field('max_strobe_period', 'float', 'f', 's'),
-], ['uptime_ms', 'error_status', 'brightness', 'strobe_period', 'strobe_duty_cycle', 'temp_c',
-    'min_strobe_period', 'max_strobe_period', 'enable', 'mode_bitmask', 'mode'])
+@define(77, 'COMMAND_ACK', extensions=4)
+@dataclass(slots=True)
+class CommandAck(Message):
+    """https://mavlink.io/en/messages/common.html#COMMAND_ACK."""
 
-ComponentInformationBasic = _installed(INFORMATION_ID, 'COMPONENT_INFORMATION_BASIC', 50, [
-    _Field('time_boot_ms', 'uint32_t', 'I', 'ms'),
-    _Field('capabilities', 'uint64_t', 'Q', enum='MAV_PROTOCOL_CAPABILITY', display='bitmask'),
-    _Field('time_manufacture_s', 'uint32_t', 'I', 's'),
-    _Field('vendor_name', 'char', '32s'),
-    _Field('model_name', 'char', '32s'),
-    _Field('software_version', 'char', '24s'),
-    _Field('hardware_version', 'char', '24s'),
-    _Field('serial_number', 'char', '32s'),
-], ['capabilities', 'time_boot_ms', 'time_manufacture_s', 'vendor_name', 'model_name',
-    'software_version', 'hardware_version', 'serial_number'])
-
-Heartbeat = _common.MAVLink_heartbeat_message
-CommandLong = _common.MAVLink_command_long_message
-CommandInt = _common.MAVLink_command_int_message
-CommandAck = _common.MAVLink_command_ack_message
-
-# What is decoded. Every other message is foreign: its header is looked at, its payload is not.
-HANDLED: dict[int, Any] = {
-    cls.id: cls for cls in (
-        Heartbeat, CommandInt, CommandLong, CommandAck, IlluminatorStatus,
-        ComponentInformationBasic)
-}
+    command: UInt16
+    result: UInt8
+    progress: UInt8 = 0
+    result_param2: Int32 = 0
+    target_system: UInt8 = 0
+    target_component: UInt8 = 0
 
 
-class Layout(NamedTuple):
-    """What checks a frame: the CRC_EXTRA of its message, and the longest payload known of it."""
+@define(396, 'COMPONENT_INFORMATION_BASIC')
+@dataclass(slots=True)
+class ComponentInformationBasic(Message):
+    """https://mavlink.io/en/messages/common.html#COMPONENT_INFORMATION_BASIC."""
 
-    crc_extra: int
-    size: int
-
-
-# Every message that can be checked, by message id.
-LAYOUTS: dict[int, Layout] = {
-    id_: Layout(cls.crc_extra, cls.unpacker.size)
-    for id_, cls in {**_common.mavlink_map, **HANDLED}.items()
-}
-
-# As they stand in a frame, three bytes: the ids of what is decoded, and the CRC_EXTRA of what
-# can be checked and is not.
-HANDLED_IDS = frozenset(id_.to_bytes(3, 'little') for id_ in HANDLED)
-FOREIGN: dict[bytes, bytes] = {
-    id_.to_bytes(3, 'little'): bytes((layout.crc_extra,))
-    for id_, layout in LAYOUTS.items() if id_ not in HANDLED
-}
+    time_boot_ms: UInt32
+    capabilities: UInt64
+    time_manufacture_s: UInt32
+    vendor_name: Char32
+    model_name: Char32
+    software_version: Char24
+    hardware_version: Char24
+    serial_number: Char32
 
 
-def encode_payload(message: Any) -> bytes:
-    """Return the payload of a message as it goes on the wire, trailing zeros not yet cut."""
-    cls = type(message)
-    if 'char' in cls.fieldtypes:
-        values = [wire_value(message, name) for name in cls.ordered_fieldnames]
-    else:
-        values = [getattr(message, name) for name in cls.ordered_fieldnames]
-    return bytes(cls.unpacker.pack(*values))
+@define(440, 'ILLUMINATOR_STATUS')
+@dataclass(slots=True)
+class IlluminatorStatus(Message):
+    """https://mavlink.io/en/messages/common.html#ILLUMINATOR_STATUS."""
+
+    uptime_ms: UInt32
+    enable: UInt8
+    mode_bitmask: UInt8
+    error_status: UInt32
+    mode: UInt8
+    brightness: Float
+    strobe_period: Float
+    strobe_duty_cycle: Float
+    temp_c: Float
+    min_strobe_period: Float
+    max_strobe_period: Float
 
 
-def wire_value(message: Any, field: str) -> Any:
-    """
-    Return a field as it is on the wire; a char field is bytes, terminated or not.
-
-    pymavlink shows char fields as ASCII text and keeps the bytes beside it.
-    """
-    return getattr(message, f'_{field}_raw', getattr(message, field))
+INFORMATION_ID = ComponentInformationBasic.id
+STATUS_ID = IlluminatorStatus.id
 
 
-def decode_payload(message_id: int, payload: bytes) -> Any:
-    """
-    Return the message object for a checked payload.
-
-    A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension
-    fields), and what goes beyond the known fields is ignored, as extensions must be: there is a
-    38-byte ILLUMINATOR_STATUS in the field.
-
-    :raises KeyError: if the message is not one of :data:`HANDLED`.
-    """
-    cls = HANDLED[message_id]
-    size = cls.unpacker.size
-    values = cls.unpacker.unpack(payload[:size].ljust(size, b'\0'))
-    return cls(*(values[i] for i in cls.orders))
-
-
-def heartbeat(mav_type: int, *, state: int = MAV_STATE_ACTIVE) -> Any:
+def heartbeat(mav_type: int, *, state: int = MAV_STATE_ACTIVE) -> Heartbeat:
     """Return the HEARTBEAT of a component that is not an autopilot (heartbeat protocol)."""
     return Heartbeat(mav_type, MAV_AUTOPILOT_INVALID, 0, 0, state, MAVLINK_VERSION)

@@ -12,17 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Believed frames from the bytes of many peers; no I/O, and time is passed in."""
+"""Authenticated frames from the bytes of many peers; no I/O, and time is passed in."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 from typing import NamedTuple
 
 from .frame import Decoder, DecoderCounters, Frame
-from .messages import Address
-from .signing import Signing, SigningMode
+from .signing import Signing
 from .transport import Peer
 
 # Peers whose incomplete frames are kept apart.
@@ -30,10 +28,6 @@ MAX_DECODERS = 64
 # s; the longest frame takes 0.3 s at 9600 baud. What has not come by then is no frame but noise
 # that looks like the beginning of one, and good frames are held back behind it.
 STALL = 0.5
-# s after which the first frame of each source is looked at again as if it were not known: routes
-# and peers live on what is seen of it.
-RENEWAL = 0.5
-
 
 class _Wait(NamedTuple):
     """For the rest of a frame: where it begins, what had come of the stream, and when (s)."""
@@ -48,9 +42,7 @@ class _Stream:
 
     def __init__(self, counters: DecoderCounters) -> None:
         self.decoder = Decoder(counters=counters)
-        self.known: dict[bytes, Callable[[int], None]] = {}
-        self.renewal = 0.0
-        # Whether anything to be believed has ever come.
+        # Whether an authenticated frame has ever come.
         self.good = False
 
 
@@ -71,23 +63,16 @@ class Receiver:
         return len(self._streams)
 
     def take(self, peer: Peer, data: bytes, now: float, unix_time: float) -> list[Frame]:
-        """
-        Return the frames that bytes of a peer complete and that are to be believed.
-
-        Foreign ones of sources that are known on this peer are only counted.
-        """
+        """Return the frames that bytes of a peer complete and whose signature is accepted."""
         stream = self._streams.get(peer)
         if stream is None:
             stream = self._new_stream(peer)
-        if now >= stream.renewal:
-            stream.renewal = now + RENEWAL
-            stream.known.clear()
         decoder = stream.decoder
-        frames = decoder.feed(data, stream.known)
+        frames = decoder.feed(data)
         if decoder.incomplete is not None or self._waits:
             self._watch(peer, decoder, now)
         if frames:
-            frames = self._believed(frames, unix_time)
+            frames = self._authenticated(frames, unix_time)
             stream.good = stream.good or bool(frames)
         return frames
 
@@ -100,18 +85,6 @@ class Receiver:
             self._waits.pop(oldest, None)
         self._streams[peer] = stream = _Stream(self.counters)
         return stream
-
-    def know(self, peer: Peer, source: Address, count: Callable[[int], None]) -> None:
-        """
-        Have foreign frames of a source on a peer counted for a while, and nothing more.
-
-        Where signatures matter it changes nothing: each frame is then looked at.
-
-        :param count: called with the sequence number of each.
-        """
-        stream = self._streams.get(peer)
-        if stream is not None and self._signing.mode is SigningMode.OFF:
-            stream.known[bytes(source)] = count
 
     def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
         start = decoder.incomplete
@@ -134,7 +107,7 @@ class Receiver:
                 decoder = self._streams[peer].decoder
                 frames = decoder.give_up(wait.taken)
                 self._watch(peer, decoder, now)
-                found += [(peer, frame) for frame in self._believed(frames, unix_time)]
+                found += [(peer, frame) for frame in self._authenticated(frames, unix_time)]
         return found
 
     def next_deadline(self) -> float:
@@ -148,5 +121,5 @@ class Receiver:
         self._streams.clear()
         self._waits.clear()
 
-    def _believed(self, frames: list[Frame], unix_time: float) -> list[Frame]:
+    def _authenticated(self, frames: list[Frame], unix_time: float) -> list[Frame]:
         return [frame for frame in frames if self._signing.accepts(frame, unix_time)]

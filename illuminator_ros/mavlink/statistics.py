@@ -149,16 +149,15 @@ class Traffic:
         """Return the bytes that went out per second lately."""
         return self._out.rate(self.bytes_sent, now)
 
-    def count(self, source: Address, sequence: int) -> SequenceCounter | None:
-        """Take a frame that has come with the right checksum; return what counts its source."""
+    def count(self, source: Address, sequence: int) -> None:
+        """Count a frame with the right checksum."""
         counter = self.sources.get(source)
         if counter is None:
             if len(self.sources) >= MAX_SOURCES:
                 self._frames_of_others += 1
-                return None
+                return
             counter = self.sources[source] = SequenceCounter()
         counter.add(sequence)
-        return counter
 
     def restart(self) -> None:
         """Forget the sequence numbers but not the counts: the link was interrupted."""

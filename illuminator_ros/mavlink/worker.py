@@ -22,7 +22,6 @@ from collections.abc import Callable
 import contextlib
 import logging
 import math
-import select
 import selectors
 import socket
 import threading
@@ -39,8 +38,6 @@ class Worker(ABC):
     """
     Takes turns in a thread of its own until it is stopped.
 
-    A turn waits on ``_selector`` for events or calls or, with ``_calls_only``, for calls alone.
-
     :param clock: s, monotonic.
     """
 
@@ -52,8 +49,6 @@ class Worker(ABC):
         self._wake_in.setblocking(False)
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._wake_out, selectors.EVENT_READ)
-        self._calls_only = select.poll()
-        self._calls_only.register(self._wake_out, select.POLLIN)
         self._stopping = threading.Event()
         self._starting = threading.Lock()
         # s that the next turn is to wait at least: there was a fault.

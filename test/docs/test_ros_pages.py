@@ -14,6 +14,7 @@
 
 """The pages about the ROS interface, and what the bridge has."""
 
+import dataclasses
 from pathlib import Path
 import re
 from typing import Any
@@ -150,7 +151,7 @@ def test_the_readme_has_the_executables() -> None:
 
 
 @pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],
-                         ids=lambda message: message.msgname)
+                         ids=lambda message: message.name)
 def test_the_protocol_page_has_each_field_of_a_message(message: Any) -> None:
     fields: dict[str, set[str]] = {}
     name = ''
@@ -158,7 +159,7 @@ def test_the_protocol_page_has_each_field_of_a_message(message: Any) -> None:
         name = cells[0] or name
         fields.setdefault(name, set()).update(re.findall('`([^`]+)`', cells[1]))
 
-    assert fields[message.msgname] == set(message.fieldnames)
+    assert fields[message.name] == {field.name for field in dataclasses.fields(message)}
 
 
 def test_the_protocol_page_has_each_command_and_error_flag() -> None:

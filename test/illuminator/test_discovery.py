@@ -100,7 +100,7 @@ def test_a_light_is_known_by_what_it_sends_from_whatever_address(controller, sou
     heartbeat(MavType.ONBOARD_CONTROLLER), heartbeat(SUBMARINE), heartbeat(0),
     CommandAck(405, 0, 0, 0, 1, 194),
     ComponentInformationBasic(0, 0, 0, b'maker', b'torch', b'1', b'1', b'n'),
-], ids=lambda message: message.get_type())
+], ids=lambda message: message.name)
 def test_the_id_of_an_illuminator_proves_nothing(controller, message):
     controller.receive(Address(1, 243), message, 0.0)
     assert controller.lights == {}

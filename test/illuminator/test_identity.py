@@ -17,11 +17,11 @@
 from illuminator_ros.illuminator.identity import Identity, text
 from illuminator_ros.mavlink.messages import (
     ComponentInformationBasic,
-    decode_payload,
     encode_payload,
     INFORMATION_ID,
 )
 import pytest
+from support.messages import decode_payload
 
 
 @pytest.mark.parametrize(('field', 'expected'), [

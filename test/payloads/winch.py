@@ -26,7 +26,19 @@ from dataclasses import dataclass
 from functools import partial
 
 from illuminator_ros.mavlink.command import Command, CommandSender, Done
-from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, Heartbeat, MavResult
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandInt,
+    CommandLong,
+    define,
+    Float,
+    Heartbeat,
+    Int16,
+    MavResult,
+    Message,
+    UInt32,
+    UInt64,
+)
 from illuminator_ros.payload.events import Listeners
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.registry import PayloadType
@@ -38,14 +50,27 @@ from illuminator_ros.payload.simulated import (
     SimulatedType,
     Snapshot,
 )
-from pymavlink.dialects.v20 import common
 
 WINCH = PayloadType('winch', simulated='payloads.winch:SIMULATED')
 
 MAV_TYPE_WINCH = 42
 DO_WINCH = 42600
 WINCH_RELATIVE_LENGTH_CONTROL = 1
-WinchStatus = common.MAVLink_winch_status_message
+
+
+@define(9005, 'WINCH_STATUS')
+@dataclass(slots=True)
+class WinchStatus(Message):
+    """See above."""
+
+    time_usec: UInt64
+    line_length: Float
+    speed: Float
+    tension: Float
+    voltage: Float
+    current: Float
+    temperature: Int16
+    status: UInt32
 
 
 @dataclass(frozen=True)

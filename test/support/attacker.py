@@ -28,7 +28,6 @@ from illuminator_ros.mavlink.messages import (
     CommandInt,
     CommandLong,
     ComponentInformationBasic,
-    HANDLED,
     Heartbeat,
     IlluminatorStatus,
     LAYOUTS,
@@ -36,6 +35,7 @@ from illuminator_ros.mavlink.messages import (
 )
 from illuminator_ros.mavlink.signing import MAX_TICKS, signature, ticks
 from support.frames import raw_v1, raw_v2
+from support.messages import HANDLED
 
 FLOATS = (0.0, -0.0, 1.0, 50.0, 100.0, 100.00001, -1.0, -1e-30, 1e-45, 3.4e38, -3.4e38, 25.5,
           math.nan, -math.nan, math.inf, -math.inf, 440.0, 396.0, 1e6, 0.05, 3600.5)

@@ -34,7 +34,6 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     decode_payload,
     encode_payload,
-    HANDLED,
     LAYOUTS,
     MavCmd,
 )
@@ -58,6 +57,7 @@ class _End:
         self.endpoint = endpoint
         self.wire = wire
         self.decoder = Decoder()
+        self.classes = {cls.id: cls for cls in endpoint.messages}
         self.sent: list[tuple[float, Any]] = []
         self.received: list[tuple[float, Address, Any]] = []
         self._sequences: dict[Address, int] = {}
@@ -76,8 +76,9 @@ class _End:
 
     def take(self, data: bytes, now: float) -> None:
         for frame in self.decoder.feed(data):
-            if frame.message_id in HANDLED:
-                message = decode_payload(frame.message_id, frame.payload)
+            cls = self.classes.get(frame.message_id)
+            if cls is not None:
+                message = decode_payload(cls, frame.payload)
                 self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)

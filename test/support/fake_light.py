@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from illuminator_ros.illuminator.identity import Identity
-from illuminator_ros.mavlink.component import Endpoint, Heartbeat
+from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -65,13 +65,15 @@ class FakeLight(Endpoint):
     :ivar fields: what it reports.
     """
 
+    messages = (CommandLong, CommandInt)
+
     def __init__(
         self, source: Address = LIGHT, *, heartbeat_type: int | None = MavType.ILLUMINATOR,
         stream: float = 1.0, results: Mapping[int, Any] | None = None, **fields: Any,
     ) -> None:
         super().__init__()
         self.source = source
-        self.heartbeat = Heartbeat(source, heartbeat_type or 0)
+        self.heartbeat = HeartbeatTimer(source, heartbeat_type or 0)
         self.beats = heartbeat_type is not None
         self.results: dict[int, Any] = dict(results or {})
         self.applies = True

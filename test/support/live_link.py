@@ -27,12 +27,13 @@ from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.component import Endpoint, Heartbeat
+from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url, Url
 from support.client import Client
+from support.messages import HANDLED
 from support.waiting import eventually, Log, PATIENCE
 
 BRIDGE = Address(1, 194)
@@ -48,9 +49,11 @@ class Talker(Endpoint):
     :ivar turns: how often the link's thread has gone round.
     """
 
+    messages = tuple(HANDLED.values())
+
     def __init__(self, source: Address = BRIDGE, mav_type: int = 18) -> None:
         super().__init__()
-        self.heartbeat = Heartbeat(source, mav_type)
+        self.heartbeat = HeartbeatTimer(source, mav_type)
         self.heard: Log[tuple[Address, Any]] = Log()
         self.greetings: Log[float] = Log()
         self.closings: Log[float] = Log()

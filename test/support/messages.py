@@ -18,6 +18,7 @@ One message of each kind that is handled.
 No field is at its default, and float32 has each number exactly.
 """
 
+from illuminator_ros.mavlink import messages
 from illuminator_ros.mavlink.messages import (
     CommandAck,
     CommandInt,
@@ -25,6 +26,7 @@ from illuminator_ros.mavlink.messages import (
     ComponentInformationBasic,
     Heartbeat,
     IlluminatorStatus,
+    Message,
 )
 
 STATUS = IlluminatorStatus(
@@ -43,3 +45,10 @@ EVERY_MESSAGE = (
     STATUS,
     INFORMATION,
 )
+# The classes of these, by message id.
+HANDLED: dict[int, type[Message]] = {message.id: type(message) for message in EVERY_MESSAGE}
+
+
+def decode_payload(message_id: int, payload: bytes) -> Message:
+    """Return the message of a payload, of whichever class of :data:`HANDLED`."""
+    return messages.decode_payload(HANDLED[message_id], payload)

@@ -19,14 +19,9 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
-from illuminator_ros.mavlink.messages import (
-    Address,
-    decode_payload,
-    encode_payload,
-    HANDLED,
-    LAYOUTS,
-)
+from illuminator_ros.mavlink.messages import Address, encode_payload, LAYOUTS
 from illuminator_ros.mavlink.signing import Signing, SigningMode
+from support.messages import decode_payload, HANDLED
 
 # Of all who sign.
 KEY = bytes(range(32))

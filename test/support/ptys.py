@@ -27,8 +27,8 @@ import threading
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import decode_payload, HANDLED
 from support.frames import frame_of
+from support.messages import decode_payload, HANDLED
 from support.waiting import PATIENCE
 
 

@@ -21,8 +21,8 @@ parser and an encoder, none of them ours, that know the illuminator's messages.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 import contextlib
+import dataclasses
 from functools import cache
 import importlib.util
 import io
@@ -140,11 +140,10 @@ class Peer:
 
 def twin(message: Any) -> Any:
     """Return a message of ours as one of the :func:`reference` dialect."""
-    fields = {name: getattr(message, f'_{name}_raw', getattr(message, name))
-              for name in message.fieldnames}
-    return reference().mavlink_map[message.id](**fields)
+    return reference().mavlink_map[message.id](**dataclasses.asdict(message))
 
 
-def fields_of(messages: Iterable[Any]) -> list[dict[str, Any]]:
-    """Return names and fields of messages, to compare those of different dialects."""
-    return [message.to_dict() for message in messages]
+def fields_of(message: Any) -> dict[str, Any]:
+    """Return the fields of a message of the :func:`reference` dialect, as in :class:`Message`."""
+    return {name: getattr(message, f'_{name}_raw', getattr(message, name))
+            for name in message.fieldnames}

@@ -31,6 +31,8 @@ class SharedAddress(Endpoint):
     :param offset: s by which the statuses of each come after those of the one before.
     """
 
+    messages = FakeLight.messages
+
     def __init__(self, *lights: FakeLight, offset: float = 0.0) -> None:
         super().__init__()
         self.lights = lights

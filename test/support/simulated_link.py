@@ -79,17 +79,6 @@ class _Selector(selectors.BaseSelector):
         return []
 
 
-class _Collection:
-    """Lets time pass while frames collect."""
-
-    def __init__(self, link: SimulatedLink) -> None:
-        self._link = link
-
-    def poll(self, milliseconds: float) -> None:
-        self._link.collected_at.append(self._link.now)
-        self._link.now = min(self._link.now + milliseconds / 1000, self._link.until)
-
-
 class _FromZero(dict[Address, int]):
     """Sequence numbers that begin with 0, so that the same run gives the same bytes."""
 
@@ -103,7 +92,6 @@ class SimulatedLink(Link):
 
     :param take: called with what it sends, and to whom.
     :ivar now: s.
-    :ivar collected_at: when it began to let frames collect, s.
     """
 
     def __init__(
@@ -111,12 +99,10 @@ class SimulatedLink(Link):
         signing: Signing | None = None, now: float = 1000.0,
     ) -> None:
         self.now = self.until = now
-        self.collected_at: list[float] = []
         super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing)
         self._selector.close()
         self._selector = _Selector(self)
-        self._calls_only = _Collection(self)  # type: ignore[assignment]
         self._departure.sequences = _FromZero()
         self.socket = _Socket(take)
         self.udp = UdpChannel(URL)

@@ -21,7 +21,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
-from illuminator_ros.mavlink.messages import Address, decode_payload, encode_payload, HANDLED
+from illuminator_ros.mavlink.messages import Address, decode_payload, encode_payload
 
 # s on the clock at the beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
@@ -83,6 +83,7 @@ class VirtualLink:
                 message.id, encode_payload(message), sequence=sequence, source=source,
                 crc_extra=message.crc_extra))
             for frame in frames:
-                if frame.message_id in HANDLED:
-                    receiver.receive(
-                        frame.source, decode_payload(frame.message_id, frame.payload), self.now)
+                for cls in receiver.messages:
+                    if frame.message_id == cls.id:
+                        receiver.receive(
+                            frame.source, decode_payload(cls, frame.payload), self.now)

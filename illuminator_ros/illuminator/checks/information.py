@@ -20,7 +20,7 @@ from typing import Any
 
 from .specification import ILLUMINATOR
 from ..identity import Identity
-from ...mavlink.messages import ComponentInformationBasic, MavCmd, wire_value
+from ...mavlink.messages import ComponentInformationBasic, MavCmd
 from ...payload.checks.requirement import Failed, MESSAGES, requirement, Skipped, Tester
 from ...payload.checks.session import Session
 
@@ -63,7 +63,7 @@ async def _information(tester: Tester) -> Any:
 async def terminated(tester: Tester) -> None:
     """Look for the terminator that the description of each field requires."""
     message = await _information(tester)
-    wrong = [name for name in STRINGS if b'\0' not in wire_value(message, name)]
+    wrong = [name for name in STRINGS if b'\0' not in getattr(message, name)]
     if wrong:
         raise Failed(f'no terminator in {", ".join(wrong)}')
 
@@ -75,7 +75,7 @@ async def text(tester: Tester) -> None:
     message = await _information(tester)
     wrong = []
     for name in STRINGS:
-        raw = wire_value(message, name).partition(b'\0')[0]
+        raw = getattr(message, name).partition(b'\0')[0]
         # The length limit may have cut the last character.
         shown = raw.decode('utf-8', errors='ignore')
         if not shown.isprintable() or len(raw) - len(shown.encode()) > 3:

@@ -36,7 +36,7 @@ def describe(message: messages.Message) -> str:
         return _ack(message)
     if isinstance(message, messages.Heartbeat):
         return f'HEARTBEAT type {message.type}, autopilot {message.autopilot}'
-    return str(message.msgname)
+    return str(message.name)
 
 
 def _command(message: CommandLong | CommandInt) -> str:
@@ -46,7 +46,7 @@ def _command(message: CommandLong | CommandInt) -> str:
     to = Address(message.target_system, message.target_component)
     confirmation = getattr(message, 'confirmation', 0)
     numbers = ' '.join(f'{param:g}' for param in params)
-    return (f'{message.msgname} to {to}: {command_name(message.command)} {numbers}'
+    return (f'{message.name} to {to}: {command_name(message.command)} {numbers}'
             + (f', confirmation {confirmation}' if confirmation else ''))
 
 

@@ -25,7 +25,8 @@ from .coroutine import CoroutineRunner
 from .describe import command_name, describe
 from .history import History
 from .transaction import Ack, Transaction
-from ...mavlink import component, messages
+from ...mavlink import messages
+from ...mavlink.component import Endpoint, HeartbeatTimer
 from ...mavlink.messages import Address, CommandAck, MavCmd, MavResult, Message
 
 M = TypeVar('M', bound=Message)
@@ -50,7 +51,7 @@ class DeviceLost(Exception):
     """The device has stopped sending."""
 
 
-class Session(component.Endpoint):
+class Session(Endpoint):
     """
     Sends commands to one device and records its messages.
 
@@ -93,7 +94,7 @@ class Session(component.Endpoint):
         self._began: float | None = None
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
-        self._heartbeat = component.Heartbeat(address, messages.MavType.GCS)
+        self._heartbeat = HeartbeatTimer(address, messages.MavType.GCS)
         self._open = False
 
     # The endpoint

@@ -41,7 +41,7 @@ def stream_requirements(
     :param stream: section of the specification that requires the stream.
     :param request: section that requires the answer to a request.
     """
-    @requirement('status-stream', f'sends {status.msgname} at a regular rate', specification,
+    @requirement('status-stream', f'sends {status.name} at a regular rate', specification,
                  stream)
     async def regular(tester: base.Tester) -> str:
         times = periods([at for at, _ in tester.session.idle(status)])
@@ -51,7 +51,7 @@ def stream_requirements(
             raise Failed(f'irregular: intervals of {min(times):.2f} to {max(times):.2f} s')
         return f'every {median(times):.2f} s'
 
-    @requirement('status-request', f'sends {status.msgname} on request', specification, request)
+    @requirement('status-request', f'sends {status.name} on request', specification, request)
     async def on_request(tester: base.Tester) -> None:
         session = tester.session
         before = session.received(status).count
@@ -60,14 +60,14 @@ def stream_requirements(
             raise Failed(one.answer)
         if not await session.runner.until(
                 lambda: session.received(status).count > before, REQUEST_TIMEOUT):
-            raise Failed(f'MAV_RESULT_ACCEPTED, but no {status.msgname}')
+            raise Failed(f'MAV_RESULT_ACCEPTED, but no {status.name}')
 
     return regular, on_request
 
 
 def interval_requirements(status: type[Message]) -> tuple[Requirement[base.Tester], ...]:
     """Return the requirements ``interval``, ``interval-stop`` and ``interval-default``."""
-    @requirement('interval', f'sends {status.msgname} at the requested interval', MESSAGES,
+    @requirement('interval', f'sends {status.name} at the requested interval', MESSAGES,
                  MESSAGE_INTERVAL, changes=True)
     async def honoured(tester: base.Tester) -> str:
         await _accepted(tester.session, status, INTERVAL * 1e6)

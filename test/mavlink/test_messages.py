@@ -1,0 +1,135 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Message classes: definitions, checked against the MAVLink guide and pymavlink's generator."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+import struct
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+from illuminator_ros.mavlink import messages
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    decode_payload,
+    encode_payload,
+    heartbeat,
+    LAYOUTS,
+    MavCmd,
+    MavResult,
+    MavType,
+    Message,
+    result_name,
+    STATUS_ID,
+)
+from pymavlink.dialects.v20 import common
+import pytest
+from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
+from support.reference_dialect import fields_of, reference, twin
+
+each_message = pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda one: one.name)
+
+
+@each_message
+def test_definition_is_that_of_the_generator(message: Message) -> None:
+    generated = reference().mavlink_map[message.id]
+
+    assert (message.name, message.crc_extra, message.codec.size) == (
+        generated.msgname, generated.crc_extra, generated.unpacker.size)
+    assert LAYOUTS[message.id] == (generated.crc_extra, generated.unpacker.size)
+    assert encode_payload(message) == twin(message).unpacker.pack(
+        *(fields_of(twin(message))[name] for name in generated.ordered_fieldnames))
+
+
+def test_status_and_information_lie_on_the_wire_as_specified() -> None:
+    assert (STATUS.id, STATUS.crc_extra, INFORMATION.id, INFORMATION.crc_extra) == (
+        440, 66, 396, 50)
+    assert encode_payload(STATUS) == struct.pack(
+        '<IIffffffBBB', 123456, 5, 62.5, 0.25, 40.0, 71.5, 0.0625, 10.0, 1, 3, 2)
+    assert encode_payload(INFORMATION) == struct.pack(
+        '<QII32s32s24s24s32s', 1 << 40, 5000, 1_600_000_000, b'Maker', b'Torch', b'1.2.3',
+        b'B', b'SN-7')
+
+
+@each_message
+def test_cut_zeros_and_unknown_extensions_change_no_known_field(message: Message) -> None:
+    payload = encode_payload(message)
+
+    for variant in (payload.rstrip(b'\0'), payload, payload + bytes(range(1, 50))):
+        read = decode_payload(type(message), variant)
+        assert encode_payload(read) == payload
+    assert not encode_payload(decode_payload(type(message), b'')).strip(b'\0')
+
+
+@given(st.binary(max_size=255), st.sampled_from(EVERY_MESSAGE))
+def test_any_payload_decodes_to_the_fields_that_the_generator_reads(
+        payload: bytes, message: Message) -> None:
+    generated = reference().mavlink_map[message.id]
+    values = generated.unpacker.unpack(
+        payload[:message.codec.size].ljust(message.codec.size, b'\0'))
+
+    read = asdict(decode_payload(type(message), payload))  # type: ignore[call-overload]
+
+    assert repr(read) == repr(dict(zip(
+        generated.fieldnames, (values[i] for i in generated.orders), strict=True)))
+
+
+def test_mavlink_1_acknowledgement_has_neither_progress_nor_target() -> None:
+    assert CommandAck.base_size == 3
+    assert decode_payload(CommandAck, struct.pack('<HB', 405, 4)) == CommandAck(405, 4)
+
+
+def test_value_that_does_not_fit_its_field_is_refused() -> None:
+    with pytest.raises(struct.error):
+        encode_payload(CommandAck(405, 256))
+
+
+def test_every_message_of_pymavlink_can_be_checked() -> None:
+    for message_id, message in common.mavlink_map.items():
+        assert LAYOUTS[message_id] == (message.crc_extra, message.unpacker.size)
+    assert STATUS_ID in LAYOUTS
+
+
+@pytest.mark.parametrize(('enum', 'prefix'), [
+    (MavCmd, 'MAV_CMD'), (MavResult, 'MAV_RESULT'), (MavType, 'MAV_TYPE')])
+def test_numbers_are_those_of_pymavlink(enum: Any, prefix: str) -> None:
+    missing = {entry.name for entry in enum if not hasattr(common, f'{prefix}_{entry.name}')}
+
+    assert missing <= {'CANCELLED', 'COMMAND_UNSUPPORTED_MAV_FRAME', 'NOT_IN_CONTROL'}
+    for entry in enum:
+        assert getattr(common, f'{prefix}_{entry.name}', entry) == entry
+    assert messages.MAV_COMP_ID_ILLUMINATOR == common.MAV_COMP_ID_ILLUMINATOR
+
+
+def test_every_result_has_a_name_of_its_own() -> None:
+    names = [result_name(result) for result in range(256)]
+
+    assert len(set(names)) == 256
+    assert names[4:6] == ['MAV_RESULT_FAILED', 'MAV_RESULT_IN_PROGRESS']
+    assert names[77] == 'MAV_RESULT 77 (unknown)'
+
+
+def test_heartbeat_is_that_of_an_active_component_and_not_of_an_autopilot() -> None:
+    assert asdict(heartbeat(MavType.ILLUMINATOR)) == {
+        'type': common.MAV_TYPE_ILLUMINATOR, 'autopilot': common.MAV_AUTOPILOT_INVALID,
+        'base_mode': 0, 'custom_mode': 0, 'system_status': common.MAV_STATE_ACTIVE,
+        'mavlink_version': 3}
+
+
+def test_address_reads_as_system_and_component() -> None:
+    assert str(Address(1, 243)) == '1/243'
