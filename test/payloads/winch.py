@@ -51,7 +51,8 @@ from illuminator_ros.payload.simulated import (
     Snapshot,
 )
 
-WINCH = PayloadType('winch', simulated='payloads.winch:SIMULATED')
+WINCH = PayloadType(
+    'winch', simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS')
 
 MAV_TYPE_WINCH = 42
 DO_WINCH = 42600

@@ -25,7 +25,7 @@ def main(args: list[str] | None = None) -> int:
     """
     Check a device, and return the exit status.
 
-    :param args: the command line without the program's name; None takes that of the process.
+    :param args: the command line without the program's name, by default from ``sys.argv``.
     """
     # End without a traceback until the run handles signals.
     signal.signal(signal.SIGINT, signal.SIG_DFL)

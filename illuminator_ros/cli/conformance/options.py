@@ -38,7 +38,7 @@ examples:
   conformance udp://:14541@127.0.0.1:14540    the emulator of the MAVLink guide
 
 The checks change the state of the device; afterwards it is restored.
-exit status: 0 if all that was checked is met, 1 if not or if no device was found,
+exit status: 0 if all checked requirements are met, 1 if not or if no device was found,
 2 if an argument is wrong or this computer cannot open the link."""
 
 
@@ -53,7 +53,7 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks
     """
     Return the options, and the checks of the payload that they name.
 
-    :param args: the command line without the program's name; None takes that of the process.
+    :param args: the command line without the program's name, by default from ``sys.argv``.
     :raises SystemExit: if an argument is wrong, with status 2.
     """
     payload = Parser(prog='conformance', add_help=False)

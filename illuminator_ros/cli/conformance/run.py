@@ -36,7 +36,7 @@ from ..options import signing
 from ..program import discard_output
 from ..termination import SIGNALS
 from ...mavlink.link import Link
-from ...mavlink.link_state import LinkEvent, LinkState
+from ...mavlink.link_state import LinkEvent
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import KeyFileError, TimestampStore
@@ -59,7 +59,7 @@ def run(args: Sequence[str] | None = None) -> int:
     """
     Check a device, and return the exit status.
 
-    :param args: the command line without the program's name; None takes that of the process.
+    :param args: the command line without the program's name, by default from ``sys.argv``.
     """
     options, checks = parse(args)
     logging.basicConfig(format='%(message)s')
@@ -96,6 +96,9 @@ class Conformance:
         self._suite: Suite[Any] | None = None
         self._signals = 0
         self._written = True
+        # Written by the link's thread before the main thread reads them.
+        self._missing = ''
+        self._announcement: list[str] = []
 
     def run(self) -> int:
         """Find the device, ask for consent, check the device, and write the reports."""
@@ -106,15 +109,15 @@ class Conformance:
         begun = self._link.clock()
         self._link.start()
         self._write_line(f'checking the {checks.device} on {options.url} ...')
-        self._finish(self._session.find(options.wait, LISTEN_TIME))
-        missing = self._why_missing(self._link.state())
+        self._finish(self._find())
+        missing = self._missing
         if missing.startswith(NOT_OPEN) and not any(
                 os.strerror(number) in missing for number in PEER_ERRORS):
             self._link.stop()
             _complain(f'{missing}; nothing was checked')
             return 2
         conditions = Conditions(
-            self._session.found is not None and self._announce_and_ask(),
+            bool(self._announcement) and self._announce_and_ask(),
             lambda: self._link.state().decoding.crc_errors, self._own_options())
         suite = self._suite = Suite(
             checks.tester(self._session, conditions), self._requirements, device=checks.device,
@@ -162,26 +165,28 @@ class Conformance:
         if lines := self._table.add(result):
             self._texts.put('\n'.join(lines))
 
-    def _why_missing(self, state: LinkState) -> str:
-        """Return why there is no device to check, '' if there is one."""
-        if self._session.found or self._session.runner.interrupted:
-            return ''
-        if state.is_open:
-            checks = self._checks
-            return absence(self._session, checks.device, checks.evidence, self._options.wait)
-        return f'{NOT_OPEN}{state.name}: {state.reason}'
+    async def _find(self) -> None:
+        """Find the device; note the others on the link, or why there is none."""
+        session, checks, wait = self._session, self._checks, self._options.wait
+        await session.find(wait, LISTEN_TIME)
+        state = self._link.state()
+        if session.found is None:
+            self._missing = (
+                absence(session, checks.device, checks.evidence, wait) if state.is_open
+                else f'{NOT_OPEN}{state.name}: {state.reason}')
+            return
+        changed = any(one.changes for one in self._requirements)
+        self._announcement = [f'found {checks.device} {session.found}, which ' + (
+            'the checks will change and then restore' if changed else 'stays unchanged')]
+        if others := sorted(session.devices - {session.found}):
+            self._announcement.append(
+                f'not checked: {checks.device} {names(others)}; --target selects another')
+        if others := sorted(session.heard - session.devices - {session.found}):
+            self._announcement.append(f'also on this link: {names(others)}')
 
     def _announce_and_ask(self) -> bool:
         """Name the device and the others on the link; return whether there is consent."""
-        session, device = self._session, self._checks.device
-        changed = any(one.changes for one in self._requirements)
-        texts = [f'found {device} {session.device}, which '
-                 + ('the checks will change and then restore' if changed else 'stays unchanged')]
-        if others := sorted(session.devices - {session.device}):
-            texts.append(f'not checked: {device} {names(others)}; --target selects another')
-        if others := sorted(session.heard - session.devices - {session.device}):
-            texts.append(f'also on this link: {names(others)}')
-        _print(*texts)
+        self._write_line(*self._announcement)
         if self._options.yes:
             return True
         if not any(one.needs_consent for one in self._requirements):

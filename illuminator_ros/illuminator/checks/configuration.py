@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from .specification import ILLUMINATOR
 from .tester import Change, DIM, LightTester, LOW, same
 from ..model import float32, Limits, Mode
@@ -26,6 +28,9 @@ CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
 INTERNAL = float(Mode.INTERNAL_CONTROL)
 STROBE = ('strobe_period', 'strobe_duty_cycle')
 NAN, INF = float('nan'), float('inf')
+
+configures = partial(
+    requirement, specification=MESSAGES, section='MAV_CMD_DO_ILLUMINATOR_CONFIGURE')
 
 
 def _all_shown(changes: list[Change], *names: str) -> None:
@@ -71,8 +76,7 @@ async def external(tester: LightTester) -> None:
     _all_shown([one], 'mode')
 
 
-@requirement('mode-values', 'rejects mode 0 (unknown) and undefined modes', MESSAGES,
-             'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
+@configures('mode-values', 'rejects mode 0 (unknown) and undefined modes', changes=True)
 async def modes(tester: LightTester) -> None:
     """Send values outside the range."""
     await _all_rejected(tester, [(mode, LOW, 0.0, 0.0) for mode in (0.0, -1.0, 3.0, 1.5, 255.0)])
@@ -87,8 +91,7 @@ async def brightness(tester: LightTester) -> str:
     return ', '.join(f'{value:g} %' for value in values)
 
 
-@requirement('brightness-values', 'rejects a brightness outside 0 to 100 %', MESSAGES,
-             'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
+@configures('brightness-values', 'rejects a brightness outside 0 to 100 %', changes=True)
 async def brightness_values(tester: LightTester) -> None:
     """Send values outside the range."""
     await tester.ensure_unlit()
@@ -133,8 +136,7 @@ async def strobe_limits(tester: LightTester) -> str:
     return ', '.join(f'{period:g} s' for period in periods)
 
 
-@requirement('strobe-values', 'rejects a strobe period outside its limits', MESSAGES,
-             'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', needs_consent=True)
+@configures('strobe-values', 'rejects a strobe period outside its limits', needs_consent=True)
 async def strobe_values(tester: LightTester) -> str:
     """Send periods below and above."""
     limits = await _limits(tester)
@@ -145,8 +147,7 @@ async def strobe_values(tester: LightTester) -> str:
     return ', '.join(f'{value:g} s' for value in values)
 
 
-@requirement('duty-cycle', 'accepts strobe duty cycles of 0 % and 100 %', MESSAGES,
-             'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', needs_consent=True)
+@configures('duty-cycle', 'accepts strobe duty cycles of 0 % and 100 %', needs_consent=True)
 async def duty(tester: LightTester) -> None:
     """Set both."""
     await tester.baseline()
@@ -155,16 +156,14 @@ async def duty(tester: LightTester) -> None:
               'strobe_duty_cycle')
 
 
-@requirement('duty-cycle-values', 'rejects a strobe duty cycle outside 0 to 100 %', MESSAGES,
-             'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', needs_consent=True)
+@configures('duty-cycle-values', 'rejects a duty cycle outside 0 to 100 %', needs_consent=True)
 async def duty_values(tester: LightTester) -> None:
     """Send values outside the range."""
     period, _ = _usable(await _limits(tester))
     await _all_rejected(tester, [(INTERNAL, LOW, period, value) for value in (-1.0, 101.0)])
 
 
-@requirement('not-a-number', 'rejects NaN and infinity in every parameter', MESSAGES,
-             'MAV_CMD_DO_ILLUMINATOR_CONFIGURE', changes=True)
+@configures('not-a-number', 'rejects NaN and infinity in every parameter', changes=True)
 async def not_a_number(tester: LightTester) -> None:
     """Send them one by one: every comparison with NaN is false, so it passes range checks."""
     await tester.ensure_unlit()

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 import math
 
 from .describe import status_text
@@ -27,6 +28,8 @@ from ...mavlink.messages import IlluminatorStatus
 from ...payload.checks.requirement import Failed, MESSAGES, requirement, Skipped
 from ...payload.checks.whole_run import none_of
 
+reports = partial(requirement, specification=MESSAGES, section='ILLUMINATOR_STATUS')
+
 
 async def _status(tester: LightTester) -> Status:
     idle = tester.session.idle(IlluminatorStatus)
@@ -36,8 +39,7 @@ async def _status(tester: LightTester) -> Status:
     return status
 
 
-@requirement('status-content', 'reports a valid value in every field of ILLUMINATOR_STATUS',
-             MESSAGES, 'ILLUMINATOR_STATUS')
+@reports('status-content', 'reports a valid value in every field of ILLUMINATOR_STATUS')
 async def content(tester: LightTester) -> None:
     """Look for values out of range."""
     status = await _status(tester)
@@ -45,8 +47,7 @@ async def content(tester: LightTester) -> None:
         raise Failed(', '.join(status.invalid))
 
 
-@requirement('status-mode', 'lists its current mode in mode_bitmask', MESSAGES,
-             'ILLUMINATOR_STATUS')
+@reports('status-mode', 'lists its current mode in mode_bitmask')
 async def mode(tester: LightTester) -> str:
     """Accept both conventions of existing lights: the value of the enum, and 1 << value."""
     status = await _status(tester)
@@ -58,8 +59,7 @@ async def mode(tester: LightTester) -> str:
     return f'0x{status.mode_bitmask:x}'
 
 
-@requirement('strobe-limits', 'reports a min_strobe_period that is at most max_strobe_period',
-             MESSAGES, 'ILLUMINATOR_STATUS')
+@reports('strobe-limits', 'reports a min_strobe_period that is at most max_strobe_period')
 async def limits(tester: LightTester) -> str:
     """Compare the limits."""
     status = await _status(tester)
@@ -83,8 +83,7 @@ async def flags(tester: LightTester) -> None:
                      f'too hot for the checks ({status_text(status)})')
 
 
-@requirement('uptime', 'counts uptime_ms in real time and never backwards', MESSAGES,
-             'ILLUMINATOR_STATUS', whole_run=True)
+@reports('uptime', 'counts uptime_ms in real time and never backwards', whole_run=True)
 async def uptime(tester: LightTester) -> str:
     """Compare it with our clock."""
     seen = [(at, one.uptime_ms) for at, one in tester.session.received(IlluminatorStatus)]

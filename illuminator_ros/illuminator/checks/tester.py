@@ -102,8 +102,7 @@ class LightTester:
 
     async def switch(self, on: bool, *, as_int: bool = False) -> Change:
         """Switch the light, and compare the status."""
-        one = await self.session.command(
-            MavCmd.ILLUMINATOR_ON_OFF, float(on), as_int=as_int)
+        one = await self.session.command(MavCmd.ILLUMINATOR_ON_OFF, float(on), as_int=as_int)
         return await self._compared(one, lambda status: [] if status.enabled == on else ['enable'])
 
     async def configure(
@@ -116,27 +115,24 @@ class LightTester:
             MavCmd.DO_ILLUMINATOR_CONFIGURE, mode, brightness, period, duty)
         return await self._compared(one, lambda status: differences(asked, status))
 
-    async def _compared(
-        self, one: Transaction, differ: Callable[[Status], list[str]],
-    ) -> Change:
+    async def _compared(self, one: Transaction, differ: Callable[[Status], list[str]]) -> Change:
         if not one.accepted:
             return Change(one)
         session = self.session
         mark, since = session.log.count, session.now
         while True:
             status = await self.status()
-            if status is None or not differ(status):
+            not_shown = [] if status is None else differ(status)
+            if status is None or not not_shown:
                 return Change(one)
             if session.now - since >= MESSAGE_TIMEOUT:
                 break
             await session.runner.sleep(0.1)
-        not_shown = differ(status)
-        finding = Finding(
+        self.disagreements.append(Finding(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
-            one.lines + session.log.since(mark)[-2:])
-        self.disagreements.append(finding)
-        return Change(one, tuple(not_shown), finding)
+            one.lines + session.log.since(mark)[-2:]))
+        return Change(one, tuple(not_shown), self.disagreements[-1])
 
     async def rejected(self, command: int, *params: float) -> Finding | None:
         """Send a command that must be rejected; return a finding if its result is another."""
@@ -237,7 +233,7 @@ class LightTester:
 
 
 def _saved(status: Status) -> Configuration:
-    """Return the configuration to restore; harmless values replace those that are invalid."""
+    """Return the configuration to restore; harmless values replace invalid ones."""
     return Configuration(
         status.mode or Mode.INTERNAL_CONTROL,
         LOW if status.brightness is None else shortest(status.brightness),

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a light says while it gets hot."""
+"""The requirement on the error flags of a hot light."""
 
 from __future__ import annotations
 
@@ -51,15 +51,11 @@ async def thermal(tester: LightTester) -> str:
 
 
 async def _sample(tester: LightTester, heat: float) -> list[Status]:
-    samples = []
-    session = tester.session
-    until = session.now + heat
-    while session.now < until:
-        status = await tester.status()
-        if status is not None:
-            samples.append(status)
-        await session.runner.sleep(min(0.5, heat / 5))
-    return samples
+    samples, until = [], tester.session.now + heat
+    while tester.session.now < until:
+        samples.append(await tester.status())
+        await tester.session.runner.sleep(min(0.5, heat / 5))
+    return [one for one in samples if one is not None]
 
 
 def _judge(seen: list[Status], seconds: float) -> str:

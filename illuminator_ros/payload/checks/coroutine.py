@@ -40,7 +40,7 @@ class _Wait:
         yield self
 
 
-# What a coroutine of this module awaits in the end, whatever it returns.
+# A coroutine that awaits :class:`_Wait`, by way of others.
 Main = Coroutine[Any, Any, None]
 
 

@@ -29,7 +29,7 @@ def command_name(command: int) -> str:
 
 
 def describe(message: messages.Message) -> str:
-    """Return a message in one line; only the name of one that is not of these protocols."""
+    """Return a message in one line; only its name if it belongs to another protocol."""
     if isinstance(message, CommandLong | CommandInt):
         return _command(message)
     if isinstance(message, CommandAck):

@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
+from .describe import describe
 from .requirement import Conditions, Requirement, T
 from .session import Session
 from ...mavlink.messages import Address, Message
@@ -48,9 +49,9 @@ class PayloadChecks(Generic[T]):
     :param messages: the classes of its messages.
     :param is_device: whether a message identifies its sender as a device of this payload.
     :param evidence: those messages, as text.
+    :param tester: returns a tester that operates the device of a session.
     :param describe: text of a message.
     :param identity: what is known of the device, '' if nothing.
-    :param tester: returns a tester that operates the device of a session.
     :param risk: what the device does in the checks that need consent, as a clause.
     :param question: asked before them; ``{device}`` and the options are filled in.
     :param options: options of the command line, for :attr:`Conditions.options`.
@@ -61,12 +62,12 @@ class PayloadChecks(Generic[T]):
     messages: tuple[type[Message], ...]
     is_device: Callable[[Message], bool]
     evidence: str
-    describe: Callable[[Message], str]
-    identity: Callable[[Session], str]
     tester: Callable[[Session, Conditions], T]
     requirements: tuple[Requirement[T], ...]
-    risk: str
-    question: str
+    describe: Callable[[Message], str] = describe
+    identity: Callable[[Session], str] = lambda session: ''
+    risk: str = ''
+    question: str = ''
     options: tuple[Option, ...] = ()
 
     def session(self, address: Address, target: Address | None = None) -> Session:

@@ -275,7 +275,7 @@ class Session(Endpoint):
             if len(one.acks) == seen:
                 return False
             timeout = PROGRESS_TIMEOUT
-        # A late acknowledgement must not be taken for that of the next command.
+        # A late acknowledgement must not be assigned to the next command.
         if len(one.sent) > 1:
             await self.runner.until(lambda: len(one.finals) >= len(one.sent), ACK_TIMEOUT)
         await self.runner.sleep(SETTLE_TIME)

@@ -1,0 +1,63 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The conformance checks of a winch, beside a light on the same link."""
+
+from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.checks.requirement import Conditions, Verdict
+from illuminator_ros.payload.checks.suite import Suite
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from payloads.winch import SimulatedWinch, WINCH
+from payloads.winch_checks import CHECKS, REQUIREMENTS
+import pytest
+
+DECK = Address(1, 169)
+
+
+@pytest.mark.parametrize(('fault', 'failed'), [('', set()), ('lie', {'release'})])
+def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_every_component(
+        fault, failed):
+    winch = SimulatedWinch()
+    devices = SimulatedComponents(
+        [describe(IlluminatorProperties()), Description(DECK, winch)], 0.0)
+    component = devices.components[1]
+    if fault:
+        component.behave(winch.faults.add(component.behaviour, fault), 0.0)
+    checks = WINCH.load('checks')
+    session = checks.session(Address(255, 190))
+    suite = Suite(checks.tester(session, Conditions()), checks.requirements, device=checks.device)
+
+    async def run():
+        await session.find(10.0, 2.0)
+        await suite.run()
+
+    session.runner.run(run())
+    session.link_opened(0.0)
+    for step in range(10_000):
+        now = 0.01 * step
+        for side, other in ((session, devices), (devices, session)):
+            side.poll(now)
+            while side.outgoing:
+                other.receive(*side.outgoing.popleft(), now)
+        if not session.runner.running:
+            break
+
+    assert checks is CHECKS
+    assert session.found == DECK
+    assert {one.requirement.name for one in suite.results if one.verdict is Verdict.FAIL} == failed
+    assert len(suite.results) == len(REQUIREMENTS)
+    assert suite.restored == 'the winch is as it was'
+    assert winch.line_length == 0.0

@@ -1,0 +1,74 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The checks of a winch: what a second payload adds to those of every component."""
+
+from __future__ import annotations
+
+from illuminator_ros.mavlink.messages import Heartbeat
+from illuminator_ros.payload.checks import command, heartbeat, whole_run
+from illuminator_ros.payload.checks.payload_checks import PayloadChecks
+from illuminator_ros.payload.checks.requirement import (
+    Conditions,
+    fail_if,
+    MESSAGES,
+    Requirement,
+    requirement,
+)
+from illuminator_ros.payload.checks.session import Session
+from illuminator_ros.payload.checks.stream import interval_requirements
+from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTROL, WinchStatus
+
+
+class WinchTester:
+    """Releases line, and winds in as much at the end."""
+
+    def __init__(self, session: Session, conditions: Conditions) -> None:
+        self.session = session
+        self.conditions = conditions
+        self.saved = ''
+
+    async def length(self) -> float:
+        """Return the released length, m; NaN if the winch does not report it."""
+        status = await self.session.request(WinchStatus)
+        return status.line_length if status else float('nan')
+
+    async def save(self) -> bool:
+        """See :class:`Tester`."""
+        self.saved = self.saved or str(await self.length())
+        return self.saved != 'nan'
+
+    async def restore(self) -> list[str]:
+        """See :class:`Tester`."""
+        change = float(self.saved) - await self.length()
+        await self.session.command(DO_WINCH, 1, WINCH_RELATIVE_LENGTH_CONTROL, change)
+        return [] if await self.length() == float(self.saved) else ['line_length']
+
+
+@requirement('release', 'releases line when commanded', MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
+async def release(tester: WinchTester) -> None:
+    """Release 2 m, and compare the status."""
+    before = await tester.length()
+    one = await tester.session.command(DO_WINCH, 1, WINCH_RELATIVE_LENGTH_CONTROL, 2.0)
+    after = await tester.length()
+    fail_if([None if after == before + 2.0 else one.finding(f'{before} m, then {after} m')])
+
+
+REQUIREMENTS: tuple[Requirement[WinchTester], ...] = (
+    heartbeat.heartbeat, heartbeat.heartbeat_autopilot, command.unknown_command,
+    *interval_requirements(WinchStatus), release, *whole_run.ACKNOWLEDGEMENTS)
+CHECKS = PayloadChecks(
+    'winch', 'winch', (WinchStatus,),
+    lambda message: isinstance(message, Heartbeat) and message.type == MAV_TYPE_WINCH,
+    'HEARTBEAT with MAV_TYPE_WINCH', WinchTester, REQUIREMENTS)
