@@ -46,15 +46,22 @@ def run_program(
     :param more: signals that end it too, see :class:`Termination`.
     :param queued: descriptors that are written to through an :class:`~.output.OutputQueue`.
     """
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            # A text that the encoding lacks must not end the program. Not later: the queue
-            # makes a pipe of a file, which cannot be reconfigured.
-            stream.reconfigure(errors='backslashreplace')
+    escape_output()
     termination = Termination(more, queued)
     status = explained(name, lambda: run(termination))
     termination.finish()
     return status
+
+
+def escape_output() -> None:
+    """
+    Escape characters that the encoding of stdout and stderr lacks, instead of failing.
+
+    Call it before an output queue makes pipes of files, which cannot be reconfigured.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors='backslashreplace')
 
 
 def explained(name: str, run: Callable[[], int]) -> int:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import signal
 
-from ..program import explained
+from ..program import escape_output, explained
 
 
 def main(args: list[str] | None = None) -> int:
@@ -29,6 +29,7 @@ def main(args: list[str] | None = None) -> int:
     """
     # End without a traceback until the run handles signals.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    escape_output()
 
     def start() -> int:
         from .run import run
