@@ -19,14 +19,7 @@ from __future__ import annotations
 from .error_flags import ErrorFlag
 from ..payload.faults import Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
-
-
-def _flags(text: str) -> int:
-    value = int(text, 0)
-    if not 0 < value < 1 << 32:
-        raise ValueError('not within 1 to 0xffffffff')
-    return value
-
+from ..payload.settings import integer
 
 FAULTS = FaultTable({
     **COMPONENT_FAULTS,
@@ -40,7 +33,7 @@ FAULTS = FaultTable({
     'anything': Fault('accepts_out_of_range', 'accepts values out of range'),
     'toggle': Fault('toggles', 'is switched off by switching it on again'),
     'flags': Fault('false_flags', 'reports error flags without a reason',
-                   'FLAGS', _flags, int(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)),
+                   'FLAGS', integer(1, 0xFFFFFFFF), int(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)),
     'cold-throttling': Fault('inverted_flags', 'reports THERMAL_THROTTLING while it is on and '
                              'cool, not while it is hot'),
 })

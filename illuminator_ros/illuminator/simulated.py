@@ -67,7 +67,7 @@ def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Change
     return light.press(now, strobe_period=_number(words[0]), strobe_duty_cycle=duty_cycle)
 
 
-COMMANDS: dict[str, ConsoleCommand[SimulatedIlluminator]] = {
+COMMANDS: dict[str, ConsoleCommand[SimulatedIlluminator, Change]] = {
     'on': ConsoleCommand('on', 'switch on, as by a button on the light',
                          lambda light, words, now: light.press(now, enabled=True)),
     'off': ConsoleCommand('off', 'switch off, likewise',

@@ -17,7 +17,9 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 import copy
+from functools import partial
 import heapq
 import itertools
 import math
@@ -28,27 +30,53 @@ from .faults import Behaviour
 from ..mavlink.messages import Address
 
 
+class Schedule:
+    """Actions that are due later, in the order of their times."""
+
+    def __init__(self) -> None:
+        self._entries: list[tuple[float, int, Callable[[float], None]]] = []
+        self._order = itertools.count()
+
+    def add(self, due: float, action: Callable[[float], None]) -> None:
+        """Call ``action(now)`` when it is due."""
+        heapq.heappush(self._entries, (due, next(self._order), action))
+
+    def poll(self, now: float) -> None:
+        """Do everything that is due."""
+        while self._entries and self._entries[0][0] <= now:
+            heapq.heappop(self._entries)[2](now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        return self._entries[0][0] if self._entries else math.inf
+
+    def clear(self) -> None:
+        """Drop all actions."""
+        self._entries.clear()
+
+
 class FaultInjector:
     """
     Drops, corrupts, duplicates and delays messages. No I/O; time is passed in.
 
     :param outgoing: takes the messages that are sent, each with the address that sends it.
+    :param schedule: sends the delayed ones.
     :param seed: the same seed gives the same faults again.
     """
 
     def __init__(
-        self, address: Address, outgoing: deque[tuple[Address, Any]], seed: int = 0,
+        self, address: Address, outgoing: deque[tuple[Address, Any]], schedule: Schedule,
+        seed: int = 0,
     ) -> None:
         self._address = address
         self._outgoing = outgoing
+        self._schedule = schedule
         self._random = random.Random(f'{seed} {address}')
-        self._delayed: list[tuple[float, int, Any]] = []
-        self._order = itertools.count()
 
     def send(self, message: Any, behaviour: Behaviour, now: float) -> None:
         """Send a message with the faults of a behaviour."""
         if not behaviour.link_faults:
-            self._outgoing.append((self._address, message))
+            self._transmit(message, now)
             return
         if self._occurs(behaviour.drop):
             return
@@ -58,23 +86,13 @@ class FaultInjector:
             message.crc_extra = type(message).crc_extra ^ 0xFF
         for _ in range(2 if self._occurs(behaviour.duplicate) else 1):
             if behaviour.delay:
-                due = now + self._random.uniform(0.0, behaviour.delay)
-                heapq.heappush(self._delayed, (due, next(self._order), message))
+                self._schedule.add(now + self._random.uniform(0.0, behaviour.delay),
+                                   partial(self._transmit, message))
             else:
-                self._outgoing.append((self._address, message))
+                self._transmit(message, now)
 
-    def poll(self, now: float) -> None:
-        """Send the delayed messages that are due."""
-        while self._delayed and self._delayed[0][0] <= now:
-            self._outgoing.append((self._address, heapq.heappop(self._delayed)[2]))
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
-        return self._delayed[0][0] if self._delayed else math.inf
-
-    def clear(self) -> None:
-        """Drop the delayed messages."""
-        self._delayed.clear()
+    def _transmit(self, message: Any, now: float) -> None:
+        self._outgoing.append((self._address, message))
 
     def _occurs(self, share: float) -> bool:
         return share > 0 and self._random.random() < share

@@ -27,6 +27,7 @@ from functools import cached_property
 import math
 from typing import Any, TypeVar
 
+from .settings import integer
 from ..mavlink.messages import (
     MAV_AUTOPILOT_INVALID,
     MAV_STATE_ACTIVE,
@@ -113,36 +114,14 @@ class FaultError(ValueError):
     """A fault that does not exist, or a value that it cannot have; the message says which."""
 
 
-def seconds(text: str) -> float:
-    """Read a duration, s."""
-    value = float(text)
-    if not 0 < value <= 3600:
-        raise ValueError('not within 0 to 3600 s')
-    return value
-
-
-def share(text: str) -> float:
-    """Read a share, 0..1."""
-    value = float(text)
-    if not 0 < value <= 1:
-        raise ValueError('not within 0 to 1')
-    return value
-
-
-def count(text: str) -> int:
-    """Read a number of times."""
-    value = int(text)
-    if not 1 <= value <= 1_000_000:
-        raise ValueError('not within 1 to 1000000')
-    return value
-
-
-def uint8(text: str) -> int:
-    """Read a field of one byte."""
-    value = int(text)
-    if not 0 <= value <= 255:
-        raise ValueError('not within 0 to 255')
-    return value
+def above_zero(limit: float) -> Callable[[str], float]:
+    """Return a reader of numbers above 0, up to a limit."""
+    def read(text: str) -> float:
+        value = float(text)
+        if not 0 < value <= limit:
+            raise ValueError(f'not within 0 to {limit:g}')
+        return value
+    return read
 
 
 def _result(text: str) -> MavResult:
@@ -254,31 +233,33 @@ class FaultTable(dict[str, Fault]):
         return '\n'.join(lines)
 
 
+_seconds, _share, _uint8 = above_zero(3600), above_zero(1), integer(0, 255)
+
 FAULTS = FaultTable({
-    'silence': Fault('silence', 'neither receives nor sends for S seconds', 'S', seconds,
+    'silence': Fault('silence', 'neither receives nor sends for S seconds', 'S', _seconds,
                      math.inf),
     'reboot': Fault('reboot_interval', 'restarts every S seconds; on the console, '
-                    'without S, once', 'S', seconds, 10.0),
+                    'without S, once', 'S', _seconds, 10.0),
     'refuse': Fault('refuse', 'answers changes with RESULT, such as failed',
                     'RESULT', _result, MavResult.DENIED),
     'progress': Fault('progress', 'reports IN_PROGRESS for S seconds before each change',
-                      'S', seconds, 2.5),
-    'busy': Fault('rejections', 'rejects N changes temporarily', 'N', count, 3),
-    'slow': Fault('slow', 'answers S seconds late', 'S', seconds, 1.5),
-    'drop': Fault('drop', 'loses a share of its messages', 'SHARE', share, 0.3),
+                      'S', _seconds, 2.5),
+    'busy': Fault('rejections', 'rejects N changes temporarily', 'N', integer(1, 1_000_000), 3),
+    'slow': Fault('slow', 'answers S seconds late', 'S', _seconds, 1.5),
+    'drop': Fault('drop', 'loses a share of its messages', 'SHARE', _share, 0.3),
     'duplicate': Fault('duplicate', 'sends a share of its messages twice',
-                       'SHARE', share, 0.3),
+                       'SHARE', _share, 0.3),
     'delay': Fault('delay', 'delays and reorders its messages by up to S seconds',
-                   'S', seconds, 2.0),
+                   'S', _seconds, 2.0),
     'corrupt': Fault('corrupt', 'sends a share of its messages with a wrong checksum',
-                     'SHARE', share, 0.3),
+                     'SHARE', _share, 0.3),
     'lie': Fault('ignores_changes', 'accepts changes and does not apply them'),
     'heartbeat': Fault('heartbeat_interval', 'sends a heartbeat every S seconds',
-                       'S', seconds, 4.0),
+                       'S', _seconds, 4.0),
     'type': Fault('heartbeat_type', 'sends a heartbeat of MAV_TYPE N',
-                  'N', uint8, int(MavType.ONBOARD_CONTROLLER)),
+                  'N', _uint8, int(MavType.ONBOARD_CONTROLLER)),
     'autopilot': Fault('heartbeat_autopilot', 'sends a heartbeat with MAV_AUTOPILOT N',
-                       'N', uint8, 3),
+                       'N', _uint8, 3),
     'no-int': Fault('answers_command_int', 'does not answer COMMAND_INT', default=False),
     'no-broadcast': Fault('answers_broadcast', 'does not answer messages to all components',
                           default=False),

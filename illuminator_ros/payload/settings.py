@@ -20,8 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .faults import FaultTable
-
 
 @dataclass(frozen=True)
 class Setting:
@@ -78,21 +76,3 @@ def one_of(names: Any) -> Callable[[str], str]:
             raise ValueError(f'{text!r} is not one of {", ".join(names)}')
         return text
     return read
-
-
-def common_settings(noun: str, faults: FaultTable) -> dict[str, Setting]:
-    """
-    Return the settings that every payload has.
-
-    :param noun: names one component, such as ``light``.
-    """
-    def read(text: str) -> tuple[str, ...]:
-        names = tuple(part.strip() for part in text.split(',') if part.strip())
-        for name in names:
-            faults.value(name)
-        return names
-
-    return {
-        'fault': Setting(f'[{noun.upper()}:]NAME[=VALUE]', 'a fault, see below', read, True),
-        'seed': Setting('N', 'seed of the random faults (default: 0)', integer(0, 1 << 32)),
-    }

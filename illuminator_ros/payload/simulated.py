@@ -22,15 +22,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 import functools
 from functools import cached_property
-import heapq
-import itertools
 import math
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .events import Listeners
-from .fault_injector import FaultInjector
+from .fault_injector import FaultInjector, Schedule
 from .faults import Behaviour, FAULTS, FaultTable
-from .settings import common_settings, Setting
+from .settings import integer, Setting
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (
@@ -52,7 +50,8 @@ MAX_PEERS = 100
 PROGRESS_INTERVAL = 0.5
 
 Change = Callable[[], None]
-D_contra = TypeVar('D_contra', contravariant=True)
+T_contra = TypeVar('T_contra', contravariant=True)
+R_co = TypeVar('R_co', covariant=True)
 
 
 class CommandReply(NamedTuple):
@@ -77,18 +76,19 @@ class Snapshot(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ConsoleCommand(Generic[D_contra]):
+class ConsoleCommand(Generic[T_contra, R_co]):
     """
-    A command that a person gives to a simulated device, as with a button on it.
+    A command of the console, with a result for each component that it is given to.
 
     :param usage: the command and its arguments.
-    :param do: returns the change that the arguments ask for; ValueError if there is none.
+    :param do: called with the component or its device, the arguments and the time; ValueError
+        if an argument is wrong.
     :param counts: how many arguments it takes.
     """
 
     usage: str
     help: str  # noqa: A003
-    do: Callable[[D_contra, list[str], float], Change]
+    do: Callable[[T_contra, list[str], float], R_co]
     counts: tuple[int, ...] = (0,)
 
 
@@ -101,12 +101,12 @@ class SimulatedDevice(ABC):
     :param behaviour: how it behaves at first, and without faults.
     :cvar changes: the MAV_CMDs that change its state.
     :cvar faults: the faults that it can have.
-    :cvar commands: what a person can do with it on the console.
+    :cvar commands: changes by a person, on the console.
     """
 
     changes: ClassVar[frozenset[int]]
     faults: ClassVar[FaultTable] = FAULTS
-    commands: ClassVar[Mapping[str, ConsoleCommand[Any]]] = {}
+    commands: ClassVar[Mapping[str, ConsoleCommand[Any, Change]]] = {}
 
     def __init__(self, behaviour: Behaviour) -> None:
         self.behaviour = self.normal = behaviour
@@ -166,7 +166,18 @@ class SimulatedType(Generic[D]):
     @cached_property
     def all_settings(self) -> Mapping[str, Setting]:
         """The settings of the payload, and those of every payload."""
-        return {**self.settings, **common_settings(self.noun, self.device.faults)}
+        return {
+            **self.settings,
+            'fault': Setting(f'[{self.noun.upper()}:]NAME[=VALUE]', 'a fault, see below',
+                             self._read_faults, True),
+            'seed': Setting('N', 'seed of the random faults (default: 0)', integer(0, 1 << 32)),
+        }
+
+    def _read_faults(self, text: str) -> tuple[str, ...]:
+        names = tuple(part.strip() for part in text.split(',') if part.strip())
+        for name in names:
+            self.device.faults.value(name)
+        return names
 
 
 @dataclass(frozen=True)
@@ -202,28 +213,6 @@ class _Stream:
             self.due = now + self.interval
 
 
-class _Schedule:
-    """Actions that are due later."""
-
-    def __init__(self) -> None:
-        self._entries: list[tuple[float, int, Callable[[float], None]]] = []
-        self._order = itertools.count()
-
-    def add(self, due: float, action: Callable[[float], None]) -> None:
-        """Call ``action(now)`` when it is due."""
-        heapq.heappush(self._entries, (due, next(self._order), action))
-
-    def poll(self, now: float) -> None:
-        while self._entries and self._entries[0][0] <= now:
-            heapq.heappop(self._entries)[2](now)
-
-    def next_deadline(self) -> float:
-        return self._entries[0][0] if self._entries else math.inf
-
-    def clear(self) -> None:
-        self._entries.clear()
-
-
 class SimulatedComponent(Generic[D]):
     """
     One simulated component: heartbeat, commands, streams and faults. No I/O.
@@ -242,8 +231,9 @@ class SimulatedComponent(Generic[D]):
         self.device = described.device
         self.outgoing = deque() if outgoing is None else outgoing
         self._changed = changed
-        self._injector = FaultInjector(self.address, self.outgoing, described.seed)
-        self._schedule = _Schedule()
+        self._schedule = Schedule()
+        self._injector = FaultInjector(
+            self.address, self.outgoing, self._schedule, described.seed)
         self.power_on(now)
 
     @property
@@ -263,7 +253,6 @@ class SimulatedComponent(Generic[D]):
                          for message_id, interval in self.device.streams().items()}
         self._in_progress: set[int] = set()
         self._heartbeat_due = now if self.behaviour.heartbeat_interval else math.inf
-        self._injector.clear()
         self._schedule.clear()
         self._reboot_due = now + (self.behaviour.reboot_interval or math.inf)
         self._changed()
@@ -443,14 +432,13 @@ class SimulatedComponent(Generic[D]):
             if now >= stream.due:
                 stream.advance(now)
                 self._send(self.device.message(message_id, now), now)
-        self._injector.poll(now)
         self._changed()
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
         end_of_silence = math.inf if self._silent_until == -math.inf else self._silent_until
         return min(self._heartbeat_due, self._reboot_due, end_of_silence,
-                   self._schedule.next_deadline(), self._injector.next_deadline(),
+                   self._schedule.next_deadline(),
                    *(stream.due for stream in self._streams.values()))
 
 

@@ -43,10 +43,11 @@ def simulator(*arguments, **streams):
         process.wait()
 
 
-@pytest.mark.parametrize('stream', ['stdout', 'stderr'])
-def test_a_reader_that_stops_reading_delays_no_command_and_no_sigterm(stream):
+@pytest.mark.parametrize(('stream', 'make'), [
+    ('stdout', os.pipe), ('stderr', os.pipe), ('stdout', os.openpty)])
+def test_a_reader_that_stops_reading_delays_no_command_and_no_sigterm(stream, make):
     port = free_port()
-    reading, writing = os.pipe()
+    reading, writing = make()
     os.set_blocking(writing, False)
     with contextlib.suppress(BlockingIOError):
         while True:

@@ -16,22 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .view import look
 from ...payload.simulated import ConsoleCommand, SimulatedComponent
 
 Component = SimulatedComponent[Any]
-
-
-@dataclass(frozen=True)
-class _Command:
-    usage: str
-    help: str  # noqa: A003
-    do: Callable[[Component, list[str], float], str | None]
-    counts: tuple[int, ...] = (0,)
 
 
 def _fault(component: Component, words: list[str], now: float) -> None:
@@ -56,19 +47,19 @@ def _faults(component: Component, words: list[str], now: float) -> str:
 
 
 # The commands of every component.
-COMMANDS: Mapping[str, _Command] = {
-    'reboot': _Command('reboot', 'restart, as after a power cycle',
+COMMANDS: Mapping[str, ConsoleCommand[Component, str | None]] = {
+    'reboot': ConsoleCommand('reboot', 'restart, as after a power cycle',
                        lambda component, words, now: component.restart(now)),
-    'fault': _Command('fault NAME[=VALUE]', 'start a fault', _fault, (1,)),
-    'clear': _Command('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
-    'faults': _Command('faults', 'show the present faults', _faults),
-    'status': _Command('status', 'show the state of each component',
+    'fault': ConsoleCommand('fault NAME[=VALUE]', 'start a fault', _fault, (1,)),
+    'clear': ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
+    'faults': ConsoleCommand('faults', 'show the present faults', _faults),
+    'status': ConsoleCommand('status', 'show the state of each component',
                        lambda component, words, now: str(look(component, now))),
 }
 OTHERS = {'help': 'show this', 'quit': 'end'}
 
 
-def describe_commands(tables: Iterable[Mapping[str, _Command | ConsoleCommand[Any]]]) -> str:
+def describe_commands(tables: Iterable[Mapping[str, ConsoleCommand[Any, Any]]]) -> str:
     """Return the commands of the console, a line each; those of every component come last."""
     common, *own = tables
     rows = {one.usage: one.help for table in (*own, common) for one in table.values()}
