@@ -450,7 +450,7 @@ class SimulatedComponents(Endpoint, Generic[D]):
     :ivar new_peers: the address of each other component, with the first message from it.
     """
 
-    messages = (CommandLong, CommandInt)
+    messages = (Heartbeat, CommandLong, CommandInt)
 
     def __init__(self, described: Iterable[Description[D]], now: float) -> None:
         super().__init__()

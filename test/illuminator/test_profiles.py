@@ -128,7 +128,7 @@ class TestExtended:
         bench = light('extended')
         bench.command(CONFIGURE, 2, 30, 0.5, 20)
         status = Status.from_message(
-            decode_payload(STATUS_ID, encode_payload(bench.status())))
+            decode_payload(IlluminatorStatus, encode_payload(bench.status())))
         assert (status.brightness, status.strobe_period, status.invalid) == (30, 0.5, ())
 
 

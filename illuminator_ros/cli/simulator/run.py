@@ -77,12 +77,13 @@ class _Simulation:
 
     def run(self, termination: Termination) -> None:
         """Run until a signal or ``quit``."""
-        self._view.say(self._headline)
         termination.calls(self._end)
         self._link.start()
         # A background job that reads from its terminal is stopped, if it does not ignore this.
         signal.signal(signal.SIGTTIN, signal.SIG_IGN)
         threading.Thread(target=self._listen, name='console', daemon=True).start()
+        # From here on this thread waits for its terminal while that is stopped.
+        self._view.say(self._headline)
         while not self._ended.is_set():
             self._link.call(self._look)
             with contextlib.suppress(queue.Empty):
