@@ -21,8 +21,8 @@ from typing import Any
 
 from bench.subjects import SUBJECTS
 from illuminator_ros.cli.bridge import usage
-from illuminator_ros.cli.monitor import graph, keys, model, requests
-from illuminator_ros.cli.monitor.options import parser
+from illuminator_ros.cli.monitor import graph, key_bindings, model, requests
+from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.illuminator.error_flags import ErrorFlag
 from illuminator_ros.illuminator.ros import beam
 from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
@@ -180,7 +180,8 @@ def test_the_beam_page_has_the_parameters_and_limits_of_the_code() -> None:
 
 def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:
     assert [(tuple(re.findall('`([^`]+)`', cells[0])), cells[1])
-            for cells in table(MONITOR, 'key')] == list(keys.HELP)
+            for cells in table(MONITOR, 'key')] == [
+                (keys, text) for keys, text, _ in key_bindings.BINDINGS]
     assert [cells[0] for cells in table(MONITOR, 'state')] == [
         f'`{state.value}`' for state in model.State]
     assert all(f'`{topic}`' in MONITOR for topic in graph.SIGNATURE)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the monitor knows of lights, moment by moment."""
+"""The lights of the monitor over time."""
 
 from illuminator_ros.cli.monitor.model import (
     Diagnosis,
@@ -37,135 +37,96 @@ def fleet_with(**values: object) -> Fleet:
     return fleet
 
 
-class TestState:
-    @pytest.mark.parametrize(('values', 'state'), [
-        ({}, State.UNKNOWN),
-        ({'connected': True}, State.UNKNOWN),
-        ({'connected': True, 'enabled': True}, State.ON),
-        ({'connected': True, 'enabled': False}, State.OFF),
-        ({'connected': False, 'enabled': True}, State.LOST),
-    ])
-    def test_it_follows_from_what_was_published(
-        self, values: dict[str, bool], state: State,
-    ) -> None:
-        assert fleet_with(**values).lights[0].state(100.0) is state
-
-    def test_a_light_of_which_nothing_comes_is_silent(self) -> None:
-        [light] = fleet_with(connected=True, enabled=True).lights
-
-        assert light.state(100.0 + SILENCE) is State.ON
-        assert light.state(100.1 + SILENCE) is State.SILENT
-
-    def test_diagnostics_break_the_silence_too(self) -> None:
-        fleet = fleet_with(enabled=True)
-
-        fleet.diagnosed(BOW, 'link', Diagnosis(0, 'open', {}), 110.0)
-
-        assert fleet.lights[0].state(111.0) is State.ON
-
-    def test_a_light_that_left_the_graph_is_gone(self) -> None:
-        fleet = fleet_with(connected=True, enabled=True)
-
-        fleet.seen([], 101.0)
-
-        assert fleet.lights[0].state(101.0) is State.GONE
-
-    def test_one_that_returns_is_as_before_but_for_what_was_agreed(self) -> None:
-        fleet = fleet_with(connected=True, enabled=True)
-        fleet.agreed(BOW, 30.0)
-        fleet.seen([], 101.0)
-
-        new = fleet.seen([BOW], 102.0)
-
-        assert new == []
-        assert fleet.lights[0].state(102.0) is State.ON
-        assert fleet.lights[0].setpoint is None
+@pytest.mark.parametrize(('values', 'state'), [
+    ({}, State.UNKNOWN),
+    ({'connected': True}, State.UNKNOWN),
+    ({'connected': True, 'enabled': True}, State.ON),
+    ({'connected': True, 'enabled': False}, State.OFF),
+    ({'connected': False, 'enabled': True}, State.LOST),
+])
+def test_state_follows_from_the_topics(values: dict[str, bool], state: State) -> None:
+    assert fleet_with(**values).lights[0].state(100.0) is state
 
 
-class TestFleet:
+def test_light_without_topics_and_diagnostics_is_silent() -> None:
+    fleet = fleet_with(connected=True, enabled=True)
+    [light] = fleet.lights
+    assert light.state(100.0 + SILENCE) is State.ON
+    assert light.state(100.1 + SILENCE) is State.SILENT
 
-    def test_new_lights_are_told_once_and_stand_in_the_order_of_their_names(self) -> None:
-        fleet = Fleet()
+    fleet.diagnosed(BOW, 'link', Diagnosis(0, 'open', {}), 110.0)
 
-        assert fleet.seen(['/b', '/a'], 0.0) == ['/a', '/b']
-        assert fleet.seen(['/a', '/b', '/aa'], 1.0) == ['/aa']
-        assert [light.name for light in fleet.lights] == ['/a', '/aa', '/b']
-
-    def test_only_what_is_gone_is_cleared(self) -> None:
-        fleet = Fleet()
-        fleet.seen(['/a', '/b'], 0.0)
-        fleet.seen(['/b'], 1.0)
-
-        assert fleet.clear_gone() == ['/a']
-        assert [light.name for light in fleet.lights] == ['/b']
-
-    def test_their_number_is_bounded(self) -> None:
-        fleet = Fleet()
-
-        fleet.seen([f'/light_{number}' for number in range(MAX_LIGHTS + 5)], 0.0)
-
-        assert len(fleet.lights) == MAX_LIGHTS
-
-    def test_what_is_of_no_known_light_is_passed_over(self) -> None:
-        fleet = fleet_with()
-
-        fleet.take('/other', 'enabled', True, 100.0)
-        fleet.diagnosed('', 'lamp', Diagnosis(2, 'broken', {}), 100.0)
-        fleet.agreed('/other', 1.0)
-
-        assert [light.name for light in fleet.lights] == [BOW]
-        assert fleet.lights[0].level == 0
-
-    def test_the_level_is_the_worse_of_link_and_lamp(self) -> None:
-        fleet = fleet_with()
-        fleet.diagnosed(BOW, 'link', Diagnosis(2, 'lost', {}), 100.0)
-        fleet.diagnosed(BOW, 'lamp', Diagnosis(1, 'hot', {}), 100.0)
-
-        assert fleet.lights[0].level == 2
-
-    def test_error_flags_have_words(self) -> None:
-        assert fleet_with(error_flags=0x15).lights[0].flags == [
-            'thermal throttling', 'thermistor failure', 'unknown flags 0x10']
-
-    @pytest.mark.parametrize(('text', 'number'), [
-        ('12.5', 12.5), ('0', 0.0), ('n/a', None), ('nan', None), ('inf', None), (None, None)])
-    def test_a_number_of_a_diagnosis_is_one_or_none(
-        self, text: str | None, number: float | None,
-    ) -> None:
-        values = {} if text is None else {'loss_percent': text}
-
-        assert Diagnosis(0, '', values).number('loss_percent') == number
-
-    def test_nothing_that_others_send_reaches_the_terminal_as_a_command(self) -> None:
-        fleet = fleet_with(mode='\x1b[2J')
-        fleet.diagnosed(BOW, 'lamp', Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
-        [light] = fleet.lights
-
-        assert light.lamp is not None
-        texts = [light.value('mode'), light.lamp.message, *light.lamp.values.values()]
-        assert all(text.isprintable() for text in texts)
-        assert printable('Ünï 20 %') == 'Ünï 20 %'
+    assert light.state(111.0) is State.ON
 
 
-class TestTrend:
+def test_light_that_left_the_graph_is_gone_and_returns_without_its_setpoint() -> None:
+    fleet = fleet_with(connected=True, enabled=True)
+    fleet.agreed(BOW, 30.0)
+    fleet.seen([], 101.0)
+    assert fleet.lights[0].state(101.0) is State.GONE
 
-    def test_it_has_the_newest_value_of_each_step(self) -> None:
-        trend = Trend(step=2.0, size=10)
-        for now, value in ((0.0, 20.0), (1.9, 21.0), (2.0, 22.0), (4.5, 23.0)):
-            trend.add(value, now)
+    assert fleet.seen([BOW], 102.0) == []
 
-        assert trend.last(3, 5.0) == [21.0, 22.0, 23.0]
+    assert fleet.lights[0].state(102.0) is State.ON
+    assert fleet.lights[0].setpoint is None
 
-    def test_steps_without_a_value_are_empty(self) -> None:
-        trend = Trend(step=2.0, size=10)
-        trend.add(20.0, 0.0)
-        trend.add(21.0, 6.0)
 
-        assert trend.last(5, 9.0) == [20.0, None, None, 21.0, None]
+def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
+    fleet = Fleet()
 
-    def test_it_is_no_longer_than_its_size(self) -> None:
-        trend = Trend(step=1.0, size=3)
-        for now in range(100):
-            trend.add(float(now), float(now))
+    assert fleet.seen(['/b', '/a'], 0.0) == ['/a', '/b']
+    assert fleet.seen(['/a', '/b', '/aa'], 1.0) == ['/aa']
+    assert [light.name for light in fleet.lights] == ['/a', '/aa', '/b']
+    fleet.seen(['/b'], 2.0)
+    assert fleet.clear_gone() == ['/a', '/aa']
+    assert [light.name for light in fleet.lights] == ['/b']
+    fleet.seen(['/b', *(f'/light_{number}' for number in range(MAX_LIGHTS + 5))], 3.0)
+    assert len(fleet.lights) == MAX_LIGHTS
 
-        assert trend.last(10, 99.0) == [97.0, 98.0, 99.0]
+
+def test_values_of_unknown_lights_are_ignored() -> None:
+    fleet = fleet_with()
+
+    fleet.take('/other', 'enabled', True, 100.0)
+    fleet.diagnosed('', 'lamp', Diagnosis(2, 'broken', {}), 100.0)
+    fleet.agreed('/other', 1.0)
+
+    assert [(light.name, light.lamp) for light in fleet.lights] == [(BOW, None)]
+
+
+def test_error_flags_have_texts() -> None:
+    assert fleet_with(error_flags=0x15).lights[0].flags == [
+        'thermal throttling', 'thermistor failure', 'unknown flags 0x10']
+
+
+@pytest.mark.parametrize(('text', 'number'), [
+    ('12.5', 12.5), ('0', 0.0), ('n/a', None), ('nan', None), ('inf', None), (None, None)])
+def test_number_of_a_diagnosis_is_finite_or_none(
+    text: str | None, number: float | None,
+) -> None:
+    values = {} if text is None else {'loss_percent': text}
+
+    assert Diagnosis(0, '', values).number('loss_percent') == number
+
+
+def test_control_characters_of_others_never_reach_the_terminal() -> None:
+    fleet = fleet_with(mode='\x1b[2J')
+    fleet.diagnosed(BOW, 'lamp', Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
+    [light] = fleet.lights
+
+    assert light.lamp is not None
+    texts = [light.value('mode'), light.lamp.message, *light.lamp.values.values()]
+    assert all(text.isprintable() for text in texts)
+    assert printable('Ünï 20 %') == 'Ünï 20 %'
+
+
+def test_trend_has_the_newest_value_of_each_step_up_to_its_size() -> None:
+    trend = Trend(step=2.0, size=10)
+    for now, value in ((0.0, 20.0), (1.9, 21.0), (2.0, 22.0), (8.5, 23.0)):
+        trend.add(value, now)
+
+    assert trend.last(6, 9.0) == [None, 21.0, 22.0, None, None, 23.0]
+    short = Trend(step=1.0, size=3)
+    for second in range(100):
+        short.add(float(second), float(second))
+    assert short.last(10, 99.0) == [97.0, 98.0, 99.0]

@@ -12,16 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the monitor shows, on terminals of every size and kind."""
+"""The screen of the monitor, on terminals of every size and kind."""
 
 import io
 import re
 from typing import Literal
 
-from illuminator_ros.cli.monitor.keys import HELP
-from illuminator_ros.cli.monitor.model import Diagnosis, Fleet, Light, Outcome
-from illuminator_ros.cli.monitor.texts import bar, BLOCKS, sparkline
-from illuminator_ros.cli.monitor.view import columns_for, plain, Scene, screen
+from illuminator_ros.cli.monitor.formatting import bar, sparkline
+from illuminator_ros.cli.monitor.key_bindings import BINDINGS
+from illuminator_ros.cli.monitor.model import Diagnosis, Fleet, Outcome
+from illuminator_ros.cli.monitor.view import columns_for, plain, screen, ViewState
 import pytest
 from rich.console import Console
 from rich.screen import Screen
@@ -31,7 +31,7 @@ SIZES = [(200, 50), (132, 24), (80, 24), (60, 12), (40, 8), (20, 6), (12, 3), (5
 
 
 def fleet_of(*names: str) -> Fleet:
-    """Return lights that are on and have told everything."""
+    """Return lights that are on and have published all values."""
     fleet = Fleet()
     fleet.seen(names, NOW)
     for name in names:
@@ -54,187 +54,163 @@ def fleet_of(*names: str) -> Fleet:
 def shown(fleet: Fleet, width: int = 132, height: int = 24, *,
           color: Literal['standard'] | None = None, now: float = NOW,
           selected: str | None = '/bow', **how: bool) -> str:
-    """Return what a terminal gets, with its colours if some are asked for."""
+    """Return the output for a terminal."""
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, force_terminal=bool(color),
                       color_system=color, highlight=False, legacy_windows=False)
-    drawn = screen(Scene(fleet.lights, selected, now, **how), width, height)
-    # As Live has it.
+    drawn = screen(ViewState(fleet.lights, selected, now, **how), width, height)
+    # As rich.live.Live draws it.
     console.print(Screen(drawn), end='')
     return file.getvalue()
 
 
-def bow() -> tuple[Fleet, Light]:
-    """Return a light, alone."""
+@pytest.mark.parametrize('text', [
+    '/bow', 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
+    'thermal throttling', 'dimmed because it is hot', 'maker torch', 'no. T-1',
+    'agreed: 90 %', 'up 5 min', '1 light: 1 ON', '30.0 to 41.5'])
+def test_screen_shows_each_known_value(text: str) -> None:
+    assert text in shown(fleet_of('/bow'))
+
+
+@pytest.mark.parametrize(('width', 'height'), SIZES)
+@pytest.mark.parametrize('count', [0, 1, 3, 40])
+@pytest.mark.parametrize('show_help', [False, True])
+def test_screen_fits_every_terminal(
+    width: int, height: int, count: int, show_help: bool,
+) -> None:
+    names = [f'/vehicle_{number:02}/illuminator' for number in range(count)]
+
+    lines = shown(fleet_of(*names), width, height, selected=names[-1] if names else None,
+                  show_help=show_help).splitlines()
+
+    assert len(lines) <= height
+    assert max(map(len, lines), default=0) <= width
+
+
+@pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 12), (40, 8)])
+@pytest.mark.parametrize('at', [0, 17, 39])
+def test_selected_light_is_on_the_screen(width: int, height: int, at: int) -> None:
+    names = [f'/l{number:02}' for number in range(40)]
+
+    assert f'{names[at]} ' in shown(fleet_of(*names), width, height, selected=names[at])
+
+
+def test_narrower_screen_has_a_part_of_the_columns() -> None:
+    titles = [[column.title for column in columns_for(width)] for width in range(1, 250)]
+
+    assert titles[0] == ['LIGHT', 'STATE'][:len(titles[0])]
+    assert all(set(narrow) <= set(wide)
+               for narrow, wide in zip(titles, titles[1:], strict=False))
+    assert {'STATE', 'BRIGHT', 'TEMP', 'STROBE', 'ERRORS', 'LOSS'} <= set(titles[79])
+    assert {'TREND', 'RTT', 'MODE', 'LAST'} <= set(titles[-1])
+
+
+def test_help_lists_each_key() -> None:
+    text = shown(fleet_of('/bow'), show_help=True)
+
+    assert all(key in text for keys, _, _ in BINDINGS for key in keys)
+
+
+def test_unknown_values_are_dashes_and_no_lights_a_sentence() -> None:
+    assert 'no lights in this ROS graph yet' in shown(Fleet())
+    fleet = Fleet()
+    fleet.seen(['/bow'], NOW)
+
+    [row] = [line for line in shown(fleet).splitlines() if ' ? ' in line][1:2]
+
+    assert row.split() == ['/bow', '?', '-', '-', '-', '-', '-', '-']
+
+
+@pytest.mark.parametrize(('seconds', 'there', 'word'), [
+    (0, True, 'ON'), (30, True, 'silent'), (0, False, 'gone')])
+def test_state_is_a_word_and_not_only_a_colour(seconds: int, there: bool, word: str) -> None:
+    fleet = fleet_of('/bow', '/stern')
+    fleet.seen(['/bow', '/stern'] if there else ['/stern'], NOW)
+
+    text = shown(fleet, now=NOW + seconds)
+
+    assert re.search(rf'^/bow +{word} ', text, re.M)
+    assert there or '2 lights: 1 ON, 1 gone' in text
+
+
+@pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 20)])
+def test_refusal_is_shown_with_its_reason(width: int, height: int) -> None:
     fleet = fleet_of('/bow')
-    return fleet, fleet.lights[0]
+    fleet.acted('/bow', 'brightness 90 %', Outcome.FAILED,
+                'refused: MAV_RESULT_DENIED (1 try, 3 ms)', NOW - 3)
+
+    text = ' '.join(shown(fleet, width, height).split())
+
+    assert 'brightness 90 %: FAILED: refused: MAV_RESULT_DENIED (1 try, 3 ms) (3 s ago)' in text
 
 
-class TestScreen:
-    @pytest.mark.parametrize('text', [
-        '/bow', 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
-        'thermal throttling', 'dimmed because it is hot', 'maker torch', 'no. T-1',
-        'agreed: 90 %', 'up 5 min', '1 light: 1 ON', '30.0 to 41.5'])
-    def test_it_has_all_that_is_known(self, text: str) -> None:
-        assert text in shown(fleet_of('/bow'))
+def test_colours_mark_a_failure_and_markup_in_a_message_is_text() -> None:
+    fleet = fleet_of('/bow')
+    fleet.acted('/bow', '[bold]x[/bold]', Outcome.FAILED, '[red]no[/red]', NOW)
 
-    @pytest.mark.parametrize(('width', 'height'), SIZES)
-    @pytest.mark.parametrize('count', [0, 1, 3, 40])
-    @pytest.mark.parametrize('show_help', [False, True])
-    def test_it_fits_every_terminal(
-        self, width: int, height: int, count: int, show_help: bool,
-    ) -> None:
-        names = [f'/vehicle_{number:02}/illuminator' for number in range(count)]
-
-        lines = shown(fleet_of(*names), width, height, selected=names[-1] if names else None,
-                      show_help=show_help).splitlines()
-
-        assert len(lines) <= height
-        assert max(map(len, lines), default=0) <= width
-
-    @pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 12), (40, 8)])
-    @pytest.mark.parametrize('at', [0, 17, 39])
-    def test_the_selected_light_is_always_among_those_shown(
-        self, width: int, height: int, at: int,
-    ) -> None:
-        names = [f'/l{number:02}' for number in range(40)]
-
-        text = shown(fleet_of(*names), width, height, selected=names[at])
-
-        assert f'{names[at]} ' in text
-
-    def test_the_narrower_it_is_the_fewer_columns_there_are(self) -> None:
-        titles = [[column.title for column in columns_for(width)] for width in range(1, 250)]
-
-        assert titles[0] == ['LIGHT', 'STATE'][:len(titles[0])]
-        assert all(set(narrow) <= set(wide)
-                   for narrow, wide in zip(titles, titles[1:], strict=False))
-        assert {'STATE', 'BRIGHT', 'TEMP', 'STROBE', 'ERRORS', 'LOSS'} <= set(titles[79])
-        assert {'TREND', 'RTT', 'MODE', 'LAST'} <= set(titles[-1])
-
-    def test_every_key_stands_in_the_help(self) -> None:
-        text = shown(fleet_of('/bow'), show_help=True)
-
-        assert all(key in text for keys, _ in HELP for key in keys)
-
-    def test_without_lights_it_says_so(self) -> None:
-        assert 'no lights in this ROS graph yet' in shown(Fleet())
-
-    def test_what_a_light_has_not_told_is_a_dash(self) -> None:
-        fleet = Fleet()
-        fleet.seen(['/bow'], NOW)
-
-        [row] = [line for line in shown(fleet).splitlines() if ' ? ' in line][1:2]
-
-        assert row.split() == ['/bow', '?', '-', '-', '-', '-', '-', '-']
-
-    @pytest.mark.parametrize(('seconds', 'word'), [(0, 'ON'), (30, 'silent')])
-    def test_the_state_is_a_word_and_not_only_a_colour(self, seconds: int, word: str) -> None:
-        text = shown(fleet_of('/bow'), now=NOW + seconds)
-
-        assert re.search(rf'^/bow +{word} ', text, re.M)
-
-    def test_a_light_that_is_gone_is_marked(self) -> None:
-        fleet = fleet_of('/bow', '/stern')
-        fleet.seen(['/stern'], NOW)
-
-        text = shown(fleet)
-
-        assert re.search('^/bow +gone ', text, re.M)
-        assert '2 lights: 1 ON, 1 gone' in text
-
-    @pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 20)])
-    def test_a_refusal_is_shown_with_its_reason(self, width: int, height: int) -> None:
-        fleet = fleet_of('/bow')
-        fleet.acted('/bow', 'brightness 90 %', Outcome.FAILED,
-                    'refused: MAV_RESULT_DENIED (1 try, 3 ms)', NOW - 3)
-
-        text = ' '.join(shown(fleet, width, height).split())
-
-        assert ('brightness 90 %: FAILED: refused: MAV_RESULT_DENIED (1 try, 3 ms) (3 s ago)'
-                in text)
-
-    def test_names_and_messages_are_not_taken_for_markup(self) -> None:
-        fleet = fleet_of('/bow')
-        fleet.acted('/bow', '[bold]x[/bold]', Outcome.FAILED, '[red]no[/red]', NOW)
-
-        assert '[bold]x[/bold]: FAILED: [red]no[/red]' in shown(fleet)
+    assert '[bold]x[/bold]: FAILED: [red]no[/red]' in shown(fleet)
+    assert '\x1b[1;31mFAILED' in shown(fleet, color='standard')
 
 
-class TestTerminals:
+def test_no_color_removes_the_colours_and_no_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_colour = shown(fleet_of('/bow'), color='standard')
+    monkeypatch.setenv('NO_COLOR', '1')
 
-    def test_with_colours_an_error_is_red(self) -> None:
-        fleet = fleet_of('/bow')
-        fleet.acted('/bow', 'on', Outcome.FAILED, 'no', NOW)
+    without = shown(fleet_of('/bow'), color='standard')
 
-        assert '\x1b[1;31mFAILED' in shown(fleet, color='standard')
-
-    def test_no_color_has_the_same_words_and_no_colour(
-        self, monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
-        with_colour = shown(fleet_of('/bow'), color='standard')
-        monkeypatch.setenv('NO_COLOR', '1')
-
-        without = shown(fleet_of('/bow'), color='standard')
-
-        colours = r'\x1b\[[\d;]*\b(3\d|4\d|9\d)[\d;]*m'
-        assert re.search(colours, with_colour)
-        assert not re.search(colours, without)
-        strip = re.compile(r'\x1b\[[\d;]*m')
-        assert strip.sub('', with_colour) == strip.sub('', without)
-
-    def test_a_terminal_without_unicode_gets_ascii(self) -> None:
-        assert shown(fleet_of('/bow', '/stern'), ascii_only=True).isascii()
-        assert not shown(fleet_of('/bow', '/stern')).isascii()
+    colours = r'\x1b\[[\d;]*\b(3\d|4\d|9\d)[\d;]*m'
+    assert re.search(colours, with_colour)
+    assert not re.search(colours, without)
+    strip = re.compile(r'\x1b\[[\d;]*m')
+    assert strip.sub('', with_colour) == strip.sub('', without)
 
 
-class TestPlain:
-
-    def text(self, fleet: Fleet) -> list[str]:
-        console = Console(file=io.StringIO(), width=400, record=True, color_system=None)
-        console.print(plain(Scene(fleet.lights, None, NOW)))
-        return [line.rstrip() for line in console.export_text().splitlines()]
-
-    def test_it_is_a_line_for_each_light_below_a_heading(self) -> None:
-        heading, *rows = self.text(fleet_of('/stern', '/bow'))
-
-        assert heading.split() == ['LIGHT', 'STATE', 'BRIGHT', 'STROBE', 'MODE', 'TEMP', 'LOSS',
-                                   'RTT', 'ERRORS', 'DIAGNOSTICS']
-        assert [re.split(' {2,}', row) for row in rows] == [
-            [name, 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
-             'thermal throttling',
-             'WARN: dimmed because it is hot; WARN: 12 % of the frames lost']
-            for name in ('/bow', '/stern')]
-
-    def test_what_is_fine_or_unknown_is_a_word_too(self) -> None:
-        fleet = fleet_of('/bow')
-        fleet.take('/bow', 'error_flags', 0, NOW)
-        for kind in ('link', 'lamp'):
-            fleet.diagnosed('/bow', kind, Diagnosis(0, 'fine', {}), NOW)
-
-        assert re.split(' {2,}', self.text(fleet)[1])[-4:] == ['-', '-', '-', 'OK']
+@pytest.mark.parametrize('ascii_only', [False, True])
+def test_ascii_terminal_gets_ascii_only(ascii_only: bool) -> None:
+    assert shown(fleet_of('/bow', '/stern'), ascii_only=ascii_only).isascii() is ascii_only
 
 
-class TestBar:
-    @pytest.mark.parametrize(('value', 'drawn'), [
-        (0.0, '----'), (0.1, '#---'), (50.0, '##--'), (100.0, '####'), (None, '    '),
-        (float('nan'), '    '), (900.0, '####')])
-    def test_it_is_as_long_as_the_share(self, value: float | None, drawn: str) -> None:
-        assert bar(value, 4, ascii_only=True) == drawn
+def table(fleet: Fleet) -> list[list[str]]:
+    """Return the cells of the table for a pipe."""
+    console = Console(file=io.StringIO(), width=400, record=True, color_system=None)
+    console.print(plain(ViewState(fleet.lights, None, NOW)))
+    return [re.split(' {2,}', line.rstrip()) for line in console.export_text().splitlines()]
 
 
-class TestSparkline:
+def test_table_has_a_heading_and_a_row_for_each_light() -> None:
+    heading, *rows = table(fleet_of('/stern', '/bow'))
 
-    def test_it_goes_from_the_lowest_to_the_highest(self) -> None:
-        assert sparkline([20.0, 25.0, 30.0, None, 40.0]) == '▁▃▅ █'
+    assert heading == ['LIGHT', 'STATE', 'BRIGHT', 'STROBE', 'MODE', 'TEMP', 'LOSS', 'RTT',
+                       'ERRORS', 'DIAGNOSTICS']
+    assert rows == [
+        [name, 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
+         'thermal throttling', 'WARN: dimmed because it is hot; WARN: 12 % of the frames lost']
+        for name in ('/bow', '/stern')]
 
-    def test_a_tenth_of_a_degree_is_no_mountain(self) -> None:
-        drawn = {BLOCKS.index(block) for block in sparkline([25.0, 25.1, 25.0])}
 
-        assert max(drawn) - min(drawn) <= 1
+def test_table_names_good_and_unknown_values_too() -> None:
+    fleet = fleet_of('/bow')
+    fleet.take('/bow', 'error_flags', 0, NOW)
+    for kind in ('link', 'lamp'):
+        fleet.diagnosed('/bow', kind, Diagnosis(0, 'fine', {}), NOW)
 
-    def test_without_values_it_is_empty(self) -> None:
-        assert sparkline([None, None]) == '  '
+    assert table(fleet)[1][-4:] == ['-', '-', '-', 'OK']
 
-    def test_temperatures_that_cannot_be_are_drawn_all_the_same(self) -> None:
-        assert sparkline([-1.7e308, 1.7e308]) == f'{BLOCKS[0]}{BLOCKS[-1]}'
+
+@pytest.mark.parametrize(('value', 'drawn'), [
+    (0.0, '----'), (0.1, '#---'), (50.0, '##--'), (100.0, '####'), (None, '    '),
+    (float('nan'), '    '), (900.0, '####')])
+def test_bar_is_as_long_as_the_share(value: float | None, drawn: str) -> None:
+    assert bar(value, 4, ascii_only=True) == drawn
+
+
+@pytest.mark.parametrize(('values', 'drawn'), [
+    ([20.0, 25.0, 30.0, None, 40.0], '▁▃▅ █'),
+    # A tenth of a degree is not a peak.
+    ([25.0, 25.1, 25.0], '▄▅▄'),
+    ([None, None], '  '),
+    ([-1.7e308, 1.7e308], '▁█')])
+def test_sparkline_spans_lowest_to_highest_value(
+    values: list[float | None], drawn: str,
+) -> None:
+    assert sparkline(values) == drawn

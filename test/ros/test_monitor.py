@@ -17,8 +17,15 @@
 from collections.abc import Iterator
 import threading
 
-from illuminator_ros.cli.monitor.actions import dim, refresh, Request, strobe, switch, switch_off
 from illuminator_ros.cli.monitor.graph import lights_among, TOPICS, type_name
+from illuminator_ros.cli.monitor.key_bindings import (
+    dim,
+    refresh,
+    Request,
+    strobe,
+    switch,
+    switch_off,
+)
 from illuminator_ros.cli.monitor.model import Light, Outcome, State
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32

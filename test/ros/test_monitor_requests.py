@@ -17,7 +17,7 @@
 import threading
 from typing import Any
 
-from illuminator_ros.cli.monitor.actions import dim, strobe, switch
+from illuminator_ros.cli.monitor.key_bindings import dim, strobe, switch
 from illuminator_ros.cli.monitor.model import Fleet, Outcome
 from illuminator_ros.cli.monitor.requests import ANSWER_LIMIT, Requests
 import pytest

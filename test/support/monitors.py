@@ -30,7 +30,7 @@ import termios
 import threading
 from typing import Any
 
-from illuminator_ros.cli.monitor.actions import Ask
+from illuminator_ros.cli.monitor.key_bindings import Ask
 from illuminator_ros.cli.monitor.model import Light, Outcome
 from illuminator_ros.cli.monitor.run import Monitor
 from rclpy.node import Node

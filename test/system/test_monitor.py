@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``monitor`` as a process: on a terminal, without one, and where something is missing."""
+"""``monitor`` as a process, with and without a terminal."""
 
 import os
 import re
@@ -33,134 +33,136 @@ def domain(ros: Ros) -> dict[str, str]:
     return {'ROS_DOMAIN_ID': str(ros.domain)}
 
 
-class TestOnATerminal:
+def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
+    with (running_bridge(own_ros.domain, port), ServedLight(port) as light,
+          terminal(env=domain(own_ros)) as screen):
+        screen.wait_for('/illuminator off')
 
-    def test_keys_switch_and_dim_the_light(self, own_ros: Ros, port: int) -> None:
-        with (running_bridge(own_ros.domain, port), ServedLight(port) as light,
-              terminal(env=domain(own_ros)) as screen):
-            screen.wait_for('/illuminator off')
+        screen.type(' ')
+        screen.wait_for('on: done')
+        screen.type('\x1b[D')
+        screen.wait_for('brightness 90 %: done')
 
-            screen.type(' ')
-            screen.wait_for('on: done')
-            screen.type('\x1b[D')
-            screen.wait_for('brightness 90 %: done')
-
-            assert (light.fake.fields['enable'], light.fake.fields['brightness']) == (1, 90.0)
-
-    @pytest.mark.parametrize('way', [
-        'q', '\x03', '\x04', '\x1c', 'SIGINT', 'SIGTERM', 'SIGQUIT', 'SIGHUP'])
-    def test_it_leaves_the_terminal_as_it_was(self, own_ros: Ros, way: str) -> None:
-        with terminal(env=domain(own_ros)) as screen:
-            screen.wait_for('no lights in this ROS graph yet')
-
-            if way.startswith('SIG'):
-                screen.send(signal.Signals[way])
-            else:
-                screen.type(way)
-
-            assert screen.wait() == 0
-            eventually(lambda: screen.restored)
-            assert 'Traceback' not in screen.raw
-
-    @pytest.mark.parametrize(('way', 'job'), [
-        ('SIGTSTP', '"$@"'),
-        ('\x1a', '"$@"'),
-        # As "ros2 run" does, another program waits for it in the same job.
-        ('\x1a', '("$@"; exit $?)'),
-    ])
-    def test_it_gives_the_terminal_back_while_it_is_stopped(
-        self, own_ros: Ros, way: str, job: str,
-    ) -> None:
-        shell = f'{job} & echo pid $!; fg; echo in the shell; read line; fg'
-        with terminal(env=domain(own_ros), shell=shell) as screen:
-            screen.wait_for('no lights in this ROS graph yet')
-
-            if way == '\x1a':
-                screen.type(way)
-            else:
-                [pid] = re.findall(r'pid (\d+)', screen.raw)
-                os.kill(int(pid), signal.SIGTSTP)
-            screen.wait_for('in the shell')
-            assert screen.restored
-
-            screen.forget()
-            screen.type('\n')
-            screen.wait_for('no lights in this ROS graph yet')
-            screen.type('q')
-            assert screen.wait() == 0
-            eventually(lambda: screen.restored)
-
-    def test_ctrl_z_is_nothing_where_no_shell_could_continue_it(self, own_ros: Ros) -> None:
-        with terminal(env=domain(own_ros)) as screen:
-            screen.wait_for('no lights in this ROS graph yet')
-
-            screen.type('\x1a')
-            eventually(lambda: screen.raw.count('\x1b[?1049h') == 2)
-            screen.type('?')
-
-            screen.wait_for('any key goes back')
-
-    def test_it_ends_in_order_with_its_terminal(self, own_ros: Ros) -> None:
-        with terminal(env=domain(own_ros)) as screen:
-            screen.wait_for('no lights in this ROS graph yet')
-
-            screen.hang_up()
-
-            assert screen.wait() == 0
-
-    def test_it_follows_the_size(self, own_ros: Ros) -> None:
-        with terminal(env=domain(own_ros), size=(24, 100)) as screen:
-            screen.wait_for('a all off')
-
-            screen.forget()
-            screen.resize(5, 30)
-
-            screen.wait_for('space on/off [+]/- brightness …')
-
-    def test_without_colours_there_are_none(self, own_ros: Ros) -> None:
-        with terminal(env={**domain(own_ros), 'NO_COLOR': '1'}) as screen:
-            screen.wait_for('no lights in this ROS graph yet')
-
-            assert '\x1b[3' not in screen.raw
-            assert ';3' not in screen.raw
-
-    def test_a_terminal_that_cannot_be_drawn_on_gets_a_table(self, own_ros: Ros) -> None:
-        with terminal('--wait', '0.1', env={**domain(own_ros), 'TERM': 'dumb'}) as screen:
-            assert screen.wait() == 1
-            screen.wait_for('monitor: no lights found')
+        assert (light.fake.fields['enable'], light.fake.fields['brightness']) == (1, 90.0)
 
 
-class TestWithoutATerminal:
+@pytest.mark.parametrize('way', [
+    'q', '\x03', '\x04', '\x1c', 'SIGINT', 'SIGTERM', 'SIGQUIT', 'SIGHUP'])
+def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
+    with terminal(env=domain(own_ros)) as screen:
+        screen.wait_for('no lights in this ROS graph yet')
 
-    def test_it_prints_a_table_and_ends(self, own_ros: Ros) -> None:
-        port = free_port()
-        with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port, brightness=30.0)):
-            bridge.wait_for('connected')
-            outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
+        if way.startswith('SIG'):
+            screen.send(signal.Signals[way])
+        else:
+            screen.type(way)
 
-        heading, row = outcome.stdout.splitlines()
-        assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
-        assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
-        assert (outcome.returncode, outcome.stderr) == (0, '')
+        assert screen.wait() == 0
+        eventually(lambda: screen.restored)
+        assert 'Traceback' not in screen.raw
 
-    def test_a_full_disk_is_said_in_one_line_with_exit_status_1(self, own_ros: Ros) -> None:
-        port = free_port()
-        with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port),
-              open('/dev/full', 'w') as full):
-            bridge.wait_for('connected')
-            outcome = subprocess.run(
+
+@pytest.mark.parametrize(('way', 'job'), [
+    ('SIGTSTP', '"$@"'),
+    ('\x1a', '"$@"'),
+    # As "ros2 run" does, another program waits for it in the same job.
+    ('\x1a', '("$@"; exit $?)'),
+])
+def test_stopped_monitor_restores_the_terminal_until_it_continues(
+    own_ros: Ros, way: str, job: str,
+) -> None:
+    shell = f'{job} & echo pid $!; fg; echo in the shell; read line; fg'
+    with terminal(env=domain(own_ros), shell=shell) as screen:
+        screen.wait_for('no lights in this ROS graph yet')
+
+        if way == '\x1a':
+            screen.type(way)
+        else:
+            [pid] = re.findall(r'pid (\d+)', screen.raw)
+            os.kill(int(pid), signal.SIGTSTP)
+        screen.wait_for('in the shell')
+        assert screen.restored
+
+        screen.forget()
+        screen.type('\n')
+        screen.wait_for('no lights in this ROS graph yet')
+        screen.type('q')
+        assert screen.wait() == 0
+        eventually(lambda: screen.restored)
+
+
+def test_ctrl_z_is_ignored_without_a_shell_that_could_continue_it(own_ros: Ros) -> None:
+    with terminal(env=domain(own_ros)) as screen:
+        screen.wait_for('no lights in this ROS graph yet')
+
+        screen.type('\x1a')
+        eventually(lambda: screen.raw.count('\x1b[?1049h') == 2)
+        screen.type('?')
+
+        screen.wait_for('any key goes back')
+
+
+def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> None:
+    with terminal(env=domain(own_ros)) as screen:
+        screen.wait_for('no lights in this ROS graph yet')
+
+        screen.hang_up()
+
+        assert screen.wait() == 0
+
+
+def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
+    with terminal(env=domain(own_ros), size=(24, 100)) as screen:
+        screen.wait_for('a all off')
+
+        screen.forget()
+        screen.resize(5, 30)
+
+        screen.wait_for('space on/off [+]/- brightness …')
+
+
+def test_no_color_is_respected(own_ros: Ros) -> None:
+    with terminal(env={**domain(own_ros), 'NO_COLOR': '1'}) as screen:
+        screen.wait_for('no lights in this ROS graph yet')
+
+        assert '\x1b[3' not in screen.raw
+        assert ';3' not in screen.raw
+
+
+def test_dumb_terminal_gets_a_table(own_ros: Ros) -> None:
+    with terminal('--wait', '0.1', env={**domain(own_ros), 'TERM': 'dumb'}) as screen:
+        assert screen.wait() == 1
+        screen.wait_for('monitor: no lights found')
+
+
+def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
+    port = free_port()
+    with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port, brightness=30.0)):
+        bridge.wait_for('connected')
+        outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
+        with open('/dev/full', 'w') as full:
+            failed = subprocess.run(
                 [sys.executable, '-m', MONITOR, '--once', '--wait', '20'], cwd=ROOT, text=True,
                 env=environment(domain(own_ros)), stdout=full, stderr=subprocess.PIPE,
                 timeout=60)
 
-        assert outcome.stderr == 'monitor: standard output: No space left on device\n'
-        assert outcome.returncode == 1
+    heading, row = outcome.stdout.splitlines()
+    assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
+    assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
+    assert (outcome.returncode, outcome.stderr) == (0, '')
+    assert (failed.returncode, failed.stderr) == (
+        1, 'monitor: standard output: No space left on device\n')
 
-    def test_without_lights_it_fails_and_says_so(self, own_ros: Ros) -> None:
-        outcome = run(MONITOR, '--once', '--wait', '0.1', env=domain(own_ros))
 
-        assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
-            1, '', 'monitor: no lights found\n')
+@pytest.mark.parametrize(('redirection', 'error'), [
+    ('', 'monitor: no lights found\n'), ('>&-', 'monitor: standard output is closed\n')])
+def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error: str) -> None:
+    outcome = subprocess.run(
+        ['sh', '-c', f'exec "$@" {redirection}', 'sh', sys.executable, '-m', MONITOR, '--once',
+         '--wait', '0.1'], cwd=ROOT, env=environment(domain(own_ros)), text=True,
+        capture_output=True, timeout=60)
+
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (1, '', error)
 
 
 @pytest.mark.parametrize(('arguments', 'text'), [
@@ -169,7 +171,7 @@ class TestWithoutATerminal:
     (['--ros-args', '--banana'], "wrong ROS arguments: ['--banana']"),
     (['--ros-args', '-r', '1st:=x'], "Couldn't parse remap rule: '-r 1st:=x'"),
 ])
-def test_what_is_wrong_with_an_argument_is_told_in_one_line(
+def test_wrong_argument_is_reported_in_one_line(
     arguments: list[str], text: str,
 ) -> None:
     outcome = run(MONITOR, *arguments)
@@ -180,7 +182,7 @@ def test_what_is_wrong_with_an_argument_is_told_in_one_line(
     assert (outcome.returncode, outcome.stdout) == (2, '')
 
 
-def test_the_bridge_neither_has_nor_needs_rich() -> None:
+def test_bridge_does_not_import_rich() -> None:
     done = subprocess.run(
         [sys.executable, '-c', 'import sys; import illuminator_ros.ros.bridge; '
          'print("rich" in sys.modules)'],

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-The executable ``monitor``: what ``top`` is to processes, for the lights in a ROS graph.
+The executable ``monitor``: the lights in a ROS graph, as ``top`` shows processes.
 
-``model`` is what is known of the lights, ``actions`` what a key asks of them, ``keys`` what a
-terminal sends, ``view`` what is shown: without ROS, and without a clock. ``graph`` fills the model
-from the ROS graph, ``terminal`` is the terminal, ``run`` the command line.
+``model`` holds the lights, ``key_bindings`` the meaning of keys, ``view`` the screen: without ROS
+and without a clock. ``graph`` fills the model from the ROS graph, ``requests`` calls services,
+``terminal`` is the terminal, ``run`` the command line.
 """
 
 from __future__ import annotations

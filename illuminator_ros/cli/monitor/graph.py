@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The lights in the ROS graph: found by their interface, listened to, and asked."""
+"""The lights in the ROS graph: discovery by their interface, their topics, and requests."""
 
 from __future__ import annotations
 
@@ -31,29 +31,28 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
-from .actions import Ask
+from .key_bindings import Ask
 from .model import Diagnosis, Fleet, Outcome
 from .requests import Requests
 
-# What a light publishes, with the types.
+# The topics of a light with their types.
 TOPICS: dict[str, Any] = {
     'connected': Bool, 'enabled': Bool, 'brightness': Float32, 'error_flags': UInt32,
     'mode': String, 'strobe_period': Float32, 'strobe_duty_cycle': Float32, 'uptime': Float64,
     'temperature': Temperature,
 }
-# Whoever publishes these with their types is a light, whatever it is called.
+# A node that publishes these topics with their types is a light.
 SIGNATURE = ('connected', 'enabled', 'brightness', 'error_flags')
 STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                        durability=DurabilityPolicy.TRANSIENT_LOCAL)
-# What is published for every status is taken as it comes, in order; nothing else is of use.
 STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-# s between looks at the graph.
-LOOK_INTERVAL = 0.5
+# s between queries of the graph.
+QUERY_INTERVAL = 0.5
 
 
 def type_name(type_: Any) -> str:
-    """Return what the graph calls a message type."""
+    """Return the name of a message type in the graph."""
     return f'{type_.__module__.split(".")[0]}/msg/{type_.__name__}'
 
 
@@ -91,23 +90,24 @@ class Graph:
         self._clock = clock
         self._subscriptions: dict[str, list[Any]] = {}
         self._requests: dict[str, Requests] = {}
-        # What other threads want to have done here.
+        # Calls from other threads.
         self._jobs: deque[Callable[[], None]] = deque()
         self._guard = node.create_guard_condition(self._do_jobs)
         node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, STREAM_QOS)
         node.create_subscription(ParameterEvent, '/parameter_events', self._changed, EVENT_QOS)
-        node.create_timer(LOOK_INTERVAL, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(QUERY_INTERVAL, self.query, clock=steady)
 
     def submit(self, name: str, ask: Ask) -> None:
-        """Ask something of a light; callable from any thread."""
+        """Send a request to a light; callable from any thread."""
         self._call(lambda: self._submit(name, ask))
 
     def clear_gone(self) -> None:
-        """Forget the lights that are gone; callable from any thread."""
+        """Remove the lights that are gone; callable from any thread."""
         self._call(self._clear_gone)
 
-    def look(self) -> None:
-        """Look at who is there, and at what has not been answered."""
+    def query(self) -> None:
+        """Find new and gone lights, and give up requests without an answer."""
         topics = self._node.get_topic_names_and_types()
         names = lights_among(topics, self._node.count_publishers)
         now = self._clock()
@@ -138,7 +138,7 @@ class Graph:
             request = ask(light) if light else None
             if request is None:
                 self._fleet.acted(name, 'not asked', Outcome.FAILED,
-                                  'it has not told its brightness yet', self._clock())
+                                  'its brightness is not known yet', self._clock())
         if request is not None:
             self._requests[name].submit(request)
 
@@ -158,7 +158,7 @@ class Graph:
     def _diagnosed(self, array: Any) -> None:
         for status in array.status:
             values: Mapping[str, str] = {pair.key: pair.value for pair in status.values}
-            # The name of the status has the node's, without its namespace.
+            # The name of the status has the node's name without its namespace.
             name, kind = values.get('node', ''), status.name.rpartition(': ')[2]
             diagnosis = Diagnosis(status.level[0], status.message, values)
             with self._lock:

@@ -12,43 +12,43 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is asked of one light, through its services, and what it answers."""
+"""The requests to one light through its services, and the answers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
-from .actions import Request, Service
+from .key_bindings import Request, Service
 from .model import Fleet, Outcome
 
-# s for an answer. A bridge has told what became of the light long before; this one is dead.
+if TYPE_CHECKING:
+    from rclpy.task import Future
+
+# s for an answer: longer than a bridge takes, whatever its light does.
 ANSWER_LIMIT = 8.0
 _TYPES: dict[Service, Any] = {
     Service.ENABLE: SetBool, Service.REFRESH: Trigger, Service.SET: SetParametersAtomically}
 
 
-class _UnderWay:
-    """A request that has been sent."""
-
-    def __init__(self, request: Request, future: Any, until: float) -> None:
-        self.request = request
-        self.future = future
-        self.until = until
+class _Pending(NamedTuple):
+    request: Request
+    future: Future[Any]
+    deadline: float
 
 
 class Requests:
     """
     The requests to one light, in the thread of the node's executor.
 
-    One at a time for each service. What comes meanwhile waits: parameters are added up, so that a
-    key held down is not a hundred commands, and of the rest the newest counts.
+    Each service has one request at a time. Later ones wait: parameters are merged, so that a key
+    held down is not a hundred commands; of others the newest is kept.
     """
 
     def __init__(
@@ -63,14 +63,14 @@ class Requests:
         self._clients = {service: node.create_client(type_, f'{name}/{service.value}')
                          for service, type_ in _TYPES.items()}
         self._getter = node.create_client(GetParameters, f'{name}/get_parameters')
-        self._under_way: dict[Service, _UnderWay] = {}
+        self._pending: dict[Service, _Pending] = {}
         self._waiting: dict[Service, Request] = {}
         self._asked: tuple[Any, float] | None = None
 
     def submit(self, request: Request) -> None:
-        """Send a request, or have it wait for the one under way."""
+        """Send a request, or let it wait for the pending one."""
         service = request.service
-        if service not in self._under_way:
+        if service not in self._pending:
             self._send(request)
             return
         waiting = self._waiting.get(service)
@@ -80,10 +80,10 @@ class Requests:
         self._show_wanted()
 
     def poll(self) -> None:
-        """Give up what is not answered, and ask for what is not known."""
+        """Give up requests without an answer, and request the brightness if it is unknown."""
         now = self._clock()
-        for service, one in list(self._under_way.items()):
-            if now >= one.until:
+        for service, one in list(self._pending.items()):
+            if now >= one.deadline:
                 self._clients[service].remove_pending_request(one.future)
                 self._end(one, False, f'no answer from {self._name} for {ANSWER_LIMIT:g} s')
         if self._asked is not None and now >= self._asked[1]:
@@ -98,26 +98,26 @@ class Requests:
             future.add_done_callback(self._got)
 
     def destroy(self) -> None:
-        """Forget it all."""
+        """Drop all requests."""
         for client in [*self._clients.values(), self._getter]:
             self._node.destroy_client(client)
-        self._under_way.clear()
+        self._pending.clear()
         self._waiting.clear()
 
     def _send(self, request: Request) -> None:
         client = self._clients[request.service]
         if not client.service_is_ready():
-            self._note(request, Outcome.FAILED, f'nobody serves {client.srv_name}')
+            self._note(request, Outcome.FAILED, f'no service {client.srv_name}')
             return
         future = client.call_async(_message(request))
-        one = _UnderWay(request, future, self._clock() + ANSWER_LIMIT)
-        self._under_way[request.service] = one
+        one = _Pending(request, future, self._clock() + ANSWER_LIMIT)
+        self._pending[request.service] = one
         self._note(request, Outcome.PENDING, '')
         self._show_wanted()
         future.add_done_callback(lambda future: self._answered(one))
 
-    def _answered(self, one: _UnderWay) -> None:
-        if self._under_way.get(one.request.service) is not one:
+    def _answered(self, one: _Pending) -> None:
+        if self._pending.get(one.request.service) is not one:
             return
         try:
             response = one.future.result()
@@ -132,12 +132,12 @@ class Requests:
         else:
             self._end(one, response.success, response.message)
 
-    def _end(self, one: _UnderWay, success: bool, answer: str) -> None:
+    def _end(self, one: _Pending, success: bool, answer: str) -> None:
         service = one.request.service
-        del self._under_way[service]
+        del self._pending[service]
         self._note(one.request, Outcome.DONE if success else Outcome.FAILED, answer)
         waiting = self._waiting.pop(service, None)
-        # What was refused would be again; the reason is to be read.
+        # After a refusal the next would be refused too, and hide the reason.
         if waiting is not None and (success or service is not Service.SET):
             self._send(waiting)
         self._show_wanted()
@@ -148,7 +148,7 @@ class Requests:
             values = [parameter_value_to_python(value) for value in future.result().values]
             with self._lock:
                 light = self._fleet.get(self._name)
-                # What an event has told meanwhile is newer, or a newer event will follow.
+                # A parameter event that came meanwhile is newer.
                 if (light is not None and light.setpoint is None and values
                         and isinstance(values[0], float)):
                     light.setpoint = values[0]
@@ -159,7 +159,7 @@ class Requests:
 
     def _show_wanted(self) -> None:
         wanted: dict[str, Any] = {}
-        for request in [*(one.request for one in self._under_way.values()),
+        for request in [*(one.request for one in self._pending.values()),
                         *self._waiting.values()]:
             if request.service is Service.SET:
                 wanted |= request.value

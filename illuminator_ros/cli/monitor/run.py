@@ -12,16 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The monitor as a process: command line, node, and what is shown until the end."""
+"""The monitor as a process: command line, node, and the loop of the screen."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 import copy
 import sys
 import threading
 import time
-from typing import Any
 import uuid
 
 import rclpy
@@ -32,10 +32,8 @@ from rich.console import Console
 from rich.live import Live
 
 from .graph import Graph
-from .keys import KeyDecoder
+from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
-from .operator import Operator
-from .options import parser
 from .terminal import (
     ESCAPE_TIMEOUT,
     Keyboard,
@@ -45,23 +43,39 @@ from .terminal import (
     unbuffered,
     while_it_lasts,
 )
-from .view import plain, Scene, screen
+from .view import plain, screen, ViewState
+from ..options import number, Parser
 from ..program import discard_output, one_line
 from ..termination import Termination
+from ... import __version__
 from ...ros.executor import NodeExecutor
 from ...ros.log import NodeLog
 
-# s between pictures.
+# s between updates of the screen.
 INTERVAL = 0.25
-# s without a new light after which there are no more.
+# s without a new light until the table is taken for complete.
 SETTLING = 1.0
-# Characters: enough for every column of a table that nobody looks at on a terminal.
+# Characters; enough for each column of a table for a file or a pipe.
 PLAIN_WIDTH = 400
+DESCRIPTION = """\
+Shows the lights in a ROS graph: state, brightness, strobe, temperature, link and errors of each
+light of every bridge. Keys switch and dim the selected one; ? lists them. If standard input or
+output is not a terminal, it prints one table and ends.
+"""
+EPILOG = """\
+examples:
+  ros2 run illuminator_ros monitor
+  ros2 run illuminator_ros monitor --once | grep LOST
+  NO_COLOR=1 ros2 run illuminator_ros monitor
+
+exit status: 0 after q or a signal, or with a table printed; 1 if no light was found for that
+table, or a package is missing; 2 if an argument is wrong.
+"""
 
 
 class Monitor:
     """
-    The lights as a node sees them, in a thread of its own.
+    The lights that a node discovers, in a thread of its own.
 
     :ivar clock: returns the time, s.
     """
@@ -87,6 +101,20 @@ class Monitor:
         self._thread.join(0.3)
 
 
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    made = Parser(
+        prog='monitor', description=DESCRIPTION, epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
+    made.add_argument('--once', action='store_true', help='print one table and end')
+    made.add_argument('--wait', type=number(0.1, 3600), default=6.0, metavar='S',
+                      help='longest search for lights before that table, s (default: 6)')
+    made.add_argument('--ascii', action='store_true',
+                      help='draw with ASCII characters only')
+    made.add_argument('--version', action='version', version=__version__)
+    return made
+
+
 def run(args: list[str] | None, termination: Termination) -> int:
     """Run the monitor; see the text of ``--help``."""
     arguments = sys.argv[1:] if args is None else args
@@ -95,13 +123,13 @@ def run(args: list[str] | None, termination: Termination) -> int:
         options = parser().parse_args(own)
         termination.calls(lambda: None)
         rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        # There may be several, and they are not worth a place in anybody's log.
+        # Several may run, and none needs to be on /rosout.
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
     except SystemExit as end:
         return int(end.code or 0)
     except Exception as error:
-        # rclpy has an exception of its own for each thing that can be wrong with an argument.
+        # rclpy has an exception for each kind of wrong argument.
         print(f'monitor: wrong ROS arguments: {one_line(error)}', file=sys.stderr)
         return 2
     monitor = Monitor(node)
@@ -123,8 +151,8 @@ def run(args: list[str] | None, termination: Termination) -> int:
 def _watch(
     monitor: Monitor, console: Console, termination: Termination, *, ascii_only: bool,
 ) -> None:
-    """Show the lights until somebody has had enough."""
-    operator = Operator(monitor.graph)
+    """Show the lights until the end is requested."""
+    bindings = KeyBindings(monitor.graph)
     keyboard = Keyboard(sys.stdin.fileno())
     decoder = KeyDecoder()
     stopped = threading.Event()
@@ -135,46 +163,49 @@ def _watch(
         keyboard.wake()
 
     def end() -> None:
-        operator.quit = True
+        bindings.quit = True
         keyboard.wake()
 
-    while not operator.quit:
+    while not bindings.quit:
         stopped.clear()
         with (quiet_errors(), unbuffered(sys.stdin.fileno()) as restore, suspended_by(stop),
               Live(console=console, screen=True, auto_refresh=False) as live):
             termination.calls(end, last=restore)
-            while not (operator.quit or operator.stop or stopped.is_set()):
+            while not (bindings.quit or bindings.stop or stopped.is_set()):
                 lights = monitor.lights()
-                operator.look(lights)
-                scene = Scene(lights, operator.selected, monitor.clock(), operator.show_help,
+                bindings.update(lights)
+                view = ViewState(lights, bindings.selected, monitor.clock(), bindings.show_help,
                               ascii_only=ascii_only)
-                live.update(screen(scene, console.width, console.height), refresh=True)
+                live.update(screen(view, console.width, console.height), refresh=True)
                 data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
                 for key in decoder.feed(data):
-                    operator.press(key, lights, monitor.clock())
-        if not operator.quit:
-            suspend(job=operator.stop)
-            operator.stop = False
+                    bindings.press(key, lights, monitor.clock())
+        if not bindings.quit:
+            suspend(job=bindings.stop)
+            bindings.stop = False
     keyboard.close()
 
 
-def told(light: Light) -> bool:
-    """Return whether a light has said what there is to say of it."""
+def is_complete(light: Light) -> bool:
+    """Return whether a light has published its state."""
     return light.link is not None and (
         light.value('connected') is False or light.value('enabled') is not None)
 
 
-def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int:
+def _print_once(monitor: Monitor, options: argparse.Namespace, termination: Termination) -> int:
     """Print one table."""
+    if sys.stdout is None:
+        print('monitor: standard output is closed', file=sys.stderr)
+        return 1
     ended = threading.Event()
     termination.calls(ended.set)
     lights = monitor.lights()
     until = time.monotonic() + options.wait
-    # Lights are found one after the other, and tell of themselves in several messages.
+    # Lights are discovered one after the other and publish their state in several messages.
     complete_since = time.monotonic()
     while not ended.wait(0.1) and time.monotonic() < min(until, complete_since + SETTLING):
         before, lights = lights, monitor.lights()
-        if len(lights) != len(before) or not lights or not all(map(told, lights)):
+        if len(lights) != len(before) or not lights or not all(map(is_complete, lights)):
             complete_since = time.monotonic()
     if not lights:
         print('monitor: no lights found', file=sys.stderr)
@@ -183,15 +214,15 @@ def _print_once(monitor: Monitor, options: Any, termination: Termination) -> int
     status = 0
     try:
         with console.capture() as captured:
-            console.print(plain(Scene(lights, None, monitor.clock())))
+            console.print(plain(ViewState(lights, None, monitor.clock())))
         for line in captured.get().splitlines():
             print(line.rstrip())
         sys.stdout.flush()
     except OSError as error:
-        # Of a pipe, whoever reads has seen enough.
+        # A reader that closes a pipe wants no more.
         if not isinstance(error, BrokenPipeError):
             print(f'monitor: standard output: {error.strerror}', file=sys.stderr)
             status = 1
-        # The interpreter would say so again at its end.
+        # The interpreter would report it again at its exit.
         discard_output()
     return status

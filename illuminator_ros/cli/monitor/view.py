@@ -25,9 +25,7 @@ from rich.layout import Layout
 from rich.table import Table
 from rich.text import Text
 
-from .keys import HELP
-from .model import Action, Light, Outcome, State
-from .texts import (
+from .formatting import (
     age,
     bar,
     brightness,
@@ -39,6 +37,8 @@ from .texts import (
     strobe,
     temperature,
 )
+from .key_bindings import BINDINGS
+from .model import Action, Light, Outcome, State
 
 STATE_STYLES = {State.ON: 'bold green', State.OFF: '', State.UNKNOWN: 'dim',
                 State.LOST: 'bold red', State.SILENT: 'yellow', State.GONE: 'red'}
@@ -54,7 +54,7 @@ NO_LIGHTS = 'no lights in this ROS graph yet; is a bridge running, with this ROS
 
 
 @dataclass(frozen=True)
-class Scene:
+class ViewState:
     """
     What is to be shown.
 
@@ -82,28 +82,28 @@ class Column:
     title: str
     width: int
     rank: int
-    cell: Callable[[Light, Scene], Text]
+    cell: Callable[[Light, ViewState], Text]
     grows: bool = False
     plain: bool = True
 
 
-def _state(light: Light, scene: Scene) -> Text:
-    state = light.state(scene.now)
+def _state(light: Light, view: ViewState) -> Text:
+    state = light.state(view.now)
     return Text(state.value, STATE_STYLES[state])
 
 
-def _brightness_bar(light: Light, scene: Scene) -> Text:
+def _brightness_bar(light: Light, view: ViewState) -> Text:
     value = light.value('brightness')
-    style = 'yellow' if light.state(scene.now) is State.ON else 'dim'
-    return Text(bar(value, BAR_WIDTH, ascii_only=scene.ascii_only), style)
+    style = 'yellow' if light.state(view.now) is State.ON else 'dim'
+    return Text(bar(value, BAR_WIDTH, ascii_only=view.ascii_only), style)
 
 
-def _trend(light: Light, scene: Scene) -> Text:
-    values = light.temperatures.last(TREND_WIDTH, scene.now)
-    return Text(sparkline(values, ascii_only=scene.ascii_only), 'cyan')
+def _trend(light: Light, view: ViewState) -> Text:
+    values = light.temperatures.last(TREND_WIDTH, view.now)
+    return Text(sparkline(values, ascii_only=view.ascii_only), 'cyan')
 
 
-def _last(light: Light, scene: Scene) -> Text:
+def _last(light: Light, view: ViewState) -> Text:
     return _action(light.action) if light.action else Text('')
 
 
@@ -115,8 +115,8 @@ def _action(action: Action) -> Text:
     return text
 
 
-def _plain(cell: Callable[[Light], str], style: str = '') -> Callable[[Light, Scene], Text]:
-    return lambda light, scene: Text(cell(light), style)
+def _plain(cell: Callable[[Light], str], style: str = '') -> Callable[[Light, ViewState], Text]:
+    return lambda light, view: Text(cell(light), style)
 
 
 COLUMNS = (
@@ -152,9 +152,9 @@ def columns_for(width: int, longest: int = 0) -> list[Column]:
     return sorted(chosen, key=lambda column: TITLES.index(column.title))
 
 
-def table(scene: Scene, width: int, height: int) -> Table:
+def table(view: ViewState, width: int, height: int) -> Table:
     """Return a row for each light, around the selected one where there is no room for all."""
-    shown = columns_for(width, max((len(light.name) for light in scene.lights), default=0))
+    shown = columns_for(width, max((len(light.name) for light in view.lights), default=0))
     drawn = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0),
                   header_style='bold')
     if not any(column.grows for column in shown):
@@ -165,16 +165,16 @@ def table(scene: Scene, width: int, height: int) -> Table:
                          min_width=min(column.width, max(width - 8, 1)),
                          max_width=None if column.grows else column.width,
                          ratio=column.width if column.grows else None)
-    for light in window(scene.lights, scene.selected, max(height - 1, 1)):
-        drawn.add_row(*(column.cell(light, scene) for column in shown),
-                      style=_row_style(light, scene))
+    for light in window(view.lights, view.selected, max(height - 1, 1)):
+        drawn.add_row(*(column.cell(light, view) for column in shown),
+                      style=_row_style(light, view))
     return drawn
 
 
-def _row_style(light: Light, scene: Scene) -> str:
+def _row_style(light: Light, view: ViewState) -> str:
     # What a light that is not there any more has said is not true any more.
-    stale = light.state(scene.now) in (State.LOST, State.SILENT, State.GONE)
-    return ('dim ' if stale else '') + ('reverse' if light.name == scene.selected else '')
+    stale = light.state(view.now) in (State.LOST, State.SILENT, State.GONE)
+    return ('dim ' if stale else '') + ('reverse' if light.name == view.selected else '')
 
 
 def window(lights: Sequence[Light], selected: str | None, height: int) -> Sequence[Light]:
@@ -184,23 +184,23 @@ def window(lights: Sequence[Light], selected: str | None, height: int) -> Sequen
     return lights[first:first + height]
 
 
-def title(scene: Scene) -> Text:
+def title(view: ViewState) -> Text:
     """Return the first line: how many lights, and in what state."""
-    states = [light.state(scene.now) for light in scene.lights]
+    states = [light.state(view.now) for light in view.lights]
     parts = [f'{states.count(state)} {state.value}' for state in State if state in states]
     plural = '' if len(states) == 1 else 's'
     return Text(f'{len(states)} light{plural}' + (f': {", ".join(parts)}' if parts else ''),
                 'bold', no_wrap=True, overflow='ellipsis')
 
 
-def details(light: Light, scene: Scene) -> RenderableType:
+def details(light: Light, view: ViewState) -> RenderableType:
     """Return all that is known of a light."""
     rows = Table.grid(padding=(0, 1), expand=True)
     rows.add_column(style='bold', no_wrap=True)
     rows.add_column(ratio=1)
     if light.action is not None:
         answered = _action(light.action)
-        answered.append(f' ({age(scene.now - light.action.at)} ago)', 'dim')
+        answered.append(f' ({age(view.now - light.action.at)} ago)', 'dim')
         rows.add_row('last', answered)
     for kind, one in (('lamp', light.lamp), ('link', light.link)):
         if one is not None:
@@ -209,18 +209,18 @@ def details(light: Light, scene: Scene) -> RenderableType:
             text.append(f': {one.message}' + (f'; {link_quality(one)}' if kind == 'link' else ''),
                         'default')
             rows.add_row(kind, text)
-    rows.add_row('light', Text(_facts(light, scene)))
-    values = light.temperatures.last(DETAIL_TREND_WIDTH, scene.now)
+    rows.add_row('light', Text(_facts(light, view)))
+    values = light.temperatures.last(DETAIL_TREND_WIDTH, view.now)
     known = [value for value in values if value is not None]
     if known:
         rows.add_row('temp', Text.assemble(
             f'{temperature(light.value("temperature"))} ',
-            (sparkline(values, ascii_only=scene.ascii_only).lstrip(), 'cyan'),
+            (sparkline(values, ascii_only=view.ascii_only).lstrip(), 'cyan'),
             f' {min(known):.1f} to {max(known):.1f} in 2 min'))
     return rows
 
 
-def _facts(light: Light, scene: Scene) -> str:
+def _facts(light: Light, view: ViewState) -> str:
     identity = ' '.join(light.lamp.values.get(key, '') for key in ('vendor', 'model')
                         ) if light.lamp else ''
     serial = light.lamp.values.get('serial_number', '') if light.lamp else ''
@@ -229,7 +229,7 @@ def _facts(light: Light, scene: Scene) -> str:
     if agreed is not None and agreed != light.value('brightness'):
         shines += f' (agreed: {agreed:g} %)'
     up = light.value('uptime')
-    silence = light.silence(scene.now)
+    silence = light.silence(view.now)
     return ', '.join(filter(None, (
         identity.strip(), serial and f'no. {serial}', shines,
         strobe(light.value('strobe_period'), light.value('strobe_duty_cycle')),
@@ -242,28 +242,28 @@ def help_text() -> Table:
     drawn = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
     drawn.add_column(style='bold')
     drawn.add_column()
-    for keys, text in HELP:
+    for keys, text, _ in BINDINGS:
         drawn.add_row('  '.join(keys), text)
     return drawn
 
 
-def screen(scene: Scene, width: int, height: int) -> RenderableType:
+def screen(view: ViewState, width: int, height: int) -> RenderableType:
     """Return what fills a terminal."""
     footer = Text(FOOTER, 'dim', no_wrap=True, overflow='ellipsis')
-    if scene.show_help:
+    if view.show_help:
         return _stacked(height, (help_text(), None), (Text('any key goes back', 'dim'), 1))
-    if not scene.lights:
-        return _stacked(height, (title(scene), 1), (Text(NO_LIGHTS), None), (footer, 1))
-    selected = next((light for light in scene.lights if light.name == scene.selected), None)
-    rows = len(scene.lights) + 1
+    if not view.lights:
+        return _stacked(height, (title(view), 1), (Text(NO_LIGHTS), None), (footer, 1))
+    selected = next((light for light in view.lights if light.name == view.selected), None)
+    rows = len(view.lights) + 1
     room = height - 2
     if selected is None or room < DETAIL_HEIGHT + 3:
-        return _stacked(height, (title(scene), 1), (table(scene, width, room), None), (footer, 1))
+        return _stacked(height, (title(view), 1), (table(view, width, room), None), (footer, 1))
     # Half of the screen is for the table at least, and all that the details do not need.
     rows = min(rows, max(room - DETAIL_HEIGHT - 7, room // 2))
     heading = Text(f'\n{selected.name}', 'bold', no_wrap=True, overflow='ellipsis')
-    return _stacked(height, (title(scene), 1), (table(scene, width, rows), rows),
-                    (Group(heading, details(selected, scene)), None), (footer, 1))
+    return _stacked(height, (title(view), 1), (table(view, width, rows), rows),
+                    (Group(heading, details(selected, view)), None), (footer, 1))
 
 
 def _stacked(height: int, *parts: tuple[RenderableType, int | None]) -> RenderableType:
@@ -277,18 +277,18 @@ def _stacked(height: int, *parts: tuple[RenderableType, int | None]) -> Renderab
     return layout
 
 
-def plain(scene: Scene) -> RenderableType:
+def plain(view: ViewState) -> RenderableType:
     """Return a table without colours, bars and bounds, to be printed once."""
-    if not scene.lights:
+    if not view.lights:
         return Text('no lights')
     drawn = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style='')
     shown = [column for column in COLUMNS[:-1] if column.plain]
     for column in shown:
         drawn.add_column(column.title, no_wrap=True)
     drawn.add_column('DIAGNOSTICS', no_wrap=True)
-    for light in scene.lights:
+    for light in view.lights:
         found = [f'{LEVELS[min(one.level, 3)][0]}: {one.message}'
                  for one in (light.lamp, light.link) if one and one.level]
-        drawn.add_row(*(Text(column.cell(light, scene).plain or '-') for column in shown),
+        drawn.add_row(*(Text(column.cell(light, view).plain or '-') for column in shown),
                       Text('; '.join(found) or ('OK' if light.lamp or light.link else '-')))
     return drawn

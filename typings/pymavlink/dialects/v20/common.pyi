@@ -120,6 +120,20 @@ class MAVLink_command_ack_message(MAVLink_message):
     target_system: int
     target_component: int
 
+class MAVLink_winch_status_message(MAVLink_message):
+    def __init__(
+        self, time_usec: int, line_length: float, speed: float, tension: float, voltage: float,
+        current: float, temperature: int, status: int,
+    ) -> None: ...
+    time_usec: int
+    line_length: float
+    speed: float
+    tension: float
+    voltage: float
+    current: float
+    temperature: int
+    status: int
+
 # These two are missing from the wheels of pymavlink; illuminator_ros.mavlink.messages adds them.
 
 class MAVLink_illuminator_status_message(MAVLink_message):
