@@ -30,7 +30,8 @@ from support.conformance_run import Run
 LIGHTS = {
     'switch': IlluminatorProperties(),
     'brightness is the switch': replace(
-        properties({'profile': 'ardusub'}, PROFILES['ardusub'].address), modes=(1, 2)),
+        properties({'profile': 'ardusub'}, PROFILES['ardusub'].address),
+        modes=(Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)),
 }
 BRIGHT = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
 # Requirements whose checks switch on a light that accepts invalid commands.
@@ -39,25 +40,29 @@ SWITCHING = ('other-target', 'repeated', 'on', 'on-off-values', 'mode-internal',
 all_lights = pytest.mark.parametrize('light', LIGHTS.values(), ids=LIGHTS)
 
 
-def dazzling(seen):
+def dazzling(seen: list[Configuration]) -> list[Configuration]:
     # A comparison with NaN is false, so NaN dazzles; in external sync another signal may strobe.
     return [one for one in seen if not (
         one.brightness <= 20.0 and one.strobe_period == 0
         and one.mode is Mode.INTERNAL_CONTROL)]
 
 
-def rejecting(light, configuration, **options):
+def rejecting(
+    light: IlluminatorProperties, configuration: Configuration, *, consent: bool,
+    only: tuple[str, ...] = (),
+) -> tuple[Run, list[Configuration]]:
     """Return a run against a light that rejects every configuration, and its states while on."""
-    run = Run(light, **options)
+    run = Run(light, consent=consent, only=only)
     run.lamp.configuration = configuration
     execute = run.light.device.execute
-    run.light.device.execute = lambda command, now: (
-        CommandReply(MavResult.FAILED) if command.command == 406 else execute(command, now))
+    run.light.device.execute = (  # type: ignore[method-assign]
+        lambda command, now: CommandReply(MavResult.FAILED) if command.command == 406
+        else execute(command, now))
     seen = run.watch()
     return run.finish(), seen
 
 
-def test_checks_that_need_consent_are_skipped_without_it():
+def test_checks_that_need_consent_are_skipped_without_it() -> None:
     run = Run(consent=False).finish()
     assert run.names(Verdict.SKIPPED) == {one.name for one in REQUIREMENTS if one.needs_consent}
     assert 'not agreed to; see --yes' in run.result('strobe').detail
@@ -66,7 +71,8 @@ def test_checks_that_need_consent_are_skipped_without_it():
 
 @all_lights
 @pytest.mark.parametrize('fault', [None, *FAULTS])
-def test_without_consent_a_light_is_on_at_low_brightness_only(light, fault):
+def test_without_consent_a_light_is_on_at_low_brightness_only(
+        light: IlluminatorProperties, fault: str | None) -> None:
     run = Run(light, faults=(fault,) if fault else (), consent=False,
               only=SWITCHING if fault else ())
     seen = run.watch()
@@ -80,7 +86,8 @@ def test_without_consent_a_light_is_on_at_low_brightness_only(light, fault):
     BRIGHT, replace(BRIGHT, brightness=10.0, strobe_period=0.5, strobe_duty_cycle=50.0),
     replace(BRIGHT, brightness=10.0, mode=Mode.EXTERNAL_SYNC),
 ], ids=['bright', 'strobing', 'external sync'])
-def test_without_consent_a_light_that_cannot_be_dimmed_is_not_switched_on(light, configuration):
+def test_without_consent_a_light_that_cannot_be_dimmed_is_not_switched_on(
+        light: IlluminatorProperties, configuration: Configuration) -> None:
     run, seen = rejecting(light, configuration, consent=False)
     assert seen == []
     for name in ('on', 'off', 'on-off-values', 'other-target', 'command-int', 'repeated'):
@@ -89,27 +96,27 @@ def test_without_consent_a_light_that_cannot_be_dimmed_is_not_switched_on(light,
     assert {'mode-internal', 'brightness', 'brightness-values'} <= run.failed
 
 
-def test_the_reason_names_the_brightness():
+def test_the_reason_names_the_brightness() -> None:
     run, _ = rejecting(IlluminatorProperties(), BRIGHT, consent=False, only=('on',))
     assert run.result('on').detail.startswith('switched on, it would shine at 100 %')
 
 
 @pytest.mark.parametrize(('brightness', 'consent'), [(15.0, False), (100.0, True)])
 def test_a_light_that_rejects_configurations_is_switched_on_if_dim_or_with_consent(
-        brightness, consent):
+        brightness: float, consent: bool) -> None:
     run, seen = rejecting(
         IlluminatorProperties(), replace(BRIGHT, brightness=brightness), consent=consent)
     assert {one.brightness for one in seen} == {brightness}
     assert run.result('on').verdict is Verdict.PASS
 
 
-def test_invalid_brightness_is_not_sent_without_consent_where_brightness_is_the_switch():
+def test_invalid_brightness_is_not_sent_without_consent_where_brightness_is_the_switch() -> None:
     run = Run(LIGHTS['brightness is the switch'], faults=('anything',), consent=False).finish()
     for name in ('brightness-values', 'not-a-number'):
         assert 'its brightness switches it on' in run.result(name).detail
 
 
-def test_with_consent_a_light_strobes_and_shines_at_100_percent():
+def test_with_consent_a_light_strobes_and_shines_at_100_percent() -> None:
     run = Run()
     seen = run.watch()
     run.finish()

@@ -25,6 +25,7 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.simulated import Change
 import pytest
 from support.conformance_run import Run
 
@@ -93,56 +94,56 @@ DEVIATIONS = {
 
 
 @pytest.mark.parametrize('fault', SEEDED)
-def test_a_fault_fails_exactly_its_requirements(fault):
+def test_a_fault_fails_exactly_its_requirements(fault: str) -> None:
     assert Run(faults=(fault,)).finish().failed == SEEDED[fault]
 
 
 @pytest.mark.parametrize('fault', RANDOM)
 @pytest.mark.parametrize('seed', range(3))
-def test_a_random_fault_fails_its_requirement(fault, seed):
+def test_a_random_fault_fails_its_requirement(fault: str, seed: int) -> None:
     run = Run(IlluminatorProperties(seed=seed), faults=(fault,)).finish()
     assert RANDOM[fault] in run.failed
 
 
 @pytest.mark.parametrize('name', PROPERTIES)
-def test_properties_out_of_order_fail_their_requirement(name):
+def test_properties_out_of_order_fail_their_requirement(name: str) -> None:
     assert name in Run(PROPERTIES[name]).finish().failed
 
 
 @pytest.mark.parametrize('profile', PROFILES)
-def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile):
+def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile: str) -> None:
     run = Run(properties({'profile': profile}, PROFILES[profile].address)).finish()
     assert run.failed == DEVIATIONS[profile]
     assert run.suite.restored == 'the light is as it was'
 
 
-def test_every_fault_is_seeded_and_every_requirement_can_fail():
+def test_every_fault_is_seeded_and_every_requirement_can_fail() -> None:
     assert set(FAULTS) == {name.partition('=')[0] for name in SEEDED} | set(RANDOM)
     assert {one.name for one in REQUIREMENTS} == set().union(
         *SEEDED.values(), RANDOM.values(), PROPERTIES, {'status-content'})
 
 
-def test_a_status_with_nan_fails_status_content():
+def test_a_status_with_nan_fails_status_content() -> None:
     run = Run()
     run.lamp.configuration = replace(run.lamp.configuration, brightness=math.nan)
     assert run.finish().failed == {'status-content'}
 
 
-def test_a_hot_light_without_faults_meets_every_requirement():
+def test_a_hot_light_without_faults_meets_every_requirement() -> None:
     run = Run(IlluminatorProperties(time_scale=120.0)).finish()
     assert run.names(Verdict.PASS) == {one.name for one in REQUIREMENTS}
     assert run.suite.passed
     assert 'thermal throttling from' in run.result('thermal-flags').detail
 
 
-def test_a_restart_during_the_run_fails_uptime():
+def test_a_restart_during_the_run_fails_uptime() -> None:
     run = Run()
     run.link.run(12.0)
     run.light.restart(run.link.now)
     assert 'uptime' in run.finish().failed
 
 
-def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped():
+def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped() -> None:
     run = Run()
     run.link.run(8.0)
     run.fault('silence')
@@ -151,14 +152,14 @@ def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped():
     assert run.result('thermal-flags').detail == 'the light has stopped sending'
 
 
-def test_an_accepted_invalid_value_is_corrected_before_the_next_one():
+def test_an_accepted_invalid_value_is_corrected_before_the_next_one() -> None:
     run = Run(faults=('anything',)).finish()
     configured = [one.text for one in run.session.transactions if one.command == 406]
     invalid = next(i for i, text in enumerate(configured) if text.endswith('1 -1 0 0'))
     assert configured[invalid + 1].endswith(' 1 10 0 0')
 
 
-def test_a_duplicate_acknowledgement_is_not_counted_for_the_next_command():
+def test_a_duplicate_acknowledgement_is_not_counted_for_the_next_command() -> None:
     run = Run(faults=('duplicate=1',)).finish()
     assert {len(one.finals) for one in run.session.transactions if one.expected} == {2}
 
@@ -166,23 +167,24 @@ def test_a_duplicate_acknowledgement_is_not_counted_for_the_next_command():
 @pytest.mark.parametrize(('name', 'contradiction'), [
     ('on', 'in enable: off'), ('mode-internal', 'in brightness: off'),
     ('mode-external', 'in mode and brightness: off'), ('brightness', 'in brightness: off')])
-def test_an_accepted_change_that_the_status_contradicts_fails(name, contradiction):
+def test_an_accepted_change_that_the_status_contradicts_fails(
+        name: str, contradiction: str) -> None:
     result = Run(faults=('lie',), only=(name,)).finish().result(name)
     assert result.verdict is Verdict.FAIL
     assert ('MAV_RESULT_ACCEPTED, but then the status differs ' + contradiction) in result.detail
     assert '< ILLUMINATOR_STATUS off' in result.exchange[-1]
 
 
-def test_a_light_that_stays_in_external_sync_fails_mode_internal():
+def test_a_light_that_stays_in_external_sync_fails_mode_internal() -> None:
     run = Run(only=('mode-internal', 'mode-external'))
     apply = run.light.apply
 
-    def stuck(change, now):
+    def stuck(change: Change, now: float) -> None:
         mode = run.lamp.configuration.mode
         apply(change, now)
         if mode is Mode.EXTERNAL_SYNC:
             run.lamp.configuration = replace(run.lamp.configuration, mode=mode)
-    run.light.apply = stuck
+    run.light.apply = stuck  # type: ignore[method-assign]
     assert run.finish().failed == {'mode-internal'}
     assert 'then the status differs in mode' in run.result('mode-internal').detail
 
@@ -190,12 +192,13 @@ def test_a_light_that_stays_in_external_sync_fails_mode_internal():
 @pytest.mark.parametrize(('light', 'only'), [
     (IlluminatorProperties(modes=(Mode.INTERNAL_CONTROL,)), 'mode-internal'),
     *((IlluminatorProperties(), name) for name in ('on', 'off', 'brightness'))])
-def test_one_requirement_alone_passes(light, only):
+def test_one_requirement_alone_passes(light: IlluminatorProperties, only: str) -> None:
     assert Run(light, only=(only,)).finish().names(Verdict.PASS) == {only}
 
 
 @pytest.mark.parametrize(('on', 'name', 'other'), [(True, 'on', 'off'), (False, 'off', 'on')])
-def test_a_state_that_cannot_be_left_does_not_count_as_reached(on, name, other):
+def test_a_state_that_cannot_be_left_does_not_count_as_reached(
+        on: bool, name: str, other: str) -> None:
     run = Run(faults=('lie',), only=('on', 'off') if on else ('off',))
     run.press(enabled=on)
     run.finish()
@@ -203,7 +206,7 @@ def test_a_state_that_cannot_be_left_does_not_count_as_reached(on, name, other):
     assert f'could not be switched {other} before' in run.result(name).detail
 
 
-def test_an_accepted_change_passes_where_the_light_reports_no_status():
+def test_an_accepted_change_passes_where_the_light_reports_no_status() -> None:
     run = Run(IlluminatorProperties(status_interval=0.0), faults=('lie',), only=('on',))
     run.link.run_until(lambda: any(
         one.text.endswith('ON_OFF 1') for one in run.session.transactions), within=60.0)
@@ -211,13 +214,13 @@ def test_an_accepted_change_passes_where_the_light_reports_no_status():
     assert run.finish().result('on').verdict is Verdict.PASS
 
 
-def test_a_change_in_progress_for_ever_does_not_delay_the_run():
+def test_a_change_in_progress_for_ever_does_not_delay_the_run() -> None:
     run = Run(faults=('progress=3600',), only=('on', 'off')).finish()
     assert run.failed == {'on', 'off'}
     assert 'no acknowledgement' in run.result('on').detail
 
 
-def test_a_light_without_strobe_limits_is_not_made_to_strobe():
+def test_a_light_without_strobe_limits_is_not_made_to_strobe() -> None:
     run = Run(properties({'profile': 'ardusub'}, PROFILES['ardusub'].address)).finish()
     assert {'strobe', 'strobe-values', 'duty-cycle'} < run.names(Verdict.SKIPPED)
     assert 'reports no strobe limits' in run.result('strobe').detail

@@ -14,14 +14,17 @@
 
 """After a run the light is as it was, also after an interruption, an error or a fault."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.checks.tester import LightTester
 from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import STATUS_ID
-from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.checks.requirement import Requirement, Verdict
 import pytest
 from support.conformance_run import Run
 
@@ -31,32 +34,33 @@ RESTORABLE = sorted(set(FAULTS) - {
     'silence', 'refuse', 'lie', 'no-stop', 'reboot', 'toggle', 'no-resume'})
 
 
-def used(*faults, **options):
+def used(*faults: str, requirements: Sequence[Requirement[Any]] = REQUIREMENTS) -> Run:
     """Return a run against a light that is on."""
-    run = Run(faults=faults, **options)
+    run = Run(faults=faults, requirements=requirements)
     run.press(enabled=True)
     run.lamp.configuration = BEFORE
     return run
 
 
-def is_restored(run):
+def is_restored(run: Run) -> bool:
     return run.lamp.enabled and run.lamp.configuration.differences(BEFORE) == []
 
 
-def test_switch_and_configuration_are_restored():
+def test_switch_and_configuration_are_restored() -> None:
     run = used().finish()
     assert is_restored(run)
     assert run.suite.restored == 'the light is as it was'
 
 
 @pytest.mark.parametrize('fault', RESTORABLE)
-def test_a_light_with_a_fault_is_restored(fault):
+def test_a_light_with_a_fault_is_restored(fault: str) -> None:
     assert is_restored(used(fault).finish())
 
 
 @pytest.mark.parametrize(('default', 'changed', 'after'), [
     (0.2, None, 0.2), (1.0, None, 1.0), (3.0, None, 3.0), (0.0, None, 0.0), (1.0, 0.4, 0.4)])
-def test_the_status_interval_is_restored(default, changed, after):
+def test_the_status_interval_is_restored(
+        default: float, changed: float | None, after: float) -> None:
     run = Run(IlluminatorProperties(status_interval=default))
     if changed:
         run.set_interval(changed)
@@ -64,7 +68,7 @@ def test_the_status_interval_is_restored(default, changed, after):
 
 
 @pytest.mark.parametrize('after', [0.0, *(0.5 + 0.7 * step for step in range(52))])
-def test_an_interrupted_run_restores_the_light_and_checks_nothing_more(after):
+def test_an_interrupted_run_restores_the_light_and_checks_nothing_more(after: float) -> None:
     run = used()
     run.link.run(after)
     checked = len(run.suite.results)
@@ -78,7 +82,7 @@ def test_an_interrupted_run_restores_the_light_and_checks_nothing_more(after):
     assert run.link.now < interrupted + 5.0
 
 
-def test_restoring_is_not_interrupted():
+def test_restoring_is_not_interrupted() -> None:
     run = used()
     run.link.run_until(lambda: run.session.runner.restoring, within=100.0)
     assert not is_restored(run)
@@ -86,8 +90,8 @@ def test_restoring_is_not_interrupted():
     assert is_restored(run.finish())
 
 
-def test_a_check_with_an_internal_error_fails_and_the_light_is_restored():
-    async def broken(tester):
+def test_a_check_with_an_internal_error_fails_and_the_light_is_restored() -> None:
+    async def broken(tester: LightTester) -> None:
         await tester.switch(False)
         raise ZeroDivisionError('oops')
 
@@ -98,7 +102,7 @@ def test_a_check_with_an_internal_error_fails_and_the_light_is_restored():
     assert is_restored(run)
 
 
-def test_a_light_that_cannot_be_restored_is_reported_with_its_former_state():
+def test_a_light_that_cannot_be_restored_is_reported_with_its_former_state() -> None:
     run = used()
     run.link.run(20.0)
     run.fault('refuse')
@@ -108,14 +112,14 @@ def test_a_light_that_cannot_be_restored_is_reported_with_its_former_state():
     assert not run.suite.passed
 
 
-def test_a_light_that_was_silent_for_a_while_is_restored():
+def test_a_light_that_was_silent_for_a_while_is_restored() -> None:
     run = used()
     run.link.run(20.0)
     run.light.behave(replace(run.light.behaviour, silence=14.0), run.link.now)
     assert is_restored(run.finish())
 
 
-def test_a_light_that_reports_no_status_is_not_changed():
+def test_a_light_that_reports_no_status_is_not_changed() -> None:
     run = used()
     run.set_interval(-1)
     run.fault('no-request')
@@ -126,7 +130,7 @@ def test_a_light_that_reports_no_status_is_not_changed():
     assert 'could not be restored' in run.result('on').detail
 
 
-def test_requests_alone_change_nothing():
+def test_requests_alone_change_nothing() -> None:
     run = Run(only=('heartbeat', 'status-request', 'information-request'))
     seen = run.watch()
     assert run.finish().suite.restored == 'nothing was changed'

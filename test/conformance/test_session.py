@@ -14,6 +14,7 @@
 
 """The session: the light that is checked, others on the link, and bounded memory."""
 
+from collections.abc import Sequence
 import tracemalloc
 
 from illuminator_ros.illuminator.checks.catalogue import CHECKS
@@ -33,7 +34,7 @@ BAD = IlluminatorProperties(address=SECOND.address, behaviour=FAULTS.add(
     FAULTS.add(IlluminatorBehaviour(), 'nan'), 'lie'))
 
 
-def test_the_first_light_is_checked_and_another_one_neither_changed_nor_judged():
+def test_the_first_light_is_checked_and_another_one_neither_changed_nor_judged() -> None:
     run = Run(FIRST, BAD)
     other = run.lights.components[1].device.lamp
     other.switch(True, brightness_is_switch=False)
@@ -45,13 +46,13 @@ def test_the_first_light_is_checked_and_another_one_neither_changed_nor_judged()
     assert other.configuration == Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
 
 
-def test_the_target_is_checked():
+def test_the_target_is_checked() -> None:
     run = Run(FIRST, BAD, target=SECOND.address).finish()
     assert run.session.found == SECOND.address
     assert {'not-a-number', 'status-agrees'} <= run.failed
 
 
-def test_a_light_with_another_heartbeat_type_is_found_by_its_status():
+def test_a_light_with_another_heartbeat_type_is_found_by_its_status() -> None:
     assert Run(faults=('type=12',)).finish().session.found == FIRST.address
 
 
@@ -64,7 +65,7 @@ def test_a_light_with_another_heartbeat_type_is_found_by_its_status():
      '1/4, 1/5, 1/6, 1/7, 1/8 and 3 more'),
 ])
 def test_without_the_light_heartbeat_fails_and_names_the_components_that_were_heard(
-        addresses, target, text):
+        addresses: Sequence[int], target: Address | None, text: str) -> None:
     silent = FAULTS.add(IlluminatorBehaviour(), 'silence')
     other = FAULTS.add(FAULTS.add(IlluminatorBehaviour(), 'type=18'), 'no-request')
     lights = [IlluminatorProperties(address=Address(1, n), behaviour=other, status_interval=0.0)
@@ -76,17 +77,20 @@ def test_without_the_light_heartbeat_fails_and_names_the_components_that_were_he
     assert not run.suite.passed
 
 
-def test_a_flood_from_the_light_takes_a_bounded_memory():
+def test_a_flood_from_the_light_takes_a_bounded_memory() -> None:
     session = CHECKS.session(TESTER)
     status = IlluminatorStatus(1, 0, 3, 0, 1, 10.0, 0.0, 0.0, 20.0, 0.05, 10.0)
     flood = (heartbeat(44), status, CommandAck(405, 0))
-    session.runner.run(session.command(405, 1.0))
 
-    def receive(count):
+    async def command() -> None:
+        await session.command(405, 1.0)
+
+    def receive(count: int) -> int:
         for number in range(count):
             session.receive(FIRST.address, flood[number % len(flood)], 0.001 * number)
         return tracemalloc.get_traced_memory()[0]
 
+    session.runner.run(command())
     tracemalloc.start()
     try:
         before = receive(3 * LIMIT)

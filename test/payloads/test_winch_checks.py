@@ -14,8 +14,11 @@
 
 """The conformance checks of a winch, beside a light on the same link."""
 
+from typing import Any
+
 from illuminator_ros.illuminator.simulated import describe
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
 from illuminator_ros.payload.checks.suite import Suite
@@ -29,10 +32,11 @@ DECK = Address(1, 169)
 
 @pytest.mark.parametrize(('fault', 'failed'), [('', set()), ('lie', {'release'})])
 def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_every_component(
-        fault, failed):
+        fault: str, failed: set[str]) -> None:
     winch = SimulatedWinch()
-    devices = SimulatedComponents(
-        [describe(IlluminatorProperties()), Description(DECK, winch)], 0.0)
+    described: list[Description[Any]] = [
+        describe(IlluminatorProperties()), Description(DECK, winch)]
+    devices = SimulatedComponents(described, 0.0)
     component = devices.components[1]
     if fault:
         component.behave(winch.faults.add(component.behaviour, fault), 0.0)
@@ -40,18 +44,20 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
     session = checks.session(Address(255, 190))
     suite = Suite(checks.tester(session, Conditions()), checks.requirements, device=checks.device)
 
-    async def run():
+    async def run() -> None:
         await session.find(10.0, 2.0)
         await suite.run()
 
     session.runner.run(run())
     session.link_opened(0.0)
+    sides: tuple[Endpoint, Endpoint] = (session, devices)
     for step in range(10_000):
         now = 0.01 * step
-        for side, other in ((session, devices), (devices, session)):
+        for side, other in (sides, sides[::-1]):
             side.poll(now)
             while side.outgoing:
-                other.receive(*side.outgoing.popleft(), now)
+                source, message = side.outgoing.popleft()
+                other.receive(source, message, now)
         if not session.runner.running:
             break
 
