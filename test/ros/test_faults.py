@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""No fault of ours ends the node or leaves a caller without an answer (DESIGN.md, 3.4)."""
+"""An exception in the bridge neither ends the node nor leaves a caller without an answer."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -20,7 +20,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.ros.publishers import LightPublishers
-from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsPublisher
 from illuminator_ros.ros.node import PayloadNode
 from illuminator_ros.ros.parameter_services import ParameterServices
@@ -29,120 +28,109 @@ from rcl_interfaces.srv import ListParameters
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support.embedded import embedded_bridge
-from support.light import eventually, ON_OFF, ServedLight
+from support.light import ServedLight
+from support.ports import free_port
+from support.recording import Call
 from support.ros import Parameters, Ros, STREAM
-
-FAULT = RuntimeError('injected')
-
-
-def fail(*arguments: Any, **named: Any) -> None:
-    raise FAULT
+from support.slow import CLOCK
+from support.waiting import eventually
 
 
-@pytest.fixture
-def bridge(own_ros: Ros, port: int) -> Iterator[Bridge]:
-    """Return a bridge with a light that has reported its configuration."""
-    with embedded_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
-        Parameters(own_ros).wait(mode='internal_control')
-        bridge.test_light = light  # type: ignore[attr-defined]
-        yield bridge
+@pytest.fixture(scope='module')
+def light(domain: int, ros: Ros) -> Iterator[ServedLight]:
+    """Return a light that has reported its configuration to a bridge in this process."""
+    light = ServedLight(port := free_port())
+    with embedded_bridge(domain, port), light:
+        Parameters(ros).wait(mode='internal_control')
+        yield light
 
 
-def works(ros: Ros) -> bool:
-    """Return whether services, parameters and the link still do what they should."""
-    enabled = ros.call(SetBool, '/illuminator/enable', SetBool.Request(data=True))
-    [result] = Parameters(ros).set(brightness=55.0)
-    return bool(enabled.success and result.successful)
+class Fault:
+    """Makes a method raise, and counts how often."""
+
+    def __init__(self, owner: type, method: str) -> None:
+        self.calls = 0
+        self._patch = pytest.MonkeyPatch()
+        self._patch.setattr(owner, method, self._fail)
+
+    def _fail(self, *arguments: object, **named: object) -> None:
+        self.calls += 1
+        raise RuntimeError('injected')
+
+    def __enter__(self) -> 'Fault':
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._patch.undo()
 
 
-@pytest.mark.parametrize(('owner', 'method', 'service', 'type_'), [
-    (Light, 'enable', 'enable', SetBool),
-    (Light, 'refresh', 'refresh', Trigger),
-])
-def test_a_service_says_that_it_failed(
-    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, owner: type,
-    method: str, service: str, type_: Any,
+def assert_works(ros: Ros) -> None:
+    """Check that services, parameters and the link still do what they should."""
+    assert ros.enable().success
+    assert Parameters(ros).set(brightness=55.0)[0].successful
+
+
+def start_set(ros: Ros, atomically: bool) -> Call:
+    return Parameters(ros).start_set(atomically=atomically, brightness=9.0)
+
+
+@pytest.mark.parametrize(('owner', 'method', 'service'), [
+    (Light, 'enable', 'enable'), (Light, 'refresh', 'refresh'),
+    *((owner, method, service) for owner, method in (
+        (Light, 'configure'), (ParameterServices, '_check'))
+      for service in ('set_parameters', 'set_parameters_atomically'))])
+def test_service_that_fails_inside_answers_with_the_exception(
+    ros: Ros, light: ServedLight, owner: type, method: str, service: str,
 ) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(owner, method, fail)
-        response = own_ros.call(type_, f'/illuminator/{service}', type_.Request())
+    with Fault(owner, method):
+        if service.startswith('set'):
+            response: Any = start_set(ros, service.endswith('atomically')).result()
+            result = response.result if service.endswith('atomically') else response.results[0]
+            success, text = result.successful, result.reason
+        else:
+            type_ = SetBool if service == 'enable' else Trigger
+            response = ros.call(type_, f'/illuminator/{service}', type_.Request())
+            success, text = response.success, response.message
 
-    assert not response.success
-    assert response.message == "internal error: RuntimeError('injected')"
-    assert works(own_ros)
-
-
-@pytest.mark.parametrize(('owner', 'method'), [
-    (Light, 'configure'), (ParameterServices, '_check')])
-@pytest.mark.parametrize('atomically', [False, True])
-def test_a_set_says_that_it_failed(
-    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, owner: type,
-    method: str, atomically: bool,
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(owner, method, fail)
-        response = Parameters(own_ros).start_set(atomically=atomically, brightness=9.0).result()
-
-    [result] = [response.result] if atomically else response.results
-    assert not result.successful
-    assert result.reason == "internal error: RuntimeError('injected')"
-    assert works(own_ros)
+    assert (success, text) == (False, "internal error: RuntimeError('injected')")
+    assert_works(ros)
 
 
-def test_other_parameter_services_answer(
-    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(PayloadNode, 'list_parameters', fail)
-        response = Parameters(own_ros).start(ListParameters, 'list_parameters').result()
+def test_parameter_service_that_fails_inside_answers_empty(ros: Ros, light: ServedLight) -> None:
+    with Fault(PayloadNode, 'list_parameters'):
+        response = Parameters(ros).start(ListParameters, 'list_parameters').result()
 
     assert response.result.names == []
-    assert works(own_ros)
+    assert_works(ros)
 
 
 @pytest.mark.parametrize(('owner', 'method'), [
-    (LightPublishers, 'take'), (DiagnosticsPublisher, 'poll'),
-    (DiagnosticsPublisher, 'look'),
-])
-def test_what_goes_wrong_in_publishing_is_over_when_it_is_over(
-    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, owner: type,
-    method: str,
+    (LightPublishers, 'take'), (DiagnosticsPublisher, 'poll'), (DiagnosticsPublisher, 'look')])
+def test_publishing_goes_on_after_it_has_failed(
+    ros: Ros, light: ServedLight, owner: type, method: str,
 ) -> None:
-    calls = []
+    with Fault(owner, method) as fault:
+        light.report(brightness=12.0, error_status=4)
+        CLOCK.forward(1.0)
+        eventually(lambda: fault.calls)
+    light.report(error_status=0)
 
-    def failing(*arguments: Any, **named: Any) -> None:
-        calls.append(arguments)
-        fail()
-
-    with monkeypatch.context() as patch:
-        patch.setattr(owner, method, failing)
-        bridge.test_light.report(brightness=12.0, error_status=4)  # type: ignore[attr-defined]
-        eventually(lambda: calls)
-    bridge.test_light.report(error_status=0)  # type: ignore[attr-defined]
-
-    assert works(own_ros)
-    own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait()
+    assert_works(ros)
+    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+    CLOCK.forward(1.0)
+    recorder.wait()
 
 
-@pytest.mark.parametrize(('topic', 'type_', 'value', 'owner', 'method'), [
-    ('enable', Bool, True, Light, 'enable'),
-    ('brightness', Float32, 20.0, Light, 'set_brightness'),
-])
-def test_a_command_topic_goes_on(
-    own_ros: Ros, bridge: Bridge, monkeypatch: pytest.MonkeyPatch, topic: str,
-    type_: Any, value: object, owner: type, method: str,
+@pytest.mark.parametrize(('topic', 'type_', 'value', 'method'), [
+    ('enable', Bool, True, 'enable'), ('brightness', Float32, 20.0, 'set_brightness')])
+def test_command_topic_goes_on_after_it_has_failed(
+    ros: Ros, light: ServedLight, topic: str, type_: Any, value: object, method: str,
 ) -> None:
-    calls = []
+    light.report(enable=0)
+    with Fault(Light, method) as fault:
+        ros.publish(type_, f'/illuminator/cmd/{topic}', value)
+        eventually(lambda: fault.calls)
 
-    def failing(*arguments: Any, **named: Any) -> None:
-        calls.append(arguments)
-        fail()
-
-    with monkeypatch.context() as patch:
-        patch.setattr(owner, method, failing)
-        own_ros.publish(type_, f'/illuminator/cmd/{topic}', value)
-        eventually(lambda: calls)
-
-    own_ros.publish(Bool, '/illuminator/cmd/enable', True)
-    bridge.test_light.wait_for(ON_OFF)  # type: ignore[attr-defined]
-    assert works(own_ros)
+    ros.publish(Bool, '/illuminator/cmd/enable', True)
+    eventually(lambda: light.fake.fields['enable'])
+    assert_works(ros)

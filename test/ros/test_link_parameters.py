@@ -35,6 +35,7 @@ def test_bridge_sends_from_its_address_and_leaves_the_status_interval_alone(
 ) -> None:
     with running_bridge(own_ros.domain, port, **given), ServedLight(port) as light:
         Parameters(own_ros).wait(brightness=100.0)
+        light.wait_for(MavCmd.REQUEST_MESSAGE)
 
         assert light.fake.heard_from == {address}
         assert light.commands(INTERVAL) == []

@@ -16,18 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 import contextlib
-import functools
 import threading
-from typing import Any
 from unittest import mock
 
 from illuminator_ros.cli.payloads import PAYLOADS
-from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros import bridge as bridge_module
 from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.node import PayloadNode
+from illuminator_ros.ros.parameters import ParameterError
 import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
@@ -35,21 +33,19 @@ from support.slow import SlowLink
 from support.waiting import PATIENCE
 
 
-def _make(
-    context: Context, link: Callable[..., Link], **parameters: Any,
-) -> Bridge:
-    with mock.patch.object(bridge_module, 'Link', link):
-        return Bridge(PayloadNode('illuminator', context=context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in parameters.items()]), [], PAYLOADS)
+def _node(context: Context, parameters: Mapping[str, object]) -> PayloadNode:
+    return PayloadNode('illuminator', context=context, parameter_overrides=[
+        Parameter(name, value=value) for name, value in parameters.items()])
 
 
 @contextlib.contextmanager
-def embedded_bridge(domain: int, port: int, **parameters: Any) -> Iterator[Bridge]:
+def embedded_bridge(domain: int, port: int, **parameters: object) -> Iterator[Bridge]:
     """Run the bridge in a thread, by the slow clock, listening on a UDP port of loopback."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)
-    process = _make(context, SlowLink, **{
-        'connection_url': f'udpin://127.0.0.1:{port}', **parameters})
+    with mock.patch.object(bridge_module, 'Link', SlowLink):
+        process = Bridge(_node(context, {
+            'connection_url': f'udpin://127.0.0.1:{port}', **parameters}), [], PAYLOADS)
     thread = threading.Thread(target=process.run)
     thread.start()
     try:
@@ -61,18 +57,13 @@ def embedded_bridge(domain: int, port: int, **parameters: Any) -> Iterator[Bridg
         assert not thread.is_alive()
 
 
-@contextlib.contextmanager
-def resting_bridge(
-    domain: int, clock: Callable[[], float], **parameters: Any,
-) -> Iterator[Bridge]:
-    """Make the bridge and do not run it: what it would do is done by the test, at its times."""
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    process = _make(context, functools.partial(Link, clock=clock),
-                    connection_url='memory://rest', **parameters)
+def refusal(context: Context, **parameters: object) -> str:
+    """Return why a bridge cannot start with these parameters."""
+    node = _node(context, parameters)
     try:
-        yield process
+        Bridge(node, [], PAYLOADS)
+    except ParameterError as error:
+        return str(error)
     finally:
-        process.link.stop()
-        process.node.destroy_node()
-        rclpy.try_shutdown(context=context)
+        node.destroy_node()
+    return ''
