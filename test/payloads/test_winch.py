@@ -14,6 +14,8 @@
 
 """A winch beside a light: one link, one address, no change to what payloads share."""
 
+from typing import Any
+
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.console import execute
 from illuminator_ros.cli.simulator.options import parser, payload_types
@@ -21,9 +23,10 @@ from illuminator_ros.cli.simulator.scenario import components, Scenario, scenari
 from illuminator_ros.cli.simulator.view import look
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.command import CommandSender
-from illuminator_ros.mavlink.component import Component
-from illuminator_ros.mavlink.messages import Address, Heartbeat
+from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.mavlink.command import CommandResult, CommandSender
+from illuminator_ros.mavlink.component import Component, Endpoint
+from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
 from illuminator_ros.payload.simulated import SimulatedComponents
 from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest
@@ -32,7 +35,7 @@ PAYLOAD_TYPES = {**PAYLOADS, 'winch': WINCH}
 BRIDGE, LIGHT, DECK = Address(1, 194), Address(1, 243), Address(1, 169)
 
 
-def simulated(*arguments, file=None):
+def simulated(*arguments: str, file: object = None) -> SimulatedComponents[Any]:
     """Return what ``simulator --payload illuminator,winch`` simulates with more arguments."""
     args = ['--payload', 'illuminator,winch', *arguments]
     types = payload_types(args, PAYLOAD_TYPES)
@@ -44,25 +47,28 @@ def simulated(*arguments, file=None):
 class Vehicle:
     """A light and a winch on one link, and one component that is a client of both."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.devices = simulated()
         commands = CommandSender(BRIDGE)
         self.lights = IlluminatorClient(commands, Settings())
         self.winches = WinchClient(commands)
-        self.reports, self.results, self.sent = [], [], []
+        self.reports: list[WinchReport] = []
+        self.results: list[CommandResult] = []
+        self.sent: list[tuple[Address, Message]] = []
         self.winches.events.subscribe(self.reports.append)
         self.component = Component(commands, [self.lights, self.winches])
         self.now = 0.0
         self.component.link_opened(self.now)
         self.run(3.5)
 
-    def done(self, result, now):
+    def done(self, result: CommandResult, now: float) -> None:
         self.results.append(result)
 
-    def run(self, seconds):
+    def run(self, seconds: float) -> None:
         end = self.now + seconds
         while self.now < end:
-            for side, other in ((self.devices, self.component), (self.component, self.devices)):
+            ends: tuple[Endpoint, Endpoint] = (self.devices, self.component)
+            for side, other in (ends, ends[::-1]):
                 side.poll(self.now)
                 while side.outgoing:
                     source, message = side.outgoing.popleft()
@@ -72,18 +78,18 @@ class Vehicle:
 
 
 @pytest.fixture
-def vehicle():
+def vehicle() -> Vehicle:
     return Vehicle()
 
 
-def test_one_component_with_one_heartbeat_finds_both(vehicle):
+def test_one_component_with_one_heartbeat_finds_both(vehicle: Vehicle) -> None:
     assert (set(vehicle.lights.lights), vehicle.winches.winches) == ({LIGHT}, {DECK})
     beats = [one for one, message in vehicle.sent if isinstance(message, Heartbeat)]
     assert beats.count(BRIDGE) == beats.count(LIGHT) == beats.count(DECK) == 4
 
 
-def test_each_payload_gets_the_result_of_its_own_command(vehicle):
-    lit = []
+def test_each_payload_gets_the_result_of_its_own_command(vehicle: Vehicle) -> None:
+    lit: list[Result] = []
     vehicle.lights.lights[LIGHT].enable(True, vehicle.now, lambda result, now: lit.append(result))
     vehicle.winches.release(DECK, 5.0, vehicle.now, vehicle.done)
     vehicle.winches.release(DECK, -9.0, vehicle.now, vehicle.done)
@@ -94,7 +100,7 @@ def test_each_payload_gets_the_result_of_its_own_command(vehicle):
     assert vehicle.reports[-1] == WinchReport(DECK, 5.0)
 
 
-def test_the_faults_of_every_component_are_those_of_the_winch_too():
+def test_the_faults_of_every_component_are_those_of_the_winch_too() -> None:
     vehicle = Vehicle()
     for component in vehicle.devices.components:
         component.behave(component.device.faults.add(component.behaviour, 'refuse=failed'), 0.0)
@@ -103,7 +109,7 @@ def test_the_faults_of_every_component_are_those_of_the_winch_too():
     assert [one.describe() for one in vehicle.results] == ['MAV_RESULT_FAILED']
 
 
-def test_the_console_gives_each_command_to_the_components_that_have_it():
+def test_the_console_gives_each_command_to_the_components_that_have_it() -> None:
     devices = simulated('--light', '1/9=bow', '--winch', '1/8=deck').components
     assert execute('deck release 2.5', devices, 0.0) == 'done'
     assert execute('on', devices, 0.0) == 'done'
@@ -113,7 +119,7 @@ def test_the_console_gives_each_command_to_the_components_that_have_it():
     assert 'release M' in execute('help', devices, 0.0)
 
 
-def test_a_file_lists_components_of_each_payload():
+def test_a_file_lists_components_of_each_payload() -> None:
     file = {'lights': [{'id': '1/9'}], 'winches': [{'id': '1/8', 'name': 'deck'}], 'seed': 4}
     assert [(str(one.address), one.name) for one in simulated(file=file).components] == [
         ('1/9', ''), ('1/8', 'deck')]

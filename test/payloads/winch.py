@@ -52,7 +52,8 @@ from illuminator_ros.payload.simulated import (
 )
 
 WINCH = PayloadType(
-    'winch', simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS')
+    'winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
+    checks='payloads.winch_checks:CHECKS')
 
 MAV_TYPE_WINCH = 42
 DO_WINCH = 42600

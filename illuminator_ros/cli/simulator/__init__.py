@@ -16,21 +16,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import sys
 
+from ..payloads import PAYLOADS
 from ..program import run_program
 from ..termination import Termination
+from ...payload.registry import PayloadType
 
 
-def main(args: list[str] | None = None) -> int:
+def main(
+    args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> int:
     """
     Run the simulator until a signal; see :mod:`~.run`.
 
     :param args: the command line without the program's name.
+    :param payloads: the kinds of payloads that ``--payload`` may name.
     """
     def start(termination: Termination) -> int:
         from .run import run
-        return run(args, termination)
+        return run(args, termination, payloads)
 
     # The live view needs the terminal itself; only the view waits while that is stopped.
     live = sys.stdout is not None and sys.stdout.isatty()

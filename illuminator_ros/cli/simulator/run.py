@@ -34,7 +34,6 @@ from .scenario import components, load, Scenario, Types
 from .settings import SettingError
 from .view import LiveView, Look, look, PlainView
 from ..options import signing
-from ..payloads import PAYLOADS
 from ..termination import Termination
 from ...mavlink.link import Link
 from ...mavlink.messages import Address
@@ -131,13 +130,13 @@ class _Simulation:
 
 def run(
     args: Iterable[str] | None, termination: Termination,
-    payloads: Mapping[str, PayloadType] = PAYLOADS,
+    payloads: Mapping[str, PayloadType],
 ) -> int:
     """
     Run the simulator until a signal or ``quit``, and return the exit status.
 
     :param args: the command line without the program's name; None takes the process's.
-    :param payloads: the payloads that it offers.
+    :param payloads: the kinds of payloads that ``--payload`` may name.
     """
     logging.basicConfig(format='%(message)s')
     try:

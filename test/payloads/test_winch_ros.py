@@ -1,0 +1,73 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bridge serves a winch beside a light: one process, one link, one address."""
+
+import contextlib
+from contextlib import AbstractContextManager
+import os
+import sys
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from std_msgs.msg import Bool, Float32  # noqa: E402
+from support.ports import free_port  # noqa: E402
+from support.processes import ended, Program, ROOT  # noqa: E402
+from support.ros import own_domain, Ros  # noqa: E402
+from support.waiting import eventually  # noqa: E402
+
+PROGRAM = """
+import sys
+from illuminator_ros.cli import {name}
+from illuminator_ros.cli.payloads import PAYLOADS
+from payloads.winch import WINCH
+sys.exit({name}.main(payloads={{**PAYLOADS, 'winch': WINCH}}))
+"""
+
+
+def program(name: str, *arguments: str, domain: int) -> AbstractContextManager[Program]:
+    return ended(Program(sys.executable, '-c', PROGRAM.format(name=name), *arguments, env={
+        'PYTHONPATH': os.pathsep.join(
+            filter(None, (str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
+        'ROS_DOMAIN_ID': str(domain)}))
+
+
+def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        domain = stack.enter_context(own_domain())
+        stack.enter_context(program(
+            'simulator', f'udpout://127.0.0.1:{port}', '--payload', 'illuminator,winch',
+            domain=domain))
+        bridge = stack.enter_context(program(
+            'bridge', f'udpin://127.0.0.1:{port}', '--ros-args', '-p',
+            'payloads:=[illuminator, winch]', domain=domain))
+        ros = Ros(domain)
+        stack.callback(ros.close)
+        enabled = ros.subscribe(Bool, '/illuminator/enabled')
+        length = ros.subscribe(Float32, '/winch/line_length')
+        enabled.wait_value(False)
+        assert ros.enable(True).success
+        enabled.wait_value(True)
+        publisher = ros.node.create_publisher(Float32, '/winch/cmd/release', 10)
+
+        def is_released() -> int:
+            # The first messages may come before the node has found the publisher.
+            publisher.publish(Float32(data=2.5))
+            return bridge.count('~/cmd/release: MAV_RESULT_ACCEPTED')
+
+        eventually(is_released)
+        length.wait(lambda message: message.data >= 2.5)

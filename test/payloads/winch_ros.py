@@ -1,0 +1,67 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The ROS half of a winch: it publishes ``~/line_length`` and takes ``~/cmd/release``."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+import math
+
+from illuminator_ros.mavlink.command import CommandResult
+from illuminator_ros.ros.node import CommandTopic, NodeInterface, Publication
+from illuminator_ros.ros.payload import Host, RosPayload, ShutdownReport
+from payloads.winch import WinchClient, WinchReport
+from std_msgs.msg import Float32
+
+
+class WinchNode:
+    """Serves all winches of a link with one node."""
+
+    def __init__(self, client: WinchClient, host: Host) -> None:
+        self._client = client
+        self._log = host.log
+        self._interface = NodeInterface(
+            host.node, host.link, host.log, publications=[Publication('line_length', Float32)],
+            commands=[CommandTopic('cmd/release', Float32, self._release, _finite)])
+        client.events.subscribe(self._publish)
+
+    def _publish(self, report: WinchReport) -> None:
+        self._interface.publish('line_length', report.line_length)
+
+    def _release(self, length: float, now: float) -> None:
+        for winch in self._client.winches:
+            self._client.release(winch, length, now, self._released)
+
+    def _released(self, result: CommandResult, now: float) -> None:
+        self._log.info(f'~/cmd/release: {result}', 'release')
+
+    def poll(self, now: float) -> None:
+        """See :meth:`ServedPayload.poll`."""
+
+    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+        """See :meth:`ServedPayload.shut_down`; a winch stays as it is."""
+        return {}
+
+    def close(self) -> None:
+        """See :meth:`ServedPayload.close`."""
+
+
+def _finite(length: float) -> float:
+    if not math.isfinite(length):
+        raise ValueError(f'{length} m is not a finite length')
+    return length
+
+
+WINCH = RosPayload('winch', lambda commands, values: WinchClient(commands), WinchNode)
