@@ -15,8 +15,8 @@
 """
 CPU time for a frame of another component, on a link that an autopilot uses too.
 
-Of the bridge, of pymavlink's ``recv_match``, and of a loop that only reads; each
-without its CPU time at rest.
+The receivers are the bridge, pymavlink's ``recv_match`` and a loop that only reads; the CPU time
+of each at rest is subtracted.
 """
 
 from __future__ import annotations

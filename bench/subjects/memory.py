@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Memory of the bridge above that of an empty node, and its growth while it serves a light."""
+"""Memory of the bridge above an empty node, and its growth while it serves a light."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def seen(client: Client, names: list[str]) -> float:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Start the bridge anew for each number of lights."""
+    """Start a bridge for each number of lights."""
     alone: Figures = {}
     for count in bench.amount(bench.lights, (2,)):
         port = free_port()

@@ -76,7 +76,7 @@ def test_modules_and_files_that_ros_looks_for_are_installed(prefix: Path) -> Non
 
     assert {path.relative_to(site) for path in site.glob('illuminator_ros/**/*.py')} == modules
     assert (site / 'illuminator_ros' / 'py.typed').is_file()
-    assert [path for path in (*files, 'package.xml') if not (share / path).is_file()] == []
+    assert [path for path in (*files, Path('package.xml')) if not (share / path).is_file()] == []
     assert (prefix / 'share/ament_index/resource_index/packages/illuminator_ros').is_file()
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Values as text, bar and line. Pure functions without rich; None is what is not known."""
+"""Values as text, bar and line. Pure functions without rich; None is an unknown value."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from .model import Diagnosis
 UNKNOWN = '-'
 BLOCKS = '▁▂▃▄▅▆▇█'
 ASCII_BLOCKS = '_.-=+*%#'
-# K; less than that between coldest and hottest is a flat line: a tenth of a degree is no news.
+# K; a smaller difference is drawn as a flat line.
 SMALLEST_SPAN = 4.0
-# degC that no line has room for.
+# degC; a greater value is clipped.
 HIGHEST = 1e6
 
 
@@ -40,9 +40,9 @@ def bar(value: float | None, width: int, *, ascii_only: bool = False) -> str:
 
 
 def sparkline(values: Sequence[float | None], *, ascii_only: bool = False) -> str:
-    """Return a line of a character for each value, a space where there is none."""
+    """Return a character for each value, a space for None."""
     blocks = ASCII_BLOCKS if ascii_only else BLOCKS
-    # Anybody can publish a temperature, and the difference of two must be a number.
+    # Published temperatures are not checked, and their difference must be finite.
     values = [None if value is None else min(max(value, -HIGHEST), HIGHEST) for value in values]
     known = [value for value in values if value is not None]
     if not known:
@@ -92,7 +92,7 @@ def milliseconds(diagnosis: Diagnosis | None, key: str) -> str:
 
 
 def link_quality(link: Diagnosis) -> str:
-    """Return how good a link is."""
+    """Return loss and round trip times of a link."""
     return (f'{percent(link, "loss_percent")} lost, round trip '
             f'{milliseconds(link, "round_trip_p50_ms")}, 95 % of them within '
             f'{milliseconds(link, "round_trip_p95_ms")}')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is known of the lights in a ROS graph. No ROS, no clock: time is passed in."""
+"""The lights in a ROS graph. No ROS, no clock: time is an argument."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from typing import Any
 
 from ...illuminator.error_flags import flag_names
 
-# s without anything from a light, or about it, after which what is shown is not up to date any
-# more: bridges ask for a status after 2.5 s, and publish diagnostics once a second.
+# s without topics and diagnostics of a light until its values are out of date: bridges request a
+# status after 2.5 s, and publish diagnostics once a second.
 SILENCE = 6.0
-# s; one value of temperature for each, and so many of them.
+# s between two temperatures of a trend, and their number.
 TREND_STEP = 2.0
 TREND_SIZE = 60
-# Anybody can publish topics like those of a light.
+# Any node can publish topics like those of a light.
 MAX_LIGHTS = 256
 
 
 class State(Enum):
-    """What there is to say of a light first."""
+    """The state of a light."""
 
     ON = 'ON'
     OFF = 'off'
@@ -47,7 +47,7 @@ class State(Enum):
 
 
 class Trend:
-    """The newest value in each of the last time steps; None where there was none."""
+    """The newest value in each of the last time steps, None for a step without one."""
 
     def __init__(self, step: float = TREND_STEP, size: int = TREND_SIZE) -> None:
         self._step = step
@@ -77,7 +77,7 @@ class Diagnosis:
     values: Mapping[str, str]
 
     def number(self, key: str) -> float | None:
-        """Return a value that is a number, None if it is none."""
+        """Return a value that is a finite number, else None."""
         try:
             value = float(self.values[key])
         except (KeyError, ValueError):
@@ -86,7 +86,7 @@ class Diagnosis:
 
 
 class Outcome(Enum):
-    """What has become of a request."""
+    """The outcome of a request."""
 
     PENDING = '...'
     DONE = 'done'
@@ -95,7 +95,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Action:
-    """The last thing that was asked of a light from here."""
+    """The last request from this monitor to a light."""
 
     text: str
     outcome: Outcome
@@ -106,12 +106,12 @@ class Action:
 @dataclass
 class Light:
     """
-    One light; None is what it has not told.
+    One light; None is an unknown value.
 
     :param name: of its node, with namespace.
-    :param heard_at: when anything came from it, or about it.
-    :ivar setpoint: the brightness that is agreed with it, %; it may shine less, being hot.
-    :ivar wanted: what has been asked for and not been answered: parameters, ``enabled``.
+    :param heard_at: the time of its last topic or diagnostics, s.
+    :ivar setpoint: its parameter brightness, %; a hot light shines less.
+    :ivar wanted: the values of requests without an answer: parameters, ``enabled``.
     :ivar values: its last values by topic.
     """
 
@@ -127,7 +127,7 @@ class Light:
     action: Action | None = None
 
     def state(self, now: float) -> State:
-        """Return what there is to say of it first."""
+        """Return its state."""
         if self.gone_at is not None:
             return State.GONE
         if self.silence(now) > SILENCE:
@@ -137,7 +137,7 @@ class Light:
         return {True: State.ON, False: State.OFF, None: State.UNKNOWN}[self.values.get('enabled')]
 
     def silence(self, now: float) -> float:
-        """Return the s since anything came from it."""
+        """Return the time since its last topic or diagnostics, s."""
         return now - self.heard_at
 
     def value(self, name: str) -> Any:
@@ -149,14 +149,9 @@ class Light:
         """Return the names of its error flags."""
         return flag_names(self.values.get('error_flags') or 0)
 
-    @property
-    def level(self) -> int:
-        """Return the worst of what the diagnostics say of it."""
-        return max((one.level for one in (self.link, self.lamp) if one), default=0)
-
 
 class Fleet:
-    """All lights that have been seen, by name."""
+    """All lights that were discovered, by name."""
 
     def __init__(self) -> None:
         self._lights: dict[str, Light] = {}
@@ -171,12 +166,12 @@ class Fleet:
         return self._lights.get(name or '')
 
     def seen(self, names: Iterable[str], now: float) -> list[str]:
-        """Take which lights are in the graph now; return the names of those that are new."""
+        """Take the names of the lights in the graph; return the new ones."""
         present = set(names)
         for light in self._lights.values():
             if light.name in present:
                 if light.gone_at is not None:
-                    # Another bridge may serve it now, and have agreed on something else.
+                    # Another bridge may serve it now, with another setpoint.
                     light.gone_at = light.setpoint = None
             elif light.gone_at is None:
                 light.gone_at = now
@@ -186,7 +181,7 @@ class Fleet:
         return new
 
     def clear_gone(self) -> list[str]:
-        """Forget the lights that are not in the graph any more, and return their names."""
+        """Remove the lights that left the graph, and return their names."""
         gone = [light.name for light in self._lights.values() if light.gone_at is not None]
         for name in gone:
             del self._lights[name]
@@ -203,7 +198,7 @@ class Fleet:
             light.temperatures.add(value, now)
 
     def agreed(self, name: str, brightness: float) -> None:
-        """Take the brightness that a light's parameter has, %."""
+        """Take the parameter brightness of a light, %."""
         light = self._lights.get(name)
         if light is not None:
             light.setpoint = brightness
@@ -212,7 +207,7 @@ class Fleet:
         """
         Take a diagnosis.
 
-        :param kind: ``link`` or ``lamp``; others are passed over.
+        :param kind: ``link`` or ``lamp``; others are ignored.
         """
         light = self._lights.get(name)
         if light is None:
@@ -226,12 +221,12 @@ class Fleet:
             light.lamp = clean
 
     def acted(self, name: str, text: str, outcome: Outcome, answer: str, now: float) -> None:
-        """Note what has been asked of a light, and what has become of it."""
+        """Take the outcome of a request to a light."""
         light = self._lights.get(name)
         if light is not None:
             light.action = Action(text, outcome, printable(answer), now)
 
 
 def printable(text: str) -> str:
-    """Return a text without what could do something to a terminal."""
+    """Return a text without characters that control a terminal."""
     return ''.join(c if c.isprintable() else ' ' for c in text)

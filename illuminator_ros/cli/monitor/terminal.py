@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The terminal: keys one by one, nothing else written on it, and all as before at the end."""
+"""The terminal: its settings, stopping and continuing, and the keys."""
 
 from __future__ import annotations
 
@@ -30,43 +30,43 @@ import threading
 
 from ..program import discard_output
 
-# s after an escape in which what belongs to it must have come.
+# s after an escape in which the rest of its sequence must arrive.
 ESCAPE_TIMEOUT = 0.05
 
 
 @contextlib.contextmanager
 def while_it_lasts() -> Iterator[None]:
-    """Leave what is in it without an error once the terminal is gone."""
+    """End without an error if the terminal closes."""
     try:
         yield
     except (OSError, termios.error) as error:
         if error.args[0] != errno.EIO:
             raise
-        # The interpreter would try at its end to write what is left.
+        # The interpreter would write the rest at its exit.
         discard_output()
 
 
 @contextlib.contextmanager
 def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
     """
-    Have a terminal pass on each key at once, without showing it.
+    Let a terminal pass on each key at once, without an echo.
 
-    Yield what brings it back without waiting for what is still to be written, for an end by force.
+    Yield a function that restores it without waiting for pending output.
     """
     before = termios.tcgetattr(descriptor)
     changed = termios.tcgetattr(descriptor)
     changed[3] &= ~(termios.ICANON | termios.ECHO)
     changed[6][termios.VMIN], changed[6][termios.VTIME] = 1, 0
-    # Ctrl-\ and ctrl-z as signals would end or stop "ros2 run" at once, and the shell have the
-    # terminal before it is brought back.
+    # Ctrl-\ and ctrl-z as signals would end or stop "ros2 run" at once, and the shell would get
+    # the terminal before it is restored.
     changed[6][termios.VQUIT] = changed[6][termios.VSUSP] = b'\0'
     try:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
         yield functools.partial(termios.tcsetattr, descriptor, termios.TCSANOW, before)
     finally:
-        # Blocked, it lets a terminal be set that the shell has taken back already.
+        # With SIGTTOU blocked, the settings work after the shell has taken the terminal back.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTTOU])
-        # Or the terminal is gone.
+        # The terminal may be closed.
         with contextlib.suppress(termios.error):
             termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
@@ -74,7 +74,7 @@ def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
 
 @contextlib.contextmanager
 def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
-    """Have ``on_stop()`` called instead of being stopped, by SIGTSTP."""
+    """Call ``on_stop()`` on SIGTSTP instead of stopping."""
     before = signal.signal(signal.SIGTSTP, lambda *_: on_stop())
     try:
         yield
@@ -84,21 +84,21 @@ def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
 
 def suspend(job: bool) -> None:
     """
-    Be stopped until a shell continues it; where none could, nothing happens.
+    Stop until a shell continues the process; without such a shell nothing happens.
 
-    :param job: stop the whole job, as ctrl-z does: "ros2 run", too.
+    :param job: stop the whole job, including "ros2 run", as ctrl-z does.
     """
     if job:
         before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
         os.kill(0, signal.SIGTSTP)
         signal.signal(signal.SIGTSTP, before)
-    # Not to the process: another thread would take it, and this one have the terminal meanwhile.
+    # To this thread: another one would stop later, and this one would use the terminal meanwhile.
     signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
 
 
 @contextlib.contextmanager
 def quiet_errors() -> Iterator[None]:
-    """Keep what the middleware writes to standard error off the screen, and show it afterwards."""
+    """Keep errors of the middleware off the screen, and write them afterwards."""
     sys.stderr.flush()
     kept = os.dup(2)
     with tempfile.TemporaryFile() as file:
@@ -115,7 +115,7 @@ def quiet_errors() -> Iterator[None]:
 
 
 class Keyboard:
-    """What is typed, and :meth:`wake` from other threads."""
+    """Reads keys; other threads can :meth:`wake` it."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -123,21 +123,21 @@ class Keyboard:
         os.set_blocking(self._waker, False)
 
     def close(self) -> None:
-        """Free what it uses."""
+        """Close its pipe."""
         os.close(self._woken)
         os.close(self._waker)
 
     def wake(self) -> None:
-        """Have :meth:`read` return; callable from any thread."""
+        """Let :meth:`read` return; callable from any thread."""
         with contextlib.suppress(OSError):
             os.write(self._waker, b'\0')
 
     def read(self, timeout: float, on_end: Callable[[], None]) -> bytes:
         """
-        Wait for keys and return what they send, b'' if none was pressed.
+        Wait for keys and return their bytes, b'' if none was pressed.
 
         :param timeout: s.
-        :param on_end: called if the terminal is gone.
+        :param on_end: called if the terminal is closed.
         """
         ready, _, _ = select.select([self._descriptor, self._woken], [], [], timeout)
         if self._woken in ready:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is shown of the lights; from the model to what rich draws. No ROS, no terminal."""
+"""The screen and the table, as rich draws them from the model. No ROS, no terminal."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ LEVELS = (('OK', 'green'), ('WARN', 'yellow'), ('ERROR', 'bold red'), ('STALE', 
 BAR_WIDTH = 10
 TREND_WIDTH = 12
 DETAIL_TREND_WIDTH = 60
-# Lines that the selected light's details need at least to be of use.
+# The least height of the details of the selected light, lines.
 DETAIL_HEIGHT = 4
 FOOTER = 'space on/off  +/- brightness  s strobe  r refresh  a all off  ? help  q quit'
 NO_LIGHTS = 'no lights in this ROS graph yet; is a bridge running, with this ROS_DOMAIN_ID?'
@@ -56,10 +56,10 @@ NO_LIGHTS = 'no lights in this ROS graph yet; is a bridge running, with this ROS
 @dataclass(frozen=True)
 class ViewState:
     """
-    What is to be shown.
+    The input of the screen.
 
-    :param selected: the name of the light that keys are for.
-    :param ascii_only: whether the terminal shows nothing else.
+    :param selected: the name of the selected light.
+    :param ascii_only: whether the terminal shows ASCII only.
     """
 
     lights: Sequence[Light]
@@ -75,8 +75,8 @@ class Column:
     A column of the table.
 
     :param width: characters.
-    :param rank: of the columns that there is no room for, the one with the highest goes first.
-    :param grows: whether it takes what room is left.
+    :param rank: the column with the highest rank is left out first if the screen is narrow.
+    :param grows: whether it takes the remaining width.
     """
 
     title: str
@@ -153,14 +153,14 @@ def columns_for(width: int, longest: int = 0) -> list[Column]:
 
 
 def table(view: ViewState, width: int, height: int) -> Table:
-    """Return a row for each light, around the selected one where there is no room for all."""
+    """Return a row for each light, or as many as fit around the selected one."""
     shown = columns_for(width, max((len(light.name) for light in view.lights), default=0))
     drawn = Table(box=None, expand=True, pad_edge=False, padding=(0, 1, 0, 0),
                   header_style='bold')
     if not any(column.grows for column in shown):
         shown[0] = replace(shown[0], grows=True)
     for column in shown:
-        # With a narrow terminal the name alone stays, in whatever room there is.
+        # A very narrow terminal shows the name only, cut off.
         drawn.add_column(column.title, no_wrap=True, overflow='ellipsis',
                          min_width=min(column.width, max(width - 8, 1)),
                          max_width=None if column.grows else column.width,
@@ -172,20 +172,20 @@ def table(view: ViewState, width: int, height: int) -> Table:
 
 
 def _row_style(light: Light, view: ViewState) -> str:
-    # What a light that is not there any more has said is not true any more.
+    # The values of a lost light are out of date.
     stale = light.state(view.now) in (State.LOST, State.SILENT, State.GONE)
     return ('dim ' if stale else '') + ('reverse' if light.name == view.selected else '')
 
 
 def window(lights: Sequence[Light], selected: str | None, height: int) -> Sequence[Light]:
-    """Return as many lights as there are lines, the selected one among them."""
+    """Return as many lights as there are lines, including the selected one."""
     at = next((at for at, light in enumerate(lights) if light.name == selected), 0)
     first = max(0, min(at - height // 2, len(lights) - height))
     return lights[first:first + height]
 
 
 def title(view: ViewState) -> Text:
-    """Return the first line: how many lights, and in what state."""
+    """Return the first line: the number of lights in each state."""
     states = [light.state(view.now) for light in view.lights]
     parts = [f'{states.count(state)} {state.value}' for state in State if state in states]
     plural = '' if len(states) == 1 else 's'
@@ -194,7 +194,7 @@ def title(view: ViewState) -> Text:
 
 
 def details(light: Light, view: ViewState) -> RenderableType:
-    """Return all that is known of a light."""
+    """Return the details of a light."""
     rows = Table.grid(padding=(0, 1), expand=True)
     rows.add_column(style='bold', no_wrap=True)
     rows.add_column(ratio=1)
@@ -238,7 +238,7 @@ def _facts(light: Light, view: ViewState) -> str:
 
 
 def help_text() -> Table:
-    """Return what each key does."""
+    """Return the meaning of each key."""
     drawn = Table(box=box.SIMPLE, show_header=False, pad_edge=False)
     drawn.add_column(style='bold')
     drawn.add_column()
@@ -248,7 +248,7 @@ def help_text() -> Table:
 
 
 def screen(view: ViewState, width: int, height: int) -> RenderableType:
-    """Return what fills a terminal."""
+    """Return the screen for a terminal of this size."""
     footer = Text(FOOTER, 'dim', no_wrap=True, overflow='ellipsis')
     if view.show_help:
         return _stacked(height, (help_text(), None), (Text('any key goes back', 'dim'), 1))
@@ -259,7 +259,7 @@ def screen(view: ViewState, width: int, height: int) -> RenderableType:
     room = height - 2
     if selected is None or room < DETAIL_HEIGHT + 3:
         return _stacked(height, (title(view), 1), (table(view, width, room), None), (footer, 1))
-    # Half of the screen is for the table at least, and all that the details do not need.
+    # The table gets half of the screen at least, and the lines that the details do not need.
     rows = min(rows, max(room - DETAIL_HEIGHT - 7, room // 2))
     heading = Text(f'\n{selected.name}', 'bold', no_wrap=True, overflow='ellipsis')
     return _stacked(height, (title(view), 1), (table(view, width, rows), rows),
@@ -267,9 +267,9 @@ def screen(view: ViewState, width: int, height: int) -> RenderableType:
 
 
 def _stacked(height: int, *parts: tuple[RenderableType, int | None]) -> RenderableType:
-    """Return parts of so many lines one above the other; None is what is left."""
+    """Return parts one above the other, each with its lines; None is the rest."""
     if height < 4:
-        # There is only room for what matters most, which never has a fixed height.
+        # Only the main part fits, the one without a fixed height.
         return next(part for part, lines in parts if lines is None)
     layout = Layout()
     layout.split_column(*(Layout(part, size=lines) if lines else Layout(part)
@@ -278,7 +278,7 @@ def _stacked(height: int, *parts: tuple[RenderableType, int | None]) -> Renderab
 
 
 def plain(view: ViewState) -> RenderableType:
-    """Return a table without colours, bars and bounds, to be printed once."""
+    """Return a table without colours, bars and limits, for a file or a pipe."""
     if not view.lights:
         return Text('no lights')
     drawn = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style='')
