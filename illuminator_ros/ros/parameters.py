@@ -38,12 +38,12 @@ from ..mavlink.signing_files import keyed, KeyFileError, TimestampStore
 from ..mavlink.url import parse_url, Url, UrlError
 
 _TYPES: dict[type, tuple[Parameter.Type, str]] = {
-    float: (Parameter.Type.DOUBLE, 'number'),
-    int: (Parameter.Type.INTEGER, 'integer'),
-    str: (Parameter.Type.STRING, 'string'),
-    bool: (Parameter.Type.BOOL, 'boolean'),
+    float: (Parameter.Type.DOUBLE, 'a number'),
+    int: (Parameter.Type.INTEGER, 'an integer'),
+    str: (Parameter.Type.STRING, 'a string'),
+    bool: (Parameter.Type.BOOL, 'a boolean'),
     list: (Parameter.Type.STRING_ARRAY,
-           "list of strings, as in -p names:=\"['1/244=belly']\""),
+           "a list of strings, as in -p names:=\"['1/244=belly']\""),
 }
 
 
@@ -130,7 +130,7 @@ class ParameterSpec:
             # For YAML, on the command line too, a bare off is a boolean.
             value = 'off'
         if type(value) is not wanted:
-            raise ParameterError(f'{self.name}: {value!r} is not a {_TYPES[wanted][1]}')
+            raise ParameterError(f'{self.name}: {value!r} is not {_TYPES[wanted][1]}')
         if self.choices and value not in self.choices:
             raise ParameterError(
                 f'{self.name}: {value!r} is not one of {", ".join(self.choices)}')

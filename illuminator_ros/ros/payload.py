@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.node import Node
 
@@ -55,7 +55,7 @@ class Host:
     check_diagnostics: Callable[[], None]
 
 
-class ServedPayload(Protocol):
+class ServedPayload:
     """A payload that is served. All but :meth:`close` is called in the link's thread."""
 
     def poll(self, now: float) -> None:
@@ -68,6 +68,7 @@ class ServedPayload(Protocol):
         :param report: called once for each device with what became of it, then or later.
         :return: by the keys of the devices, the line for one that is not reported in time.
         """
+        return {}
 
     def close(self) -> None:
         """Take back what others would go on to show, before the nodes are destroyed."""

@@ -201,7 +201,7 @@ class LightNode:
 
     def _heard(self) -> LightsHeard:
         client = self._client
-        some = itertools.islice((*client.lights, *client.left_alone), MAX_NAMED)
+        some = itertools.islice(sorted({*client.lights, *client.left_alone}), MAX_NAMED)
         return LightsHeard(len(client.lights), tuple(some), client.passed_over)
 
 

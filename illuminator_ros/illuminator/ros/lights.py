@@ -52,7 +52,7 @@ from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
 from ...ros.node import CommandTopic, RequestService
 from ...ros.parameters import misspelt
-from ...ros.payload import Host, RosPayload, ShutdownReport
+from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 # s without a light, after which the log says once why there is none.
 NO_LIGHT_DELAY = 5.0
@@ -60,7 +60,7 @@ NO_LIGHT_DELAY = 5.0
 NAMES_DELAY = 10.0
 
 
-class Lights:
+class Lights(ServedPayload):
     """
     Gives each light on the link a node. In the link's thread, but for :meth:`close`.
 
