@@ -16,15 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import itertools
-from typing import Any
 
-from .events import AnyLightEvent, ClientSnapshot, LightFound
-from .identity import Identity
+from .events import AnyLightEvent, ClientSnapshot, LightForgotten, LightFound
 from .light import Light, Settings
 from .model import Status
-from ..mavlink.command import CommandSender
+from ..mavlink.command import CommandSender, CommandStatus
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (
     Address,
@@ -32,14 +30,13 @@ from ..mavlink.messages import (
     Heartbeat,
     IlluminatorStatus,
     MavType,
+    Message,
 )
+from ..payload.discovery import Discovery
 from ..payload.events import Listeners
+from ..payload.identity import Identity
 
-# Lights that are kept apart; one more is passed over, so that memory is bounded.
-MAX_LIGHTS = 128
-# Lights outside the target that are remembered, to name them where the target is not there.
-MAX_LEFT_ALONE = 8
-# Lost lights that are looked for at once, so that a slow line is not filled.
+# Lost lights that are asked for a status at once, so that a slow line is not filled.
 MAX_ASKED = 8
 
 
@@ -48,107 +45,146 @@ class IlluminatorClient:
     Finds illuminators on a link by what they send, never by their ids.
 
     A component is one if its HEARTBEAT says so (MAV_TYPE_ILLUMINATOR) or if it sends
-    ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own.
+    ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own. It is announced once it
+    has sent a status or an answer, and forgotten after a minute of silence if no user has ever
+    commanded it.
 
     :param commands: the command sender of the component that carries this payload.
-    :param wanted: tells whether a light at an address is of interest; others are left alone.
+    :param wanted: tells whether a light at an address is of interest; others are ignored.
     :ivar events: the events of all lights.
-    :ivar lights: those found so far, by address, in the order in which they were found.
-    :ivar left_alone: the first lights that are not wanted, by address.
-    :ivar passed_over: whether there were more lights than :data:`MAX_LIGHTS`.
     """
 
     messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic)
 
     def __init__(
         self, commands: CommandSender, settings: Settings, *,
-        wanted: Callable[[Address], bool] = lambda source: True,
+        wanted: Callable[[Address], bool] = lambda address: True,
     ) -> None:
         self.commands = commands
         self.settings = settings
-        self.lights: dict[Address, Light] = {}
-        self.left_alone: dict[Address, None] = {}
-        self.passed_over = False
         self.events: Listeners[AnyLightEvent] = Listeners()
-        self._wanted = wanted
-        self._agenda: DeadlineQueue[Address] = DeadlineQueue()
+        self._discovery = Discovery(self._make, self._drop, wanted)
+        self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
+        # Lights whose deadline may differ from the one that was entered.
+        self._dirty: set[Address] = set()
+
+    @property
+    def lights(self) -> Mapping[Address, Light]:
+        """The lights that were announced, by address, in the order of their announcement."""
+        return self._discovery.devices
 
     @property
     def commanded_or_found(self) -> list[Light]:
         """Return every light that may be on, by address."""
         return [self.lights[address] for address in sorted(self.lights)]
 
+    @property
+    def ignored(self) -> tuple[Address, ...]:
+        """Return the first lights that are not wanted."""
+        return tuple(self._discovery.ignored)
+
+    @property
+    def limit_reached(self) -> bool:
+        """Return whether there are more lights than the client takes."""
+        return self._discovery.limit_reached
+
     def snapshot(self, now: float) -> ClientSnapshot:
-        """Return what is known of all lights, for any thread; call it in the link's thread."""
+        """Return all lights, for any thread; call it in the link's thread."""
         return ClientSnapshot(
             {address: light.snapshot(now) for address, light in self.lights.items()},
-            tuple(self.left_alone), self.passed_over)
+            self.ignored, self.limit_reached)
+
+    def _make(self, address: Address) -> Light:
+        def emit(event: AnyLightEvent) -> None:
+            if address in self.lights:
+                self.events.emit(event)
+
+        return Light(address, self.commands, self.settings, emit, self._changed)
+
+    def _changed(self, light: Light, now: float) -> None:
+        self._dirty.add(light.address)
+        if light.has_answered:
+            self._prove(light, now)
+
+    def _prove(self, light: Light, now: float) -> None:
+        if self._discovery.prove(light.address):
+            self.events.emit(LightFound(light.address))
+            for event in light.snapshot(now).events():
+                self.events.emit(event)
+
+    def _drop(self, light: Light) -> None:
+        """End all that concerns a light that the discovery has forgotten."""
+        self._dirty.discard(light.address)
+        self._deadlines.remove(light.address)
+        self.commands.end_all(light.heard_at, CommandStatus.CANCELLED, light.address)
+        self._dirty.discard(light.address)
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        # A returning light answers immediately; its own heartbeat may take a second.
-        for light in self.lights.values():
+        for light in self._discovery:
             light.link_opened(now)
+        # A returning light answers immediately; its own heartbeat may take a second.
         lost = (light for light in self.lights.values() if not light.connected)
         for light in itertools.islice(lost, MAX_ASKED):
             light.request_status(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        for light in self.lights.values():
-            light.link_closed(reason)
-        self._schedule_all()
+        for light in self._discovery:
+            light.link_closed(now, reason)
+            self._dirty.add(light.address)
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
-            light = self._light(source)
+            light = self._discovery.hear(source, now, proved=True)
             if light:
+                self._prove(light, now)
                 light.take_status(Status.from_message(message), now)
         elif isinstance(message, Heartbeat):
-            is_light = message.type == MavType.ILLUMINATOR
-            light = self._light(source) if is_light else self.lights.get(source)
+            light = (self._discovery.hear(source, now, proved=False)
+                     if message.type == MavType.ILLUMINATOR else self._discovery.get(source))
             if light:
                 light.heard(now)
         elif isinstance(message, ComponentInformationBasic):
-            light = self.lights.get(source)
+            light = self._discovery.get(source)
             if light:
-                light.take_information(Identity.from_message(message), now)
-        self._schedule(source)
+                self._prove(light, now)
+                light.take_identity(Identity.from_message(message), now)
+        else:
+            return
+        if light:
+            self._dirty.add(source)
 
-    def _schedule(self, source: Address) -> None:
-        """Enter when a light has something to do, after anything that may have changed it."""
-        light = self.lights.get(source)
-        if light is not None:
-            self._agenda.set(source, light.next_deadline())
-
-    def _schedule_all(self) -> None:
-        for source in self.lights:
-            self._schedule(source)
-
-    def _light(self, source: Address) -> Light | None:
-        """Return the light at an address, a new one if need be; None if it is passed over."""
-        light = self.lights.get(source)
-        if light is None and self._wanted(source):
-            if len(self.lights) >= MAX_LIGHTS:
-                self.passed_over = True
-                return None
-            light = self.lights[source] = Light(
-                source, self.commands, self.settings, self.events.emit,
-                lambda: self._schedule(source))
-            self.events.emit(LightFound(source))
-        elif light is None and len(self.left_alone) < MAX_LEFT_ALONE:
-            self.left_alone[source] = None
-        return light
+    def _enter_deadlines(self) -> None:
+        for address in self._dirty:
+            light = self._discovery.get(address)
+            if light is not None:
+                self._deadlines.set(address, min(
+                    light.next_deadline(), self._discovery.forgotten_at(light)))
+        self._dirty.clear()
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        # A command of any light may have ended.
-        self._schedule_all()
-        for source in self._agenda.due(now):
-            self.lights[source].poll(now)
-            self._schedule(source)
+        self._enter_deadlines()
+        for address in self._deadlines.due(now):
+            light = self._discovery.get(address)
+            if light is None:
+                continue
+            if now >= self._discovery.forgotten_at(light):
+                self._forget(light)
+            else:
+                light.poll(now)
+                self._dirty.add(address)
+
+    def _forget(self, light: Light) -> None:
+        was_announced = light.address in self.lights
+        self._discovery.forget(light.address)
+        self._drop(light)
+        if was_announced:
+            self.events.emit(LightForgotten(light.address))
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return self._agenda.next_deadline()
+        self._enter_deadlines()
+        return self._deadlines.next_deadline()

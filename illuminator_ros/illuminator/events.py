@@ -20,9 +20,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from .identity import Identity
 from .model import Configuration, FIELDS, Limits, Status
 from ..mavlink.messages import Address
+from ..payload.identity import Identity
 
 
 class Cause(Enum):

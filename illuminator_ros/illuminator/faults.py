@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from .error_flags import ErrorFlag
+from .model import ErrorFlag
 from ..payload.faults import Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.settings import integer

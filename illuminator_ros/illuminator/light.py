@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One light as the drone's side sees it: liveness, status and requests."""
+"""One light as the drone sees it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,8 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from .agreement import Agreement
-from .enable import Enable
-from .error_flags import ErrorFlag
+from .changes import Switch
+from .configuration import ConfigurationManager, IMPLIED_TIME, LATE_TIME, REPORT_INTERVAL
 from .events import (
     AnyLightEvent,
     LightConnected,
@@ -31,21 +30,25 @@ from .events import (
     LightLost,
     LightRestarted,
     LightSnapshot,
+    LightSwitched,
+    Origin,
+    SetpointFailed,
     StatusReceived,
 )
-from .identification import Identification
-from .identity import Identity
-from .model import Limits, Status
-from .operation import Done, Result
-from .operation_queue import OperationQueue
-from .refresh import Refresh
-from .sharing import Sharing
-from .uptime import compare_uptime, SendingTimes, Uptime
-from ..mavlink.command import Command, CommandResult, CommandSender, CommandStatus, format_seconds
+from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, Status
+from .status import RESTART_PROOF_TIME, StatusTracker
+from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd, STATUS_ID
+from ..payload.events import RateLimit
+from ..payload.identity import Identity, IdentityQuery
+from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
-# s without a status after which the light is asked for one, and between the askings.
+# s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
+# s; a light that reports progress for longer is not waited for.
+PROGRESS_LIMIT = 30.0
+# s; two commands one after the other, each with its tries, and the messages after them.
+REFRESH_LIMIT = 5.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Settings:
 
     :param heartbeat_timeout: s, > 0, without a heartbeat or status, after which a light is lost.
     :param status_interval: s, >= 0, between statuses to ask the light for; 0 leaves its own.
-    :param restore_configuration: whether a light that has restarted gets the agreed
+    :param restore_configuration: whether a light that has restarted gets its confirmed
         configuration again.
     """
 
@@ -69,136 +72,176 @@ class Light:
     One component that is an illuminator. No I/O; time is passed in.
 
     :param emit: takes the events.
-    :param changed: called when a request may have changed :meth:`next_deadline`.
+    :param changed: called with the light when :meth:`next_deadline` or ``has_answered`` may
+        differ, and the time.
     :ivar connected: whether it is heard.
     :ivar status: the newest status, None before the first.
+    :ivar lost_at: when it was lost, s; infinity while it is heard.
     :ivar restarts: how often it has restarted since it was found.
     :ivar instance: which light of the component it is; 0 is all of them, which is all that the
         commands can say until mavlink pull request 2490 is settled.
-    :ivar sharing: whether it is several lights in truth.
-    :ivar measures_temperature: whether it has ever sent a temperature other than 0.
+    :ivar was_commanded: whether a user has ever sent it a command.
+    :ivar has_answered: whether it has ever answered a command.
     """
 
     def __init__(
-        self, address: Address, sender: CommandSender, settings: Settings,
-        emit: Callable[[AnyLightEvent], None], changed: Callable[[], None], *,
+        self, address: Address, commands: CommandSender, settings: Settings,
+        emit: Callable[[AnyLightEvent], None], changed: Callable[[Light, float], None], *,
         instance: int = 0,
     ) -> None:
         self.address = address
-        self.emit = emit
-        self.changed = changed
         self.instance = instance
-        self.sender = sender
         self.settings = settings
         self.connected = False
         self.heard_at = -math.inf
+        self.lost_at = math.inf
         self.status: Status | None = None
         self.status_at = -math.inf
         self.restarts = 0
-        self.measures_temperature = False
+        self.was_commanded = False
+        self.has_answered = False
+        self._commands = commands
+        self._emit = emit
+        self._changed = changed
+        self._target = Target(
+            address, commands, self._command_ended, kind='light', status_id=STATUS_ID,
+            status_name='ILLUMINATOR_STATUS')
+        self._identity_query = IdentityQuery(self._target)
+        self._configuration = ConfigurationManager(
+            self._target, emit, instance=instance, restore=settings.restore_configuration)
+        self._switching: RequestQueue[Status] = RequestQueue(self._target)
+        self._tracker = StatusTracker()
+        self._measures_temperature = False
         self._link_failure = ''
-        self.identification = Identification(self)
-        self.agreement = Agreement(self)
-        self.sharing = Sharing()
-        self._switching = OperationQueue()
         self._status_due = math.inf
         self._asked_at = -math.inf
-        # Whether it was lost since the newest status.
-        self._was_away = False
-        self._sending_times = SendingTimes()
-        self._refreshes: list[Refresh] = []
+        self._was_lost = False
+        self._enabled: bool | None = None
+        self._last_switch: tuple[bool, float] = False, -math.inf
+        self._rate = RateLimit(REPORT_INTERVAL)
+        self._refreshes: list[_Refresh] = []
 
-    # What comes in
+    def _command_ended(self, result: CommandResult, now: float) -> None:
+        self.has_answered |= result.result is not None
+        self._changed(self, now)
+
+    # Reception
 
     def heard(self, now: float) -> None:
         """Take a heartbeat, or anything else that shows that the light is alive."""
         self.heard_at = now
         if not self.connected:
             self.connected = True
+            self.lost_at = math.inf
             self._set_up(now)
-            self.emit(LightConnected(self.address))
+            self._emit(LightConnected(self.address))
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
         self.heard(now)
-        was_away, self._was_away = self._was_away, False
-        self.sharing.take(
-            status, now, commanded=bool(self._switching.current or self.agreement.changing))
-        meaning = Uptime.RUNNING
-        # The uptimes of several lights say nothing about one another.
-        if self.status is not None and not self.sharing.recognised:
-            meaning = compare_uptime(
-                self.status.uptime_ms, status.uptime_ms, now - self.status_at, away=was_away)
-        if meaning is Uptime.LATE:
+        was_lost, self._was_lost = self._was_lost, False
+        report, restarted = self._tracker.take(
+            status, now, was_lost=was_lost,
+            commanded=bool(self._switching.current or self._configuration.is_changing))
+        if report is None:
+            self._was_lost = was_lost
+            if self._tracker.is_suspecting:
+                self._status_due = min(self._status_due, now + RESTART_PROOF_TIME)
             return
-        was_on = self.status.enabled if self.status else None
         self.status = status
         self.status_at = now
         self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
-        self.measures_temperature |= bool(status.temperature)
-        if meaning is Uptime.RESTARTED or (meaning is Uptime.NO_CLOCK and was_away):
-            self._restarted(was_on, now)
-        sent_by = (now if self.sharing.recognised
-                   else self._sending_times.sent_by(status.uptime_ms, now))
-        if self._switching.current:
-            self._switching.current.status(status, sent_by, now)
-        self.agreement.take_status(status, sent_by, now)
-        self._tell_refreshes(lambda refresh: refresh.status(now))
-        # Last, since it takes longest: whoever waits for the status has been answered by then.
-        self.emit(StatusReceived(
-            self.address, status, now, self.temperature, self.sharing.recognised))
+        self._measures_temperature |= bool(status.temperature)
+        if restarted:
+            self._restarted(now)
+        event = StatusReceived(
+            self.address, status, now, self.temperature, report.shared_address)
+        # A request that waits for the status is answered before the status is published.
+        current = self._switching.current
+        is_awaited = (self._configuration.is_confirming or bool(self._refreshes)
+                      or current is not None and current.is_confirming)
+        if not is_awaited:
+            self._emit(event)
+        self._take_report(report, now, restarted=restarted)
+        if is_awaited:
+            self._emit(event)
 
-    def take_information(self, identity: Identity, now: float) -> None:
+    def _take_report(self, report: Report[Status], now: float, *, restarted: bool) -> None:
+        if self._switching.current:
+            self._enabled = report.status.enabled
+            self._switching.take(report, now)
+        else:
+            self._switching.take(report, now)
+            self._follow_switch(report, now, restarted=restarted)
+        self._configuration.take(
+            report, now, can_follow=self._tracker.conflict.can_follow,
+            switched_at=self._last_switch[1])
+        for refresh in self._refreshes:
+            refresh.status = ''
+        self._check_refreshes(now)
+
+    def _follow_switch(self, report: Report[Status], now: float, *, restarted: bool) -> None:
+        """Report that the light was switched without a request under way."""
+        status = report.status
+        before, self._enabled = self._enabled, status.enabled
+        if (before is None or status.enabled is None or before == status.enabled or restarted
+                or report.shared_address or status.error_flags & DIMMING_FLAGS
+                or status.mode is Mode.EXTERNAL_SYNC):
+            return
+        on, at = self._last_switch
+        is_own = (on == status.enabled and now <= at + LATE_TIME
+                  or now <= self._configuration.sent_at + IMPLIED_TIME)
+        self._emit(LightSwitched(
+            self.address, status.enabled, Origin.REQUEST if is_own else Origin.OTHER_SENDER,
+            left_out=self._rate.take(now)))
+
+    def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
         self.heard(now)
-        self.identification.received(identity, now)
-        self.emit(LightIdentified(self.address, identity))
+        self._identity_query.take(identity, now)
+        self._emit(LightIdentified(self.address, identity))
 
-    def lose(self, reason: str) -> None:
+    def lose(self, reason: str, now: float) -> None:
         """Note that the light is not heard any more."""
         if self.connected:
             self.connected = False
-            self._was_away = True
+            self.lost_at = now
+            self._was_lost = True
             self._status_due = math.inf
-            self.sharing.clear()
-            self.emit(LightLost(self.address, reason))
-            self.agreement.lost(reason)
+            self._tracker.lost()
+            self._emit(LightLost(self.address, reason))
+            message = self.unreachable(now)
+            self._switching.cancel_waiting(message, now)
+            self._configuration.lost(message, now)
 
     def link_opened(self, now: float) -> None:
         """Note that the light can be reached."""
         self._link_failure = ''
 
-    def link_closed(self, reason: str) -> None:
+    def link_closed(self, now: float, reason: str) -> None:
         """Note that the light cannot be reached."""
         self._link_failure = f'the link is not open: {reason}'
-        self.lose('the link was lost')
+        self.lose('the link was lost', now)
 
-    def _restarted(self, was_on: bool | None, now: float) -> None:
+    def _restarted(self, now: float) -> None:
+        was_on, is_on = self._enabled, self.status.enabled if self.status else None
         self.restarts += 1
-        self._sending_times = SendingTimes()
-        self.emit(LightRestarted(
-            self.address, was_on, self.status.enabled if self.status else None))
+        self._emit(LightRestarted(self.address, was_on, is_on))
         self._set_up(now)
-        self.agreement.restarted(now)
+        self._configuration.restarted(now)
 
     def _set_up(self, now: float) -> None:
         """Ask for what the light does not send by itself, when it is found or has restarted."""
         interval = self.settings.status_interval
         if interval > 0:
-            self.sender.start(Command(
-                self.address, MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6)),
-                now, lambda outcome, now: None)
+            self._target.send(
+                MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6), now)
         self._status_due = now + STATUS_TIMEOUT
-        self.request_status(now)
-        self.identification.ask(now)
+        self._target.request_status(now)
+        self._identity_query.ask(now)
 
-    # What is known
-
-    @property
-    def sends_status(self) -> bool:
-        """Whether the light has ever sent a status."""
-        return self.status is not None
+    # Values
 
     @property
     def limits(self) -> Limits:
@@ -209,7 +252,7 @@ class Light:
     def temperature(self) -> float | None:
         """Return the temperature, degC; None where it is not measured, or the sensor fails."""
         status = self.status
-        if (status is None or not self.measures_temperature
+        if (status is None or not self._measures_temperature
                 or status.error_flags & ErrorFlag.THERMISTOR_FAILURE):
             return None
         return status.temperature
@@ -219,19 +262,54 @@ class Light:
         if self.connected:
             return ''
         # Without a link nothing can be heard: that is the reason, and silence its consequence.
-        reason = (self._link_failure
-                  or f'no heartbeat for {format_seconds(now - self.heard_at)}')
+        reason = self._link_failure or f'no heartbeat for {format_seconds(now - self.heard_at)}'
         return f'light {self.address} is lost: {reason}'
 
     def snapshot(self, now: float) -> LightSnapshot:
-        """Return what is known, for any thread."""
+        """Return the state, for any thread."""
         return LightSnapshot(
             self.address, self.connected, self.heard_at, self.status, self.status_at,
             self.settings.status_interval, self.restarts, self.temperature,
-            self.agreement.agreed, self.agreement.discrepancy, self.identification.identity,
-            self.identification.settled(now), self.sharing.recognised, self.unreachable(now))
+            self._configuration.confirmed, self._configuration.discrepancy,
+            self._identity_query.identity, self._identity_query.is_settled(now),
+            self._tracker.conflict.detected, self.unreachable(now))
 
     # Requests
+
+    def enable(self, on: bool, now: float, done: Done, *, detail: str = '') -> None:
+        """
+        Switch the light on or off; ``done`` is called once with the result.
+
+        Off overtakes: requests to switch on that are not accepted yet are cancelled.
+
+        :param detail: how it was asked for, which :class:`LightSwitched` repeats.
+        """
+        self.was_commanded = True
+        if unreachable := self.unreachable(now):
+            done(Result(False, unreachable), now)
+            return
+        change = Switch(on, self.instance)
+
+        def prepare(now: float) -> Change[Status]:
+            self._last_switch = on, now
+            return change
+
+        def finished(
+            result: Result, sent: Change[Status] | None, status: Status | None, now: float,
+        ) -> None:
+            if result.success:
+                self._enabled = on
+                self._emit(LightSwitched(self.address, on, Origin.REQUEST, detail))
+            done(result, now)
+
+        request = Request(
+            self._target, prepare, finished, now=now, limit=now + PROGRESS_LIMIT,
+            overtakes=not on)
+        if on:
+            self._switching.submit(request, now)
+        else:
+            self._switching.overtake(request, now)
+        self._changed(self, now)
 
     def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
         """
@@ -239,7 +317,12 @@ class Light:
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
-        self.agreement.configure(changes, now, done)
+        self.was_commanded = True
+        if unreachable := self.unreachable(now):
+            done(Result(False, unreachable), now)
+        else:
+            self._configuration.configure(changes, now, done)
+            self._changed(self, now)
 
     def set_brightness(self, brightness: float, now: float) -> None:
         """
@@ -247,7 +330,13 @@ class Light:
 
         :param brightness: %, checked.
         """
-        self.agreement.set_brightness(brightness, now)
+        self.was_commanded = True
+        if unreachable := self.unreachable(now):
+            self._configuration.lost(unreachable, now)
+            self._emit(SetpointFailed(self.address, unreachable))
+        else:
+            self._configuration.set_brightness(brightness, now)
+            self._changed(self, now)
 
     def set_desired(self, values: Mapping[str, Any], now: float) -> None:
         """
@@ -255,44 +344,46 @@ class Light:
 
         :param values: by name, checked but for the limits that the light reports.
         """
-        self.agreement.want(values, now)
-
-    def enable(self, on: bool, now: float, done: Done, *, detail: str = '') -> None:
-        """
-        Switch the light on or off; ``done`` is called once with the result.
-
-        :param detail: how it was asked for, which :class:`LightSwitched` repeats.
-        """
-        if unreachable := self.unreachable(now):
-            done(Result(False, unreachable), now)
-        else:
-            self._switching.submit(Enable(self, on, done, now=now), now)
-            self.changed()
+        self._configuration.set_desired(values, now)
+        self._changed(self, now)
 
     def cancel(self, now: float) -> None:
         """End all requests, so that the next one is sent at once: a node's last to its light."""
-        self._switching.cancel(now)
-        self.agreement.cancel(now)
-        self.sender.end_all(now, CommandStatus.CANCELLED, self.address)
-        self.changed()
+        self._switching.cancel('cancelled', now)
+        self._configuration.cancel(now)
+        self._commands.end_all(now, CommandStatus.CANCELLED, self.address)
+        self._changed(self, now)
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
         if unreachable := self.unreachable(now):
             done(Result(False, unreachable), now)
             return
-        self._refreshes.append(Refresh(self, now, done))
-        self.changed()
+        refresh = _Refresh(done, now)
+        self._refreshes.append(refresh)
 
-    def request_status(
-        self, now: float, done: Callable[[CommandResult, float], None] | None = None,
-    ) -> None:
-        """Ask for a status; without ``done`` only where no question is under way already."""
-        if done is None and self.sender.pending(self.address, MavCmd.REQUEST_MESSAGE):
-            return
-        self.sender.start(
-            Command(self.address, MavCmd.REQUEST_MESSAGE, (float(STATUS_ID),)), now,
-            done or (lambda outcome, now: None))
+        def identified(failure: str, now: float) -> None:
+            refresh.identity = failure
+            self._check_refreshes(now)
+
+        def answered(result: CommandResult, now: float) -> None:
+            if not result.accepted and refresh.status is None:
+                refresh.status = result.describe()
+                self._check_refreshes(now)
+
+        self._identity_query.ask(now, identified)
+        self._target.request_status(now, answered)
+        self._changed(self, now)
+
+    def _check_refreshes(self, now: float) -> None:
+        ended = [one for one in self._refreshes if one.is_complete]
+        self._refreshes = [one for one in self._refreshes if not one.is_complete]
+        for refresh in ended:
+            refresh.done(refresh.result(now), now)
+
+    def request_status(self, now: float) -> None:
+        """Ask for a status, where no such request is under way."""
+        self._target.request_status(now)
 
     # Time
 
@@ -300,37 +391,66 @@ class Light:
         """Do what is due."""
         # The sum and not the difference, which is what next_deadline() returns: floats differ.
         if self.connected and now >= self.heard_at + self.settings.heartbeat_timeout:
-            self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}')
+            self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
         if now >= self._question_due:
             self._asked_at, self._status_due = now, now + STATUS_TIMEOUT
-            self.request_status(now)
-        self.identification.poll(now)
+            self._target.request_status(now)
+        self._identity_query.poll(now)
         self._switching.poll(now)
-        self.agreement.poll(now)
-        self._tell_refreshes(lambda refresh: refresh.poll(now))
+        self._configuration.poll(now, connected=self.connected)
+        for refresh in self._refreshes:
+            if now >= refresh.until:
+                refresh.give_up()
+        self._check_refreshes(now)
 
     @property
     def _question_due(self) -> float:
         """
-        When the light is to be asked for a status.
+        When the light is asked for a status.
 
         It may have no heartbeat, and have been asked to send its status less often than that.
         """
         silent_since = max(self.heard_at, self._asked_at) if self.connected else math.inf
         # Its answer takes time, too.
-        patience = min(STATUS_TIMEOUT, self.settings.heartbeat_timeout / 1.2)
-        return min(self._status_due, silent_since + patience)
+        wait = min(STATUS_TIMEOUT, self.settings.heartbeat_timeout / 1.2)
+        return min(self._status_due, silent_since + wait)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        lost = (self.heard_at + self.settings.heartbeat_timeout if self.connected
-                else math.inf)
+        lost = self.heard_at + self.settings.heartbeat_timeout if self.connected else math.inf
         refresh = min((refresh.until for refresh in self._refreshes), default=math.inf)
-        return min(lost, self._question_due, refresh, self.identification.next_deadline(),
-                   self._switching.next_deadline(), self.agreement.next_deadline())
+        return min(lost, self._question_due, refresh, self._identity_query.next_deadline(),
+                   self._switching.next_deadline(),
+                   self._configuration.next_deadline(connected=self.connected))
 
-    def _tell_refreshes(self, tell: Callable[[Refresh], None]) -> None:
-        for refresh in list(self._refreshes):
-            tell(refresh)
-            if refresh.finished:
-                self._refreshes.remove(refresh)
+
+class _Refresh:
+    """
+    A request for COMPONENT_INFORMATION_BASIC and ILLUMINATOR_STATUS.
+
+    It is a success when a status has come: not every light has an identity.
+
+    :ivar identity: None while it is awaited, '' once it has come, else why not; so is ``status``.
+    """
+
+    def __init__(self, done: Done, now: float) -> None:
+        self.done = done
+        self.until = now + REFRESH_LIMIT
+        self.identity: str | None = None
+        self.status: str | None = None
+        self._started = now
+
+    @property
+    def is_complete(self) -> bool:
+        return self.identity is not None and self.status is not None
+
+    def give_up(self) -> None:
+        self.identity = 'nothing came' if self.identity is None else self.identity
+        self.status = 'nothing came' if self.status is None else self.status
+
+    def result(self, now: float) -> Result:
+        parts = [f'{name}: {failure or "received"}' for name, failure in (
+            ('ILLUMINATOR_STATUS', self.status),
+            ('COMPONENT_INFORMATION_BASIC', self.identity))]
+        return Result(
+            not self.status, f'{", ".join(parts)} ({format_seconds(now - self._started)})')

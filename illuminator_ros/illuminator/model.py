@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What an illuminator reports and is told: status, configuration, limits, and what they may be.
+The values of an illuminator: status, configuration and limits, their ranges and comparison.
 
 https://mavlink.io/en/services/illuminator.html
 """
@@ -22,7 +22,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import IntEnum
+from enum import IntEnum, IntFlag
+from functools import lru_cache
 import math
 import reprlib
 import struct
@@ -30,15 +31,38 @@ from typing import Any
 
 ABSOLUTE_ZERO_C = -273.15
 MAX_TEMPERATURE_C = 1000.0
-# s; whatever blinks once an hour is no strobe, and neither is what reports more.
+# Longest plausible strobe period, s; larger reports are invalid.
 MAX_STROBE_PERIOD = 3600.0
-# A light rounds what it is told to its own steps: that is no other configuration.
+# A light rounds values to its own steps, which does not make another configuration.
 # % for brightness and duty cycle; relative for the strobe period.
 PERCENT_STEP = 0.5
 PERIOD_STEP = 0.01
 FLOAT32_STEP = 1e-6
-# s; less is a 0 that was computed.
+# s; a shorter period is a computed 0.
 SHORTEST_PERIOD = 1e-6
+
+
+class ErrorFlag(IntFlag):
+    """ILLUMINATOR_ERROR_FLAGS."""
+
+    THERMAL_THROTTLING = 1
+    OVER_TEMPERATURE_SHUTDOWN = 2
+    THERMISTOR_FAILURE = 4
+
+
+# The flags under which a light is less bright than it was told to be.
+DIMMING_FLAGS = ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN
+# An int: since Python 3.11 the complement of an IntFlag has no unknown bits.
+KNOWN_FLAGS = int(DIMMING_FLAGS | ErrorFlag.THERMISTOR_FAILURE)
+
+
+def flag_names(flags: int) -> list[str]:
+    """Return readable names of error flags; unknown bits as one hexadecimal number."""
+    names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlag
+             if flag & flags and flag.name]
+    if unknown := flags & ~KNOWN_FLAGS:
+        names.append(f'unknown flags 0x{unknown:x}')
+    return names
 
 
 class Mode(IntEnum):
@@ -56,6 +80,7 @@ class Mode(IntEnum):
 
 # The modes that can be asked for; UNKNOWN can only be reported.
 MODES = {mode.label: mode for mode in Mode if mode is not Mode.UNKNOWN}
+_MODES = {int(mode): mode for mode in Mode}
 
 
 def float32(value: float) -> float:
@@ -92,6 +117,11 @@ class Limits:
         """Whether the light says anything of use."""
         low, high = self.min_strobe_period, self.max_strobe_period
         return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
+
+
+@lru_cache(maxsize=256)
+def _limits(low: float, high: float) -> Limits:
+    return Limits(low, high)
 
 
 class InvalidValue(ValueError):
@@ -199,14 +229,14 @@ def _check_period(period: float, limits: Limits | None) -> None:
             f'{shortest(limits.min_strobe_period):g} to {shortest(limits.max_strobe_period):g} s')
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Status:
     """
-    An ILLUMINATOR_STATUS. What is not believable in it is None and named in ``invalid``.
+    An ILLUMINATOR_STATUS. A field that is not plausible is None and named in ``invalid``.
 
     :param uptime_ms: ms since the light started, wrapping at 2**32.
     :param mode_bitmask: as sent; lights differ in what it means.
-    :param error_flags: as sent; see :class:`~.error_flags.ErrorFlag`.
+    :param error_flags: as sent; see :class:`ErrorFlag`.
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.
@@ -227,7 +257,16 @@ class Status:
 
     @classmethod
     def from_message(cls, message: Any) -> Status:
-        """Read a message. Any content is accepted: what is wrong is marked, not raised."""
+        """Read a message. Any content is accepted: a wrong field is marked, not raised."""
+        brightness, duty = message.brightness, message.strobe_duty_cycle
+        limits = _limits(message.min_strobe_period, message.max_strobe_period)
+        if (message.enable in (0, 1) and message.mode in _MODES and 0.0 <= brightness <= 100.0
+                and 0.0 <= duty <= 100.0 and 0.0 <= message.strobe_period <= MAX_STROBE_PERIOD
+                and ABSOLUTE_ZERO_C <= message.temp_c <= MAX_TEMPERATURE_C):
+            return cls(
+                message.uptime_ms, message.enable == 1, _MODES[message.mode],
+                message.mode_bitmask, message.error_status, brightness, message.strobe_period,
+                duty, message.temp_c, limits)
         invalid: list[str] = []
 
         def number(name: str, low: float, high: float) -> float | None:
@@ -250,7 +289,7 @@ class Status:
             number('brightness', 0, 100), number('strobe_period', 0, MAX_STROBE_PERIOD),
             number('strobe_duty_cycle', 0, 100),
             number('temp_c', ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C),
-            Limits(message.min_strobe_period, message.max_strobe_period), tuple(invalid))
+            limits, tuple(invalid))
 
     @property
     def complete(self) -> bool:
@@ -275,3 +314,27 @@ class Status:
 
 
 NOTHING = Configuration(Mode.UNKNOWN, 0.0, 0.0, 0.0)
+
+
+def unexpected_differences(
+    confirmed: Configuration, reported: Configuration, flags: int, *, step: bool,
+    external: bool = True,
+) -> list[str]:
+    """
+    Return the fields in which a light differs from its confirmed configuration without reason.
+
+    There are two good reasons: it dims itself because it is hot, and under external sync its
+    output follows another signal.
+
+    :param external: whether external sync is to count as a reason.
+    :param step: whether the light's own rounding is passed over.
+    """
+    names = confirmed.differences(reported, step=step)
+    # A light that does not say which mode it is in does not contradict.
+    if reported.mode is Mode.UNKNOWN or step and confirmed.mode is Mode.UNKNOWN:
+        names = [name for name in names if name != 'mode']
+    if flags & DIMMING_FLAGS and reported.brightness < confirmed.brightness:
+        names = [name for name in names if name != 'brightness']
+    if external and confirmed.mode is reported.mode is Mode.EXTERNAL_SYNC:
+        names = []
+    return names

@@ -25,9 +25,8 @@ from functools import partial
 import math
 from typing import Any
 
-from .error_flags import flag_names
 from .faults import FAULTS
-from .model import checked, Configuration, InvalidValue, Mode
+from .model import checked, Configuration, flag_names, InvalidValue, Mode
 from .simulated_lamp import SimulatedLamp
 from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
 from ..mavlink.messages import (

@@ -20,8 +20,7 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from .error_flags import ErrorFlag
-from .model import Configuration, Limits, Mode
+from .model import Configuration, ErrorFlag, Limits, Mode
 from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
 from .thermal import ThermalModel
 from ..mavlink.messages import (

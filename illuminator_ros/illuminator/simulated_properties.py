@@ -19,7 +19,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from .identity import Identity
 from .model import Limits, Mode
 from .thermal import ThermalProperties
 from ..mavlink.messages import (
@@ -31,6 +30,7 @@ from ..mavlink.messages import (
     MavType,
 )
 from ..payload.faults import Behaviour
+from ..payload.identity import Identity
 
 
 class Extension(NamedTuple):

@@ -20,13 +20,13 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from .identity import Identity
 from .model import Limits, Mode, MODES
 from .simulated import SimulatedIlluminator
 from .simulated_properties import Extension, IlluminatorProperties, Profile, PROFILES
 from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink.messages import Address
+from ..payload.identity import Identity
 from ..payload.settings import integer, number, one_of, Setting, text
 from ..payload.simulated import SimulatedType
 

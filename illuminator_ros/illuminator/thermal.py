@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from .error_flags import ErrorFlag
+from .model import ErrorFlag
 
 # degC; what an open thermistor reads like, and what receivers take for "not measured".
 BROKEN_READING = 0.0

@@ -146,11 +146,13 @@ class EarlierCommand(NamedTuple):
 
     :param result: its MAV_RESULT, None if there was no answer.
     :param ended_at: s, on the clock of the calls.
+    :param tries: how often it was sent.
     """
 
     command: Command
     result: int | None
     ended_at: float
+    tries: int = 1
 
 
 class CommandResult(NamedTuple):
@@ -535,7 +537,7 @@ class CommandSender:
             result_param2, self._earlier.get(command.key))
         answered = status is CommandStatus.ANSWERED
         self._earlier[command.key] = EarlierCommand(
-            command, request.result if answered else None, now)
+            command, request.result if answered else None, now, request.tries)
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering.add(command.target)

@@ -46,6 +46,11 @@ class DeadlineQueue(Generic[K]):
         if deadline < self._entered.get(key, math.inf):
             self._enter(key, deadline)
 
+    def remove(self, key: K) -> None:
+        """Forget a key, if it is known."""
+        self._deadlines.pop(key, None)
+        self._entered.pop(key, None)
+
     def _enter(self, key: K, deadline: float) -> None:
         self._entered[key] = deadline
         heapq.heappush(self._heap, (deadline, next(self._order), key))
@@ -54,7 +59,7 @@ class DeadlineQueue(Generic[K]):
         """Return the earliest deadline, infinity if there is none."""
         while self._heap:
             entered, _, key = self._heap[0]
-            deadline = self._deadlines[key]
+            deadline = self._deadlines.get(key, math.inf)
             if entered == deadline:
                 return deadline
             heapq.heappop(self._heap)

@@ -18,7 +18,6 @@ import json
 from xml.etree import ElementTree
 
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
-from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.report import (
@@ -29,6 +28,7 @@ from illuminator_ros.payload.checks.report import (
     Report,
     Table,
 )
+from illuminator_ros.payload.identity import Identity
 import pytest
 from support.conformance_run import Run
 

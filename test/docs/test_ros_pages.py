@@ -23,7 +23,7 @@ from bench.subjects import SUBJECTS
 from illuminator_ros.cli.bridge import usage
 from illuminator_ros.cli.monitor import graph, key_bindings, model, requests
 from illuminator_ros.cli.monitor.run import parser
-from illuminator_ros.illuminator.error_flags import ErrorFlag
+from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.ros import beam
 from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS

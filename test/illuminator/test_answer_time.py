@@ -93,7 +93,7 @@ LINES = {
 def test_each_set_is_answered_once_and_in_time(become, line, command_timeout):
     fake = FakeLight()
     pair = Pair(fake, there=line, command_timeout=command_timeout, seed=become.__name__)
-    pair.run_until(lambda: pair.controller.lights and pair.light.agreement.agreed)
+    pair.run_until(lambda: pair.controller.lights and pair.snapshot.configuration)
     draw = random.Random(become.__name__)
     become(fake)
     answers = []

@@ -43,14 +43,14 @@ def test_the_next_request_does_not_wait_for_a_light_that_takes_its_time(fake, fa
 
     assert faked.enable(False).success
     assert faked.now - started < 0.1
-    assert [command.param1 for command in faked.commands(ON_OFF)] == [1.0, 0.0]
+    assert [command.param1 for command in faked.commands(ON_OFF)] == [1.0, 0.0, 0.0]
 
 
 def test_nothing_that_was_still_to_be_sent_is_sent(fake, faked):
     fake.results[CONFIGURE] = None
     faked.ask_configure(brightness=50)
-    faked.light.agreement.set_brightness(60.0, faked.now)
-    faked.light.agreement.want({'strobe_period': 1.0}, faked.now)
+    faked.light.set_brightness(60.0, faked.now)
+    faked.light.set_desired({'strobe_period': 1.0}, faked.now)
     faked.run(0.01)
     sent = len(faked.commands(CONFIGURE))
 

@@ -16,8 +16,7 @@
 
 from dataclasses import replace
 
-from illuminator_ros.illuminator.comparison import unexplained
-from illuminator_ros.illuminator.model import Configuration, float32, Mode
+from illuminator_ros.illuminator.model import Configuration, float32, Mode, unexpected_differences
 import pytest
 
 BASE = Configuration(Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)
@@ -82,28 +81,29 @@ def test_a_description_has_units_and_can_be_partial():
     (THROTTLED, 75.0, ['brightness']),
 ])
 def test_a_hot_light_may_be_dimmer_but_not_brighter(flags, brightness, names, step):
-    assert unexplained(BASE, replace(BASE, brightness=brightness), flags, step=step) == names
+    reported = replace(BASE, brightness=brightness)
+    assert unexpected_differences(BASE, reported, flags, step=step) == names
 
 
 def test_heat_explains_nothing_but_brightness():
     shown = replace(BASE, brightness=25.0, strobe_period=2.0)
-    assert unexplained(BASE, shown, THROTTLED, step=True) == ['strobe_period']
+    assert unexpected_differences(BASE, shown, THROTTLED, step=True) == ['strobe_period']
 
 
 @pytest.mark.parametrize('step', [True, False])
 def test_a_light_that_does_not_say_its_mode_does_not_contradict(step):
-    assert unexplained(BASE, UNKNOWN, 0, step=step) == []
+    assert unexpected_differences(BASE, UNKNOWN, 0, step=step) == []
 
 
 def test_a_mode_that_was_unknown_is_news_but_no_contradiction():
-    assert unexplained(UNKNOWN, BASE, 0, step=True) == []
-    assert unexplained(UNKNOWN, BASE, 0, step=False) == ['mode']
+    assert unexpected_differences(UNKNOWN, BASE, 0, step=True) == []
+    assert unexpected_differences(UNKNOWN, BASE, 0, step=False) == ['mode']
 
 
 def test_under_external_sync_the_output_may_be_anything():
     shown = replace(SYNCED, brightness=3.0, strobe_period=0.2, strobe_duty_cycle=77.0)
-    assert unexplained(SYNCED, shown, 0, step=True) == []
+    assert unexpected_differences(SYNCED, shown, 0, step=True) == []
 
 
 def test_leaving_external_sync_is_a_difference():
-    assert unexplained(SYNCED, BASE, 0, step=True) == ['mode']
+    assert unexpected_differences(SYNCED, BASE, 0, step=True) == ['mode']

@@ -34,7 +34,7 @@ def sent(pair):
 def test_one_value_is_sent_with_the_other_three_as_they_are(pair):
     assert pair.configure(brightness=50).success
     assert pair.configure(strobe_period=0.5).success
-    assert sent(pair) == [(1, 50, 0, 0), (1, 50, 0.5, 0)]
+    assert sent(pair) == [(1, 50, 0, 0), (1, 50, 0.5, 50)]
 
 
 def test_several_values_are_one_command(pair):
@@ -42,18 +42,18 @@ def test_several_values_are_one_command(pair):
                             strobe_duty_cycle=30)
     assert result.success
     assert sent(pair) == [(2, 10, 2, 30)]
-    assert astuple(pair.light.agreement.agreed) == (Mode.EXTERNAL_SYNC, 10.0, 2.0, 30.0)
+    assert astuple(pair.snapshot.configuration) == (Mode.EXTERNAL_SYNC, 10.0, 2.0, 30.0)
 
 
 def test_success_says_what_is_new_and_how_it_is_known(pair):
-    message = pair.configure(brightness=50, strobe_period=0.5).message
-    assert message.startswith('brightness 50 %, strobe_period 0.5 s, confirmed by '
+    message = pair.configure(brightness=50, strobe_duty_cycle=5).message
+    assert message.startswith('brightness 50 %, strobe_duty_cycle 5 %, confirmed by '
                               'ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED (1 try, ')
 
 
 def test_what_is_agreed_is_told_once_before_the_answer(pair):
     told = []
-    pair.light.agreement.configure(
+    pair.light.configure(
         {'brightness': 50}, pair.now, lambda result, now: told.append(pair.recorder.changes[-1]))
     pair.run(5.0)
     assert told == [(Cause.REQUEST, {'brightness': 50.0})]
@@ -74,26 +74,26 @@ def test_a_wrong_value_fails_at_once_and_nothing_is_sent(pair, changes):
 @pytest.mark.parametrize('result', [
     MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, MavResult.CANCELLED, 77])
 def test_a_refusal_keeps_the_agreed_configuration(fake, faked, result):
-    agreed = faked.light.agreement.agreed
+    agreed = faked.snapshot.configuration
     fake.results[CONFIGURE] = result
     answer = faked.configure(brightness=50)
     assert answer.message.startswith('refused: MAV_RESULT')
-    assert faked.light.agreement.agreed is agreed
+    assert faked.snapshot.configuration is agreed
 
 
 def test_no_acknowledgement_keeps_the_agreed_configuration(fake, faked):
-    agreed = faked.light.agreement.agreed
+    agreed = faked.snapshot.configuration
     fake.results[CONFIGURE] = None
     assert faked.configure(brightness=50).message.startswith('no acknowledgement (')
-    assert faked.light.agreement.agreed is agreed
+    assert faked.snapshot.configuration is agreed
 
 
 def test_a_contradiction_is_a_failure_and_a_discrepancy(fake, faked):
     fake.applies = False
-    result = faked.configure(brightness=50, strobe_period=1)
+    result = faked.configure(brightness=50, strobe_duty_cycle=1)
     assert result.contradicted
-    assert 'but ILLUMINATOR_STATUS shows brightness 100 %, strobe_period 0 s (' in result.message
-    assert faked.light.agreement.discrepancy == result.message
+    assert 'STATUS shows brightness 100 %, strobe_duty_cycle 0 % (' in result.message
+    assert faked.snapshot.discrepancy == result.message
 
 
 def test_a_discrepancy_ends_with_the_next_success(fake, faked):
@@ -101,16 +101,16 @@ def test_a_discrepancy_ends_with_the_next_success(fake, faked):
     faked.configure(brightness=50)
     fake.applies = True
     assert faked.configure(brightness=40).success
-    assert faked.light.agreement.discrepancy == ''
+    assert faked.snapshot.discrepancy == ''
 
 
 def test_a_discrepancy_ends_when_the_light_shows_it_after_all(fake, faked):
     fake.apply_after = 2.0
     assert not faked.configure(brightness=50).success
-    assert faked.light.agreement.discrepancy
+    assert faked.snapshot.discrepancy
     faked.run(3.0)
-    assert faked.light.agreement.discrepancy == ''
-    assert faked.light.agreement.agreed.brightness == 50.0
+    assert faked.snapshot.discrepancy == ''
+    assert faked.snapshot.configuration.brightness == 50.0
 
 
 def test_an_unbelievable_part_of_a_status_neither_shows_nor_contradicts(fake, faked):
@@ -125,7 +125,7 @@ def test_a_light_that_rounds_to_its_steps_agrees_to_what_it_shows(fake, faked):
     fake.applies = False
     fake.fields['brightness'] = 50.4
     assert faked.configure(brightness=50).success
-    assert faked.light.agreement.agreed.brightness == 50.4
+    assert faked.snapshot.configuration.brightness == 50.4
 
 
 def test_a_hot_light_agrees_to_what_it_was_asked_for(fake, faked):
@@ -135,7 +135,7 @@ def test_a_hot_light_agrees_to_what_it_was_asked_for(fake, faked):
     assert result.success
     assert result.message.startswith(
         'brightness 80 %, confirmed by ILLUMINATOR_STATUS, but thermal throttling: ')
-    assert faked.light.agreement.agreed.brightness == 80.0
+    assert faked.snapshot.configuration.brightness == 80.0
 
 
 def test_a_light_under_external_sync_need_not_show_the_rest(fake, faked):
@@ -144,7 +144,7 @@ def test_a_light_under_external_sync_need_not_show_the_rest(fake, faked):
     result = faked.configure(mode='external_sync', brightness=80)
     assert result.success
     assert 'accepted (ILLUMINATOR_STATUS shows brightness 3 %)' in result.message
-    assert faked.light.agreement.agreed.brightness == 80.0
+    assert faked.snapshot.configuration.brightness == 80.0
 
 
 def test_a_late_status_from_before_the_command_confirms_nothing(fake, faked):
@@ -179,7 +179,7 @@ class TestBeforeTheFirstStatus:
                                  strobe_duty_cycle=0)
         assert result.success
         assert 'accepted, not confirmed' in result.message
-        assert faked.light.agreement.agreed == Configuration(
+        assert faked.snapshot.configuration == Configuration(
             Mode.INTERNAL_CONTROL, 50.0, 0.0, 0.0)
 
     def test_after_that_a_part_will_do(self, faked):

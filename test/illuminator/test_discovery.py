@@ -12,180 +12,145 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which components on a link are taken for lights."""
+"""Discovery and liveness of lights."""
 
-import math
+from __future__ import annotations
 
-from illuminator_ros.illuminator.client import MAX_LIGHTS
-from illuminator_ros.illuminator.events import LightFound
+from illuminator_ros.illuminator.events import (
+    AnyLightEvent,
+    LightConnected,
+    LightForgotten,
+    LightFound,
+    StatusReceived,
+)
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.component import CONFLICT_MEMORY
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
     ComponentInformationBasic,
-    Heartbeat,
     heartbeat,
-    IlluminatorStatus,
+    MavCmd,
     MavType,
+    Message,
 )
+from illuminator_ros.payload.discovery import FORGET_AFTER, MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.client import Client
-from support.fake_light import FakeLight, status_message
+from support.fake_light import FakeLight, LIGHT, status_message
 
 ILLUMINATOR = heartbeat(MavType.ILLUMINATOR)
-SUBMARINE = 12
+ANSWER = CommandAck(MavCmd.REQUEST_MESSAGE, 0, 0, 0, *BRIDGE)
+FORGED = [Address(system, component) for system in (2, 3) for component in range(1, 200)]
+
+
+class Heard(Client):
+    """A client with an open link, which keeps the events."""
+
+    def __init__(self, **options: object) -> None:
+        super().__init__(BRIDGE, Settings(), **options)
+        self.heard: list[AnyLightEvent] = []
+        self.events.subscribe(self.heard.append)
+        self.link_opened(0.0)
+
+    def run(self, until: float) -> None:
+        """Let time pass without a peer."""
+        while (due := self.next_deadline()) <= until:
+            self.poll(due)
 
 
 @pytest.fixture
-def controller() -> Client:
-    controller = Client(BRIDGE, Settings())
-    controller.link_opened(0.0)
-    return controller
-
-
-def test_our_heartbeat_goes_out_before_anything_else():
-    pair = Pair().settle()
-    kinds = [message.id for _, message in pair.near.sent]
-    assert kinds[0] == Heartbeat.id
-    assert len(set(kinds)) > 1
-
-
-def test_our_heartbeat_says_what_we_are(controller):
-    (source, message), = controller.outgoing
-    assert source == BRIDGE
-    assert (message.type, message.autopilot) == (MavType.ONBOARD_CONTROLLER, 8)
-
-
-def test_our_heartbeat_comes_once_a_second(controller):
-    for tenth in range(50):
-        controller.poll(tenth / 10)
-    assert len(controller.outgoing) == 5
-
-
-def test_nothing_is_sent_before_the_link_is_open():
-    controller = Client(BRIDGE, Settings())
-    controller.poll(0.0)
-    assert not controller.outgoing
-
-
-def test_nothing_is_sent_after_the_link_was_closed(controller):
-    controller.receive(Address(1, 243), ILLUMINATOR, 0.0)
-    controller.outgoing.clear()
-    controller.link_closed(0.1, 'lost')
-    for second in range(10):
-        controller.poll(float(second))
-    assert not controller.outgoing
-    assert controller.next_deadline() == math.inf
-
-
-def test_whoever_comes_within_hearing_gets_a_heartbeat_at_once(controller):
-    controller.outgoing.clear()
-    controller.link_opened(0.1)
-    assert [type(message) for _, message in controller.outgoing] == [Heartbeat]
+def client() -> Heard:
+    return Heard()
 
 
 @pytest.mark.parametrize('source', [
-    Address(1, 243), Address(1, 1), Address(255, 0), Address(7, 190), Address(1, 255)])
-@pytest.mark.parametrize('message', [ILLUMINATOR, status_message()], ids=['heartbeat', 'status'])
-def test_a_light_is_known_by_what_it_sends_from_whatever_address(controller, source, message):
-    controller.receive(source, message, 0.0)
-    assert list(controller.lights) == [source]
-    assert controller.lights[source].connected
+    LIGHT, Address(1, 1), Address(255, 0), Address(7, 190), Address(1, 255)])
+@pytest.mark.parametrize('messages', [[ILLUMINATOR, ANSWER], [status_message()]],
+                         ids=['heartbeat and answer', 'status'])
+def test_a_light_is_found_by_its_messages_at_any_address(
+    client: Heard, source: Address, messages: list[Message],
+) -> None:
+    for message in messages:
+        client.receive(source, message, 0.0)
+    assert list(client.lights) == [source]
+    assert client.lights[source].connected
+    assert client.heard[:2] == [LightFound(source), LightConnected(source)]
 
 
 @pytest.mark.parametrize('message', [
-    heartbeat(MavType.ONBOARD_CONTROLLER), heartbeat(SUBMARINE), heartbeat(0),
-    CommandAck(405, 0, 0, 0, 1, 194),
+    ILLUMINATOR, heartbeat(MavType.ONBOARD_CONTROLLER), heartbeat(0), ANSWER,
     ComponentInformationBasic(0, 0, 0, b'maker', b'torch', b'1', b'1', b'n'),
-], ids=lambda message: message.name)
-def test_the_id_of_an_illuminator_proves_nothing(controller, message):
-    controller.receive(Address(1, 243), message, 0.0)
-    assert controller.lights == {}
+], ids=lambda message: type(message).__name__)
+def test_one_message_that_any_component_may_send_announces_no_light(
+    client: Heard, message: Message,
+) -> None:
+    client.receive(LIGHT, message, 0.0)
+    assert client.lights == {}
+    assert client.heard == []
 
 
-def test_each_light_is_announced_once_in_the_order_of_appearance():
-    found = []
-    controller = Client(BRIDGE, Settings())
-    controller.events.subscribe(
-        lambda event: found.append(event.address) if isinstance(event, LightFound) else None)
-    for source in (Address(1, 244), Address(1, 243), Address(1, 244)):
-        controller.receive(source, ILLUMINATOR, 0.0)
-        controller.receive(source, status_message(), 0.0)
-    assert found == [Address(1, 244), Address(1, 243)]
+def test_lights_are_announced_once_in_the_order_of_their_statuses(client: Heard) -> None:
+    order = [Address(1, 244), Address(1, 243), Address(1, 244)]
+    for source in order:
+        client.receive(source, status_message(), 0.0)
+    assert [event.address for event in client.heard if isinstance(event, LightFound)] == order[:2]
+    assert isinstance(client.heard[2], StatusReceived)
 
 
-def test_further_lights_are_passed_over_when_there_are_too_many(controller):
-    sources = [Address(system, component) for system in (2, 3) for component in range(256)]
-    for source in sources[:MAX_LIGHTS]:
-        controller.receive(source, ILLUMINATOR, 0.0)
-    assert not controller.passed_over
-    for source in sources[MAX_LIGHTS:]:
-        controller.receive(source, ILLUMINATOR, 0.0)
-        controller.receive(source, status_message(), 0.0)
-    assert controller.passed_over
-    assert list(controller.lights) == sources[:MAX_LIGHTS]
+def test_forged_heartbeats_do_not_keep_a_real_light_out() -> None:
+    pair = Pair(FakeLight(stream=0.0))
+    for source in FORGED:
+        pair.controller.receive(source, ILLUMINATOR, pair.now)
+    pair.run(4.0)
+    assert list(pair.controller.lights) == [LIGHT]
+    assert pair.enable(True).success
 
 
-def test_a_light_that_is_not_wanted_is_left_alone():
-    controller = Client(BRIDGE, Settings(), wanted=lambda source: source.system == 2)
+def test_candidates_are_bounded_and_cost_few_commands(client: Heard) -> None:
+    for source in FORGED:
+        client.receive(source, ILLUMINATOR, 0.0)
+    targets = {message.target_component for _, message in client.outgoing
+               if hasattr(message, 'target_component')}
+    assert len(targets) <= MAX_CANDIDATES
+
+
+def test_further_lights_are_ignored_when_there_are_too_many(client: Heard) -> None:
+    for source in FORGED[:MAX_DEVICES]:
+        client.receive(source, status_message(), 0.0)
+    assert not client.limit_reached
+    client.receive(LIGHT, status_message(), 0.0)
+    assert client.limit_reached
+    assert list(client.lights) == FORGED[:MAX_DEVICES]
+
+
+def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
+    client: Heard,
+) -> None:
+    for source in FORGED[:MAX_DEVICES]:
+        client.receive(source, status_message(), 0.0)
+    client.lights[FORGED[0]].enable(True, 0.0, lambda result, now: None)
+    client.run(FORGET_AFTER + 10.0)
+    client.receive(LIGHT, status_message(), FORGET_AFTER + 10.0)
+    assert list(client.lights) == [FORGED[0], LIGHT]
+    forgotten = [event.address for event in client.heard if isinstance(event, LightForgotten)]
+    assert sorted(forgotten) == FORGED[1:MAX_DEVICES]
+    assert [light.address for light in client.commanded_or_found] == [LIGHT, FORGED[0]]
+
+
+def test_a_light_that_is_not_wanted_is_named_and_not_commanded() -> None:
+    client = Heard(wanted=lambda source: source.system == 2)
     for system in (1, 2):
-        controller.receive(Address(system, 243), ILLUMINATOR, 0.0)
-        controller.receive(Address(system, 243), status_message(), 0.0)
-    assert list(controller.lights) == [Address(2, 243)]
-    assert {message.target_system for _, message in controller.outgoing} == {2}
+        client.receive(Address(system, 243), status_message(), 0.0)
+    assert list(client.lights) == [Address(2, 243)]
+    assert client.ignored == (Address(1, 243),)
+    assert {message.target_system for _, message in client.outgoing
+            if hasattr(message, 'target_system')} == {2}
 
 
-def test_a_heartbeat_from_our_own_address_is_a_clash_for_a_while(controller):
-    assert not controller.address_conflict(0.0)
-    controller.receive(BRIDGE, heartbeat(SUBMARINE), 5.0)
-    assert controller.address_conflict(5.0)
-    assert controller.address_conflict(5.0 + CONFLICT_MEMORY - 0.1)
-    assert not controller.address_conflict(5.0 + CONFLICT_MEMORY)
-
-
-@pytest.mark.parametrize('message', [ILLUMINATOR, status_message()], ids=['heartbeat', 'status'])
-def test_nobody_at_our_own_address_is_a_light(controller, message):
-    controller.receive(BRIDGE, message, 0.0)
-    assert controller.lights == {}
-
-
-def test_several_lights_are_known_apart():
-    sources = [Address(1, 243), Address(1, 244), Address(2, 243)]
-    pair = Pair([IlluminatorProperties(address=source) for source in sources]).settle()
-    light = pair.controller.lights[sources[1]]
-    answer = pair.ask_enable(True, light)
-    assert pair.wait_for(answer).success
-    pair.run(2.0)
-    states = {source: light.status.enabled for source, light in pair.controller.lights.items()}
-    assert states == {sources[0]: False, sources[1]: True, sources[2]: False}
-
-
-def test_a_light_without_a_heartbeat_of_its_own_lives_by_its_statuses():
-    pair = Pair(FakeLight(Address(1, 1), heartbeat_type=None)).settle()
-    pair.run(60.0)
-    assert pair.recorder.events == ['connected']
-
-
-def test_a_light_found_by_its_status_lives_by_the_heartbeat_of_its_autopilot():
-    fake = FakeLight(Address(1, 1), heartbeat_type=SUBMARINE)
-    pair = Pair(fake).settle()
-    fake.stream = 0.0
-    fake.answers.clear()
-    pair.run(60.0)
-    assert pair.recorder.events == ['connected']
-
-
-def test_the_statuses_that_a_light_sends_are_all_passed_on(pair):
-    before = len(pair.recorder.statuses)
-    pair.run(10.0)
-    received = [message for _, _, message in pair.near.received
-                if isinstance(message, IlluminatorStatus)]
-    assert len(pair.recorder.statuses) == len(received) >= before + 10
-
-
-def test_the_address_of_everybody_is_nobody():
-    pair = Pair(FakeLight(Address(0, 7))).settle()
-    assert not pair.controller.lights
+def test_nothing_is_sent_after_the_link_was_closed(client: Heard) -> None:
+    client.receive(LIGHT, status_message(), 0.0)
+    client.outgoing.clear()
+    client.link_closed(0.1, 'lost')
+    client.run(10.0)
+    assert not client.outgoing

@@ -16,8 +16,7 @@
 
 import re
 
-from illuminator_ros.illuminator.enable import PROGRESS_LIMIT
-from illuminator_ros.illuminator.operation import CONFIRMATION_TIMEOUT
+from illuminator_ros.illuminator.light import PROGRESS_LIMIT
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -28,6 +27,7 @@ from illuminator_ros.mavlink.messages import (
     MavResult,
     result_name,
 )
+from illuminator_ros.payload.request import CONFIRMATION_TIMEOUT
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight

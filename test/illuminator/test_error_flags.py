@@ -14,7 +14,7 @@
 
 """ILLUMINATOR_ERROR_FLAGS in words."""
 
-from illuminator_ros.illuminator.error_flags import flag_names
+from illuminator_ros.illuminator.model import flag_names
 import pytest
 
 

@@ -39,15 +39,15 @@ def test_the_first_status_is_what_is_agreed(faked):
 def test_nothing_is_agreed_before_the_first_status():
     fake = FakeLight(stream=0.0)
     fake.answers.clear()
-    assert Pair(fake).settle().light.agreement.agreed is None
+    assert Pair(fake).settle().snapshot.configuration is None
 
 
 def test_a_first_status_that_cannot_be_believed_agrees_to_nothing():
     pair = Pair(FakeLight(brightness=float('nan'))).settle()
-    assert pair.light.agreement.agreed is None
+    assert pair.snapshot.configuration is None
     pair.other.fields['brightness'] = 10.0
     pair.run(1.0)
-    assert pair.light.agreement.agreed.brightness == 10.0
+    assert pair.snapshot.configuration.brightness == 10.0
 
 
 @pytest.mark.parametrize('change', [
@@ -80,7 +80,7 @@ def test_float32_rounding_is_no_change(faked, value):
     faked.configure(brightness=value, strobe_duty_cycle=value)
     faked.run(10.0)
     assert [cause for cause, _ in faked.recorder.changes] == [Cause.FIRST_STATUS, Cause.REQUEST]
-    assert faked.light.agreement.agreed.brightness == value
+    assert faked.snapshot.configuration.brightness == value
 
 
 def test_float32_is_compared_with_all_the_precision_that_it_has(fake, faked):
@@ -104,7 +104,7 @@ def test_thermal_dimming_is_no_change_neither_on_its_way_down_nor_up(
     fake.fields |= {'error_status': 0, 'brightness': 80.0}
     faked.run(10.0)
     assert len(faked.recorder.changes) == 1
-    assert faked.light.agreement.agreed.brightness == 80.0
+    assert faked.snapshot.configuration.brightness == 80.0
 
 
 def test_the_simulated_light_getting_hot_is_no_change(pair):
@@ -151,7 +151,7 @@ def test_what_takes_effect_after_the_answer_was_lost_is_followed(fake, faked):
     assert not faked.configure(brightness=30).success
     fake.fields['brightness'] = 30.0
     faked.run(2.0)
-    assert faked.recorder.changes[-1] == (Cause.LIGHT, {'brightness': 30.0})
+    assert faked.recorder.changes[-1] == (Cause.REQUEST, {'brightness': 30.0})
 
 
 def test_a_change_from_outside_during_a_command_is_followed_after_it(fake, faked):
@@ -167,5 +167,5 @@ def test_small_steps_add_up_to_a_change_that_is_told(fake, faked):
     for _ in range(5):
         fake.fields['brightness'] -= 0.4
         faked.run(1.0)
-    assert faked.light.agreement.agreed.brightness == 78.0
+    assert faked.snapshot.configuration.brightness == 78.0
     assert [cause for cause, _ in faked.recorder.changes].count(Cause.LIGHT) == 2

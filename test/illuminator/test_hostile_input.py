@@ -24,9 +24,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.illuminator.client import MAX_LIGHTS
-from illuminator_ros.illuminator.operation import Result
-from illuminator_ros.illuminator.operation_queue import MAX_WAITING
+from illuminator_ros.illuminator.model import checked
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -42,6 +40,8 @@ from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+from illuminator_ros.payload.discovery import MAX_DEVICES
+from illuminator_ros.payload.request import MAX_WAITING, Result
 import pytest
 from support.frames import frame_of, raw_v2
 from support.heartbeats import heartbeat_frame
@@ -127,9 +127,8 @@ def many_sources(count: int) -> list[Address]:
 
 
 def test_a_flood_of_lights_is_bounded(bridge: BridgeSiege) -> None:
-    flood(bridge, [heartbeat_frame(source) for source in many_sources(3 * MAX_LIGHTS)])
-    assert len(bridge.controller.lights) == MAX_LIGHTS
-    assert bridge.controller.passed_over
+    flood(bridge, [heartbeat_frame(source) for source in many_sources(3 * MAX_DEVICES)])
+    assert list(bridge.controller.lights) == [GENUINE]
     bridge.check_bounds()
     bridge.check_service()
 
@@ -229,14 +228,15 @@ def test_limits_beyond_belief_refuse_nothing(bridge: BridgeSiege, low: float) ->
     light = bridge.controller.lights[GENUINE]
     flood(bridge, [frame_of(status(light.status.uptime_ms + 10, min_strobe_period=low,
                                    max_strobe_period=math.nan), 0, GENUINE)])
-    assert light.agreement.check({'strobe_period': 7.0}) == {'strobe_period': 7.0}
+    assert not light.limits.known
+    assert checked('strobe_period', 7.0, light.limits) == 7.0
 
 
 def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSiege) -> None:
     # It compares equal to 0, but sent back to the light it would be denied for ever.
     light = bridge.controller.lights[GENUINE]
     flood(bridge, [frame_of(status(light.status.uptime_ms + 10, strobe_period=1e-45), 0, GENUINE)])
-    assert light.agreement.agreed.strobe_period == 0.0
+    assert light.snapshot(0.0).configuration.strobe_period == 0.0
     bridge.check_service()
 
 
@@ -245,14 +245,14 @@ def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied
 ) -> None:
     # Under external sync a light's output is not taken for its configuration.
     light = bridge.controller.lights[GENUINE]
-    bridge.link.ask(lambda now: light.agreement.configure(
+    bridge.link.ask(lambda now: light.configure(
         {'mode': 'external_sync'}, now, lambda result, now: None))
     bridge.link.run(1.0)
     internal, external = (frame_of(status(
         light.status.uptime_ms + 10 * mode, mode=mode, strobe_period=440.0), 0, GENUINE)
         for mode in (1, 2))
     flood(bridge, [internal, external])
-    assert light.agreement.agreed.strobe_period == 440.0
+    assert light.snapshot(0.0).configuration.strobe_period == 440.0
     bridge.check_service()
 
 

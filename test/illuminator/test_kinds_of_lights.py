@@ -88,7 +88,7 @@ class TestGuideEmulator:
         pair.other.fields['brightness'] = float('nan')
         pair.run(2.0)
         assert pair.light.status.invalid == ('brightness nan',)
-        assert pair.light.agreement.agreed.brightness == 100.0
+        assert pair.snapshot.configuration.brightness == 100.0
 
 
 class TestArduSub:

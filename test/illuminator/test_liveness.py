@@ -15,11 +15,11 @@
 """A light that falls silent, comes back, or comes back another."""
 
 from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
-from illuminator_ros.mavlink.messages import heartbeat, MavCmd, MavType, STATUS_ID
+from illuminator_ros.mavlink.messages import MavCmd, STATUS_ID
 import pytest
 from support.back_to_back import BRIDGE, Pair, START
 from support.client import Client
-from support.fake_light import FakeLight, LIGHT
+from support.fake_light import FakeLight, LIGHT, status_message
 
 
 def test_a_light_is_lost_after_the_heartbeat_timeout_and_found_again(fake, faked):
@@ -39,7 +39,8 @@ def test_the_heartbeat_timeout_is_the_one_that_was_set(timeout):
     pair = Pair(fake, settings=Settings(heartbeat_timeout=timeout)).settle()
     fake.silent = True
     heard_at = pair.light.heard_at
-    pair.run_until(lambda: not pair.light.connected, within=100.0)
+    light = pair.light
+    pair.run_until(lambda: not light.connected, within=100.0)
     assert pair.now - heard_at == pytest.approx(timeout)
 
 
@@ -47,7 +48,7 @@ def test_the_moment_of_loss_is_no_moment_of_spinning():
     # For some numbers heard_at + timeout - heard_at is less than the timeout.
     controller = Client(BRIDGE, Settings(heartbeat_timeout=7.3))
     for step in range(1000):
-        controller.receive(LIGHT, heartbeat(MavType.ILLUMINATOR), 0.137 * step)
+        controller.receive(LIGHT, status_message(), 0.137 * step)
         light = controller.lights[LIGHT]
         light.poll(light.heard_at + 7.3)
         assert not light.connected
@@ -56,7 +57,7 @@ def test_the_moment_of_loss_is_no_moment_of_spinning():
 def test_an_absence_is_one_event_however_long_it_is(fake, faked):
     fake.silent = True
     faked.run(3600.0)
-    assert len(faked.recorder.events) == 2
+    assert len(faked.recorders[fake.source].events) == 2
 
 
 def test_nothing_is_asked_of_a_light_that_is_lost(fake, faked):
@@ -196,7 +197,7 @@ class TestStatusStream:
         assert fake.stream == 60.0
         assert pair.recorder.events == ['connected']
 
-    def test_the_interval_is_left_alone_where_none_is_wished(self, faked):
+    def test_the_interval_is_ignored_where_none_is_wished(self, faked):
         assert faked.commands(MavCmd.SET_MESSAGE_INTERVAL) == []
 
     def test_the_interval_is_asked_for_again_after_a_restart(self):

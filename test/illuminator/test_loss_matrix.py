@@ -21,10 +21,10 @@ import random
 
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address, MavCmd
+from illuminator_ros.payload.request import Result
 import pytest
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
@@ -112,9 +112,9 @@ class Joystick(User):
         # Never the one before, and rarely one that is agreed already: that is not sent.
         self._value = (self._value + self.draw.randint(1, 100)) % 101
         self._asked_at, self._changes = self.pair.now, len(self._recorder.changes)
-        agreed = self.light.agreement.agreed
+        agreed = self.light.snapshot(0.0).configuration
         self._agreed_before = agreed is not None and agreed.brightness == self._value
-        self.light.agreement.set_brightness(float(self._value), self.pair.now)
+        self.light.set_brightness(float(self._value), self.pair.now)
         self.pair.turn()
         self.due = self.pair.now + (self._interval if self._left > 1 else LONGEST_SET)
 
@@ -142,7 +142,7 @@ def play(line: str, share: float) -> tuple[Pair, list[Request], Judge]:
     judge = Judge(pair)
     lights = pair.controller.lights
     pair.run_until(lambda: len(lights) == len(LIGHTS)
-                   and all(light.agreement.agreed for light in lights.values()))
+                   and all(light.snapshot(0.0).configuration for light in lights.values()))
     draw = random.Random(f'{line} {share}')
     users = [User(pair, light, ON_OFF, draw) for light in lights.values()]
     first, second, third, fourth = lights.values()
@@ -172,7 +172,7 @@ def test_every_command_has_one_outcome_and_it_is_true(line, share, request):
     pair.run(QUIET)
     for simulated in pair.other.components:
         light = pair.controller.lights[simulated.address]
-        assert light.agreement.agreed == simulated.device.lamp.configuration
+        assert light.snapshot(pair.now).configuration == simulated.device.lamp.configuration
         assert light.status.enabled == simulated.device.lamp.enabled
         assert 'restarted' not in pair.recorders[simulated.address].events
 

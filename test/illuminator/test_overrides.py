@@ -14,7 +14,7 @@
 
 """Overrides: sent at the first connection, and again with the agreed ones after a restart."""
 
-from illuminator_ros.illuminator.agreement import RESTORE_INTERVAL
+from illuminator_ros.illuminator.configuration import RESTORE_INTERVAL
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
@@ -29,7 +29,7 @@ CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
 def overriding(fake, settings=None, **values):
     """Return a pair whose light is to be configured as soon as it is found."""
     return Pair(fake, settings=settings,
-                on_light=lambda light: light.agreement.want(values, START))
+                on_light=lambda light: light.set_desired(values, START))
 
 
 def sent(pair, since=0.0):
@@ -44,7 +44,7 @@ class TestAtTheFirstConnection:
         pair = overriding(fake, brightness=30.0, strobe_period=2.0).settle()
         assert sent(pair) == [(1, 30, 2, 7)]
         assert pair.recorder.restorations[0][0] is True
-        assert pair.light.agreement.agreed.brightness == 30.0
+        assert pair.snapshot.configuration.brightness == 30.0
 
     def test_they_are_sent_once(self, fake):
         pair = overriding(fake, brightness=30.0).settle(60.0)
@@ -81,7 +81,7 @@ class TestAtTheFirstConnection:
         assert len(pair.recorder.restorations) == 1
         fake.fields['brightness'] = 5.0
         pair.run(2.0)
-        assert pair.light.agreement.agreed.brightness == 5.0
+        assert pair.snapshot.configuration.brightness == 5.0
 
     @pytest.mark.parametrize('result', [
         MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_LONG_ONLY])
@@ -92,7 +92,7 @@ class TestAtTheFirstConnection:
         (success, message), = pair.recorder.restorations
         assert not success
         assert result.name in message
-        assert result.name in pair.light.agreement.discrepancy
+        assert result.name in pair.snapshot.discrepancy
 
     @pytest.mark.parametrize('result', [
         None, MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS, MavResult.FAILED])
@@ -100,11 +100,11 @@ class TestAtTheFirstConnection:
         fake.results[CONFIGURE] = result
         pair = overriding(fake, brightness=30.0).settle(20.0)
         assert pair.recorder.restorations == []
-        assert pair.light.agreement.discrepancy
+        assert pair.snapshot.discrepancy
         fake.results[CONFIGURE] = MavResult.ACCEPTED
         pair.run(RESTORE_INTERVAL + 1.0)
         assert [success for success, _ in pair.recorder.restorations] == [True]
-        assert pair.light.agreement.discrepancy == ''
+        assert pair.snapshot.discrepancy == ''
 
     def test_retries_leave_the_line_alone_in_between(self, fake):
         fake.results[CONFIGURE] = None
@@ -126,7 +126,7 @@ class TestAtTheFirstConnection:
         fake.fields['brightness'] = 80.0
         pair = overriding(fake, brightness=100.0).settle(60.0)
         given_up = len(sent(pair))
-        assert pair.light.agreement.agreed.brightness == 80.0
+        assert pair.snapshot.configuration.brightness == 80.0
         fake.restart(pair.now, brightness=20.0)
         pair.run(60.0)
         assert len(sent(pair)) == 2 * given_up
@@ -225,12 +225,12 @@ class TestAfterARestart:
         else:
             assert pair.configure(mode='internal_control', strobe_period=1,
                                   strobe_duty_cycle=10).success
-            pair.light.agreement.set_brightness(70.0, pair.now)
-            pair.run_until(lambda: pair.light.agreement.agreed.brightness == 70.0)
+            pair.light.set_brightness(70.0, pair.now)
+            pair.run_until(lambda: pair.snapshot.configuration.brightness == 70.0)
         # Before the next status somebody else turns it down: that is to be followed.
         fake.fields['brightness'] = 20.0
         pair.run(5.0)
-        assert pair.light.agreement.agreed.brightness == 20.0
+        assert pair.snapshot.configuration.brightness == 20.0
 
     def test_the_light_is_never_switched_on(self, fake, agreed):
         agreed.enable(True)
@@ -245,13 +245,13 @@ class TestAfterARestart:
         fake.restart(agreed.now)
         agreed.run(10.0)
         assert agreed.recorder.restorations[-1][0] is False
-        assert agreed.light.agreement.discrepancy
+        assert agreed.snapshot.discrepancy
 
     def test_after_a_refusal_what_the_light_shows_is_followed(self, fake, agreed):
         fake.results[CONFIGURE] = MavResult.DENIED
         fake.restart(agreed.now)
         agreed.run(10.0)
-        assert agreed.light.agreement.agreed.brightness == 100.0
+        assert agreed.snapshot.configuration.brightness == 100.0
 
 
 class TestWithoutRestoring:
@@ -277,7 +277,7 @@ def test_overrides_that_wait_for_a_status_in_vain_are_told_once():
     (success, message), = pair.recorder.restorations
     assert not success
     assert message.startswith('brightness not sent: the light has not reported its configuration')
-    assert pair.light.agreement.discrepancy == message
+    assert pair.snapshot.discrepancy == message
     fake.fields['strobe_duty_cycle'] = 0.0
     pair.run(3.0)
     assert fake.fields['brightness'] == 60.0

@@ -14,7 +14,7 @@
 
 """Asking a light again for its status and its identity."""
 
-from illuminator_ros.illuminator.refresh import REFRESH_LIMIT
+from illuminator_ros.illuminator.light import REFRESH_LIMIT
 from illuminator_ros.mavlink.messages import INFORMATION_ID, MavCmd, MavResult, STATUS_ID
 import pytest
 from support.back_to_back import Pair
@@ -45,7 +45,7 @@ def test_what_has_become_of_the_light_is_known_afterwards(fake, faked):
     fake.identity = fake.identity.__class__(serial_number='T-2')
     faked.wait_for(refresh(faked))
     assert faked.light.status.brightness == 12.0
-    assert faked.light.identification.identity.serial_number == 'T-2'
+    assert faked.snapshot.identity.serial_number == 'T-2'
 
 
 def test_a_light_without_an_identity_is_refreshed_all_the_same(fake, faked):

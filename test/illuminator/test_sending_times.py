@@ -16,7 +16,7 @@
 
 import random
 
-from illuminator_ros.illuminator.uptime import SendingTimes, WRAP_MS
+from illuminator_ros.illuminator.status import SendingTimes, WRAP_MS
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 import pytest
 from support.back_to_back import BRIDGE, Pair

@@ -44,12 +44,12 @@ def different() -> Pair:
 
 def test_two_lights_that_show_different_things_are_told_within_three_seconds():
     pair = two(enable=1, brightness=40.0)
-    pair.run_until(lambda: pair.controller.lights and pair.light.sharing.recognised, within=3.0)
+    pair.run_until(lambda: pair.controller.lights and pair.snapshot.shared_address, within=3.0)
 
 
 def test_two_lights_that_show_the_same_are_one():
     pair = two().settle(10.0)
-    assert not pair.light.sharing.recognised
+    assert not pair.snapshot.shared_address
 
 
 @pytest.mark.parametrize('offset', [0.0, 0.01, 0.5])
@@ -69,7 +69,7 @@ def test_the_bridge_sends_nothing_to_make_two_lights_equal(different):
 def test_lights_of_one_address_with_clocks_of_their_own_do_not_look_restarted_for_ever():
     pair = two(second_boot=-3600.0).settle(10.0)
     restarts = pair.light.restarts
-    assert pair.light.sharing.recognised
+    assert pair.snapshot.shared_address
     pair.run(60.0)
     assert pair.light.restarts == restarts <= 3
 
@@ -99,50 +99,52 @@ def test_clocks_of_their_own_do_not_hide_the_light_that_does_not_obey():
 
 
 def test_a_status_that_is_lost_does_not_move_the_parameters(different):
-    agreed = different.light.agreement.agreed
+    agreed = different.snapshot.configuration
     for light in different.other.lights:
         light.delay_status(1.0)
         different.run(5.0)
-    assert different.light.sharing.recognised
-    assert different.light.agreement.agreed == agreed
+    assert different.snapshot.shared_address
+    assert different.snapshot.configuration == agreed
 
 
 def test_lights_that_were_lost_are_judged_anew(different):
     different.close()
-    assert not different.light.sharing.recognised
+    assert not different.snapshot.shared_address
 
 
 def test_a_set_makes_two_lights_one_again(different):
     result = different.configure(brightness=70.0)
-    assert result.success
+    # Within 0.85 s a second light that reports once a second may have said nothing.
+    assert 'not each of several lights that answer as 1/1' in result.message
     different.enable(True)
     different.run(6.0)
-    assert not different.light.sharing.recognised
-    assert different.light.agreement.agreed.brightness == 70.0
+    assert not different.snapshot.shared_address
+    assert different.snapshot.configuration.brightness == 70.0
 
 
 def test_parameters_follow_again_once_the_lights_agree(different):
     for light in different.other.lights:
         light.fields |= {'enable': 1, 'brightness': 55.0}
     different.run(6.0)
-    assert different.light.agreement.agreed.brightness == 55.0
+    assert different.snapshot.configuration.brightness == 55.0
 
 
 def test_one_light_that_somebody_changes_there_and_back_is_followed(fake):
     pair = Pair(fake, settings=Settings()).settle()
     fake.fields['brightness'] = 40.0
     pair.run(1.0)
-    assert pair.light.agreement.agreed.brightness == 40.0
+    assert pair.snapshot.configuration.brightness == 40.0
     fake.fields['brightness'] = 100.0
     pair.run(2.0)
-    assert pair.light.agreement.agreed.brightness == 100.0
+    assert pair.snapshot.configuration.brightness == 100.0
 
 
 @pytest.mark.parametrize('instance', [0, 2])
 def test_commands_carry_the_instance_of_the_light_and_0_is_all(instance):
     sender = CommandSender(Address(1, 194))
     light = Light(
-        AUTOPILOT, sender, Settings(), lambda event: None, lambda: None, instance=instance)
+        AUTOPILOT, sender, Settings(), lambda event: None, lambda light, now: None,
+        instance=instance)
     light.heard(0.0)
     light.enable(True, 0.0, lambda result, now: None)
     light.configure(

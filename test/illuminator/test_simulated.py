@@ -14,7 +14,6 @@
 
 """The simulated light follows the illuminator, heartbeat, command and interval protocols."""
 
-from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
@@ -33,6 +32,7 @@ from illuminator_ros.mavlink.messages import (
     MavType,
     STATUS_ID,
 )
+from illuminator_ros.payload.identity import Identity
 import pytest
 from support.light_bench import GROUND, LightBench
 

@@ -16,7 +16,7 @@
 
 import dataclasses
 
-from illuminator_ros.illuminator.error_flags import ErrorFlag
+from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.thermal import ThermalModel, ThermalProperties
 import pytest
 

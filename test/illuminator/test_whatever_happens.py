@@ -76,12 +76,12 @@ class Chaos:
         if light := self.light():
             wish = {'brightness': self.draw.randrange(101),
                     'strobe_period': self.draw.choice((0, 1))}
-            light.agreement.configure(wish, self.pair.now, self.answer(self.sets))
+            light.configure(wish, self.pair.now, self.answer(self.sets))
 
     def publish(self) -> None:
         if light := self.light():
             for _ in range(self.draw.randint(1, 5)):
-                light.agreement.set_brightness(float(self.draw.randrange(101)), self.pair.now)
+                light.set_brightness(float(self.draw.randrange(101)), self.pair.now)
 
     def refresh(self) -> None:
         if light := self.light():
@@ -133,7 +133,7 @@ def test_whatever_happens(seed):
     for simulated in chaos.lights:
         light = pair.controller.lights[simulated.address]
         assert light.connected
-        assert light.agreement.agreed == simulated.device.lamp.configuration
+        assert light.snapshot(pair.now).configuration == simulated.device.lamp.configuration
         assert light.status.enabled == simulated.device.lamp.enabled
         assert light.next_deadline() > pair.now
     assert pair.controller.sender.next_deadline() == float('inf')

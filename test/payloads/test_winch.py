@@ -23,10 +23,10 @@ from illuminator_ros.cli.simulator.scenario import components, Scenario, scenari
 from illuminator_ros.cli.simulator.view import look
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.mavlink.command import CommandResult, CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
+from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.simulated import SimulatedComponents
 from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest

@@ -15,8 +15,8 @@
 """The console: commands to simulated lights while they run."""
 
 from illuminator_ros.cli.simulator.console import COMMANDS, execute
-from illuminator_ros.illuminator.error_flags import ErrorFlag
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties

@@ -20,9 +20,8 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.events import AnyLightEvent, LightFound
+from illuminator_ros.illuminator.events import AnyLightEvent, LightFound, LightSnapshot
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.operation import Result
 from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -37,6 +36,7 @@ from illuminator_ros.mavlink.messages import (
     LAYOUTS,
     MavCmd,
 )
+from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
@@ -131,6 +131,11 @@ class Pair:
     def light(self) -> Light:
         """Return the light that the controller has found first."""
         return next(iter(self.controller.lights.values()))
+
+    @property
+    def snapshot(self) -> LightSnapshot:
+        """Return the state of that light."""
+        return self.light.snapshot(self.now)
 
     @property
     def recorder(self) -> Recorder:
@@ -238,6 +243,13 @@ class Pair:
         self.turn()
         return answer
 
+    def ask_refresh(self) -> Answer:
+        """Begin to ask for status and identity."""
+        answer = Answer(self.now)
+        self.light.refresh(self.now, answer)
+        self.turn()
+        return answer
+
     def wait_for(self, answer: Answer) -> Result:
         """Return the result of a request once it is there."""
         self.run_until(lambda: answer.results)
@@ -256,6 +268,11 @@ class Pair:
     def commands(self, *kinds: MavCmd, since: float = 0.0) -> list[Any]:
         """Return the commands that the controller has sent, tries included, all or some kinds."""
         return [message for at, message in self.commands_at(*kinds) if at >= since]
+
+    def commands_to(self, target: Address, kind: MavCmd) -> Iterator[tuple[float, Any]]:
+        """Return the commands of a kind that the controller has sent to a target, with times."""
+        return ((at, message) for at, message in self.commands_at(kind)
+                if (message.target_system, message.target_component) == target)
 
     def commands_at(self, *kinds: MavCmd) -> Iterator[tuple[float, Any]]:
         """Return the same with the times of sending."""

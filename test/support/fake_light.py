@@ -20,7 +20,6 @@ from collections.abc import Mapping
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -35,6 +34,7 @@ from illuminator_ros.mavlink.messages import (
     MavType,
     STATUS_ID,
 )
+from illuminator_ros.payload.identity import Identity
 
 LIGHT = Address(1, 243)
 DEFAULT_STATUS = {

@@ -33,9 +33,9 @@ from illuminator_ros.illuminator.events import (
     SetpointFailed,
     StatusReceived,
 )
-from illuminator_ros.illuminator.identity import Identity
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.illuminator.operation import Result
+from illuminator_ros.payload.identity import Identity
+from illuminator_ros.payload.request import Result
 
 
 @dataclass

@@ -21,10 +21,7 @@ import math
 import random
 from typing import Any
 
-from illuminator_ros.illuminator.client import MAX_LIGHTS
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.operation import Done, Result
-from illuminator_ros.illuminator.operation_queue import MAX_WAITING as MAX_WAITING_OPERATIONS
 from illuminator_ros.illuminator.simulated import describe, simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.command import MAX_WAITING
@@ -34,6 +31,9 @@ from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+from illuminator_ros.payload.discovery import MAX_DEVICES
+from illuminator_ros.payload.request import Done, Result
+from illuminator_ros.payload.request import MAX_WAITING as MAX_REQUESTS
 from illuminator_ros.payload.simulated import SimulatedComponent
 from support.attacker import Attacker
 from support.client import Client
@@ -185,14 +185,12 @@ class BridgeSiege(Siege):
         controller, sender = self.controller, self.controller.sender
         lights = controller.lights.values()
         for what, size, bound in (
-                ('lights', len(lights), MAX_LIGHTS),
-                ('commands', len(sender), 4 * MAX_LIGHTS * (MAX_WAITING + 1)),
-                ('round trips', len(sender._round_trips), MAX_LIGHTS),
-                ('deadlines', len(controller._agenda._heap), 16 * MAX_LIGHTS),
-                ('operations', _longest(light._switching._operations for light in lights),
-                 MAX_WAITING_OPERATIONS),
-                ('changes', _longest(light.agreement._queue._operations for light in lights),
-                 MAX_WAITING_OPERATIONS)):
+                ('lights', len(lights), MAX_DEVICES),
+                ('commands', len(sender), 4 * MAX_DEVICES * (MAX_WAITING + 1)),
+                ('round trips', len(sender._round_trips), MAX_DEVICES),
+                ('requests', _longest(light._switching for light in lights), MAX_REQUESTS),
+                ('changes', _longest(light._configuration._queue for light in lights),
+                 MAX_REQUESTS)):
             assert size <= bound, f'{size} {what}, more than {bound}'
 
     def check_service(self) -> None:

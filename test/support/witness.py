@@ -157,7 +157,7 @@ class Judge:
     def _received(self, request: Request, kind: type, since: float) -> list[tuple[float, Any]]:
         return [(at, message) for at, source, message in self._pair.near.received
                 if source == request.light.address and isinstance(message, kind)
-                and since < at <= request.answer.ended_at]
+                and since <= at <= request.answer.ended_at]
 
     def _acks(self, request: Request) -> list[tuple[float, Any]]:
         since = self._tries(request)[0][0]
@@ -201,6 +201,11 @@ class Judge:
         # Whatever was sent meanwhile was another command.
         return 'sent' if TRIES.search(request.message) else ''
 
+    def _overtaken(self, request: Request) -> str:
+        off = [at for at, sent in self._pair.commands_to(request.light.address, ON_OFF)
+               if not sent.param1 and request.answer.asked_at <= at <= request.answer.ended_at]
+        return '' if request.wish == {'enabled': True} and off else 'not overtaken'
+
     def _lost(self, request: Request) -> str:
         since = request.answer.ended_at - request.light.settings.heartbeat_timeout + 1e-6
         heard = (self._received(request, Heartbeat, since)
@@ -217,5 +222,6 @@ _CHECKS: dict[str, tuple[str, bool, Callable[[Judge, Request], str]]] = {
     'but ILLUMINATOR_STATUS shows': ('not shown', False, Judge._not_shown),
     'ILLUMINATOR_STATUS came within': ('no status', False, Judge._no_status),
     'not sent: earlier requests took too long': ('not sent', False, Judge._not_sent),
+    'cancelled by a later request': ('overtaken', False, Judge._overtaken),
     'is lost: no heartbeat for': ('light lost', False, Judge._lost),
 }

@@ -23,7 +23,7 @@ from enum import Enum
 import math
 from typing import Any
 
-from ...illuminator.error_flags import flag_names
+from ...illuminator.model import flag_names
 
 # s without topics and diagnostics of a light until its values are out of date: bridges request a
 # status after 2.5 s, and publish diagnostics once a second.

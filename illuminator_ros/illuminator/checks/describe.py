@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
-from ..error_flags import flag_names
-from ..identity import Identity
-from ..model import Status
+from ..model import flag_names, Status
 from ...mavlink.messages import ComponentInformationBasic, IlluminatorStatus, Message
 from ...payload.checks import describe as protocols
+from ...payload.identity import Identity
 
 
 def describe(message: Message) -> str:

@@ -19,10 +19,10 @@ from __future__ import annotations
 from typing import Any
 
 from .specification import ILLUMINATOR
-from ..identity import Identity
 from ...mavlink.messages import ComponentInformationBasic, MavCmd
 from ...payload.checks.requirement import Failed, MESSAGES, requirement, Skipped, Tester
 from ...payload.checks.session import Session
+from ...payload.identity import Identity
 
 STRINGS = ('vendor_name', 'model_name', 'software_version', 'hardware_version', 'serial_number')
 

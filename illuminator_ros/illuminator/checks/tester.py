@@ -20,8 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .describe import status_text
-from ..error_flags import DIMMING_FLAGS
-from ..model import Configuration, Mode, NOTHING, shortest, Status
+from ..model import Configuration, DIMMING_FLAGS, Mode, NOTHING, shortest, Status
 from ...mavlink.messages import IlluminatorStatus, MavCmd, MavResult
 from ...payload.checks.payload_checks import NOT_AGREED
 from ...payload.checks.requirement import Conditions, Skipped

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 from .specification import ILLUMINATOR
 from .tester import LightTester
-from ..error_flags import ErrorFlag, flag_names
-from ..model import Status
+from ..model import ErrorFlag, flag_names, Status
 from ...payload.checks.requirement import Failed, requirement, Skipped
 
 # Smallest rise of temperature that explains a flag, K.

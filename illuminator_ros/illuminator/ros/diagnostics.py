@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from ..error_flags import ErrorFlag, flag_names, KNOWN_FLAGS
 from ..events import LightSnapshot
+from ..model import ErrorFlag, flag_names, KNOWN_FLAGS
 from ...mavlink.command import format_seconds
 from ...mavlink.messages import Address
 from ...ros.diagnostics import (

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from .diagnostics import flag_findings
-from ..error_flags import flag_names
+from ..model import flag_names
 from ...ros.diagnostics import Finding, OK
 
 # s between two lines on one flag.

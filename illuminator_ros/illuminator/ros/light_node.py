@@ -33,8 +33,8 @@ from ..client import IlluminatorClient
 from ..events import AnyLightEvent
 from ..light import Light
 from ..model import checked, InvalidValue
-from ..operation import Result
 from ...mavlink.messages import Address
+from ...payload.request import Result
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
@@ -201,8 +201,8 @@ class LightNode:
 
     def _heard(self) -> LightsHeard:
         client = self._client
-        some = itertools.islice(sorted({*client.lights, *client.left_alone}), MAX_NAMED)
-        return LightsHeard(len(client.lights), tuple(some), client.passed_over)
+        some = itertools.islice(sorted({*client.lights, *client.ignored}), MAX_NAMED)
+        return LightsHeard(len(client.lights), tuple(some), client.limit_reached)
 
 
 def _checked(overrides: Mapping[str, Any]) -> dict[str, Any]:

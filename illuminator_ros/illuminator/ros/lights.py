@@ -43,11 +43,11 @@ from ..events import (
     LightRestarted,
     StatusReceived,
 )
-from ..fleet import enable_all
+from ..group import enable_all
 from ..light import Light
-from ..operation import Result
 from ...mavlink.command import CommandSender
 from ...mavlink.messages import Address
+from ...payload.request import Result
 from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
 from ...ros.node import CommandTopic, RequestService

@@ -15,7 +15,7 @@
 """Several lights behind one address are told from one light that is changed."""
 
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.illuminator.sharing import ENOUGH, Sharing
+from illuminator_ros.illuminator.status import AddressConflict, ENOUGH_EVIDENCE
 import pytest
 from support.fake_light import status_message
 
@@ -27,7 +27,7 @@ class Observed:
     """Statuses as they come, one a second unless said otherwise."""
 
     def __init__(self):
-        self.sharing = Sharing()
+        self.conflict = AddressConflict()
         self.now = 1000.0
 
     def see(self, *shown, starts=(0.0,), every=1.0, commanded=False, late=0.0):
@@ -35,10 +35,10 @@ class Observed:
         for number, fields in enumerate(shown):
             self.now += every
             running = self.now - starts[number % len(starts)] - late
-            self.sharing.take(
+            self.conflict.take(
                 Status.from_message(status_message(int(running * 1000), **fields)), self.now,
                 commanded=commanded)
-        return self.sharing
+        return self.conflict
 
 
 @pytest.mark.parametrize(('first', 'second'), [
@@ -50,38 +50,38 @@ class Observed:
     ({'enable': 1, 'brightness': 90.0}, {'enable': 0, 'brightness': 0.0}),
 ])
 def test_statuses_that_contradict_each_other_in_turn_are_of_several_lights(first, second):
-    assert Observed().see(first, second, first, second, first, second).recognised
+    assert Observed().see(first, second, first, second, first, second).detected
 
 
 def test_it_takes_six_statuses_to_tell():
     observed = Observed()
-    verdicts = [observed.see(shown).recognised for shown in (OFF, ON) * 4]
-    assert verdicts == [False] * (ENOUGH + 1) + [True] * 3
+    verdicts = [observed.see(shown).detected for shown in (OFF, ON) * 4]
+    assert verdicts == [False] * (ENOUGH_EVIDENCE + 1) + [True] * 3
 
 
 def test_three_lights_in_turn_are_told_too():
     shown = [{'brightness': value} for value in (100.0, 50.0, 20.0)]
-    assert Observed().see(*shown * 3).recognised
+    assert Observed().see(*shown * 3).detected
 
 
 @pytest.mark.parametrize('every', [0.001, 0.1, 1.0, 4.0])
 def test_the_rate_does_not_matter(every):
-    assert Observed().see(*[OFF, ON] * 4, every=every).recognised
+    assert Observed().see(*[OFF, ON] * 4, every=every).detected
 
 
 def test_lights_without_a_clock_are_told_by_what_they_show():
-    sharing = Sharing()
+    conflict = AddressConflict()
     for number in range(8):
-        sharing.take(Status.from_message(status_message(0, enable=number % 2)), 1000.0 + number,
+        conflict.take(Status.from_message(status_message(0, enable=number % 2)), 1000.0 + number,
                      commanded=False)
-    assert sharing.recognised
+    assert conflict.detected
 
 
 def test_a_status_that_is_lost_now_and_then_delays_the_verdict_only():
     observed = Observed()
     for _ in range(2):
         observed.see(*[OFF, ON] * 4, ON)
-    assert observed.sharing.recognised
+    assert observed.conflict.detected
 
 
 @pytest.mark.parametrize('shown', [
@@ -105,7 +105,7 @@ def test_a_status_that_is_lost_now_and_then_delays_the_verdict_only():
     'flashed', 'a ramp', 'rounding', 'dimmed by heat', 'dimmed and not', 'shut down by heat',
     'external sync', 'temperature', 'unbelievable brightness', 'unbelievable enable'])
 def test_one_light_that_changes_is_not_taken_for_several(shown):
-    assert not Observed().see(*shown).recognised
+    assert not Observed().see(*shown).detected
 
 
 def test_what_we_change_back_and_forth_ourselves_is_no_evidence():
@@ -115,74 +115,74 @@ def test_what_we_change_back_and_forth_ourselves_is_no_evidence():
         observed.see(ON)
         observed.see(ON, commanded=True)
         observed.see(OFF)
-    assert not observed.sharing.recognised
+    assert not observed.conflict.detected
 
 
 class TestClocks:
 
     @pytest.mark.parametrize('apart', [2.0, 4.0, 60.0, 50 * 24 * 3600.0])
     def test_two_lights_that_show_the_same_are_told_by_their_uptimes(self, apart):
-        assert Observed().see(*[OFF] * 7, starts=(0.0, -apart)).recognised
+        assert Observed().see(*[OFF] * 7, starts=(0.0, -apart)).detected
 
     def test_they_stay_told_as_long_as_both_report(self):
         observed = Observed()
         for _ in range(20):
             observed.see(OFF, OFF, starts=(0.0, -60.0))
-        assert observed.sharing.recognised
+        assert observed.conflict.detected
 
     def test_a_light_that_restarts_is_one_light(self):
         observed = Observed()
         for start in (0.0, 1000.0, 1003.0, 1006.0, 1009.0, 1012.0):
             observed.see(OFF, OFF, starts=(start,))
-        assert not observed.sharing.recognised
+        assert not observed.conflict.detected
 
     def test_a_light_whose_uptime_wraps_is_one_light(self):
         start = 1005.0 - (1 << 32) / 1000.0
-        sharing = Sharing()
+        conflict = AddressConflict()
         for number in range(12):
             now = 1000.0 + number
             uptime_ms = int((now - start) * 1000) % (1 << 32)
-            sharing.take(Status.from_message(status_message(uptime_ms)), now, commanded=False)
-        assert not sharing.recognised
+            conflict.take(Status.from_message(status_message(uptime_ms)), now, commanded=False)
+        assert not conflict.detected
 
     def test_a_slower_second_way_repeats_frames_and_is_no_second_light(self):
-        sharing = Sharing()
+        conflict = AddressConflict()
         frames = [
             Status.from_message(status_message(100_000 + 1000 * number, enable=number % 3 > 1))
             for number in range(20)]
         for number in range(2, 20):
-            sharing.take(frames[number], 1000.0 + number, commanded=False)
-            sharing.take(frames[number - 2], 1000.1 + number, commanded=False)
-        assert not sharing.recognised
+            conflict.take(frames[number], 1000.0 + number, commanded=False)
+            conflict.take(frames[number - 2], 1000.1 + number, commanded=False)
+        assert not conflict.detected
 
     def test_a_few_late_frames_are_no_second_light(self):
         observed = Observed()
         for _ in range(4):
             observed.see(OFF, OFF, OFF)
             observed.see(OFF, late=3.0)
-        assert not observed.sharing.recognised
+        assert not observed.conflict.detected
 
 
 def test_the_verdict_ends_when_the_statuses_agree_again():
     observed = Observed()
     observed.see(*[OFF, ON] * 6)
-    assert observed.see(*[OFF] * 3).recognised
-    assert not observed.see(OFF).recognised
+    assert observed.see(*[OFF] * 3).detected
+    assert not observed.see(OFF).detected
 
 
 def test_commands_of_ours_do_not_end_the_verdict():
     observed = Observed()
     observed.see(*[OFF, ON] * 6)
-    assert observed.see(OFF, ON, OFF, commanded=True).recognised
+    assert observed.see(OFF, ON, OFF, commanded=True).detected
 
 
 def test_a_light_that_was_lost_is_judged_anew():
     observed = Observed()
     observed.see(*[OFF, ON] * 6)
-    observed.sharing.clear()
-    assert not observed.sharing.recognised
-    assert observed.sharing.settled
-    assert not observed.see(*[OFF, ON] * 2).recognised
+    observed.conflict = AddressConflict()
+    assert not observed.conflict.detected
+    assert observed.conflict.can_follow
+    assert not observed.see(*[OFF, ON] * 2).detected
 
 
 @pytest.mark.parametrize(('shown', 'settled'), [
@@ -194,4 +194,4 @@ def test_a_light_that_was_lost_is_judged_anew():
     ([OFF, ON, OFF, {'brightness': 20.0}, {'brightness': 20.0}], True),
 ])
 def test_a_change_back_is_followed_once_it_has_been_repeated(shown, settled):
-    assert Observed().see(*shown).settled is settled
+    assert Observed().see(*shown).can_follow is settled

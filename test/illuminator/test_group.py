@@ -14,7 +14,7 @@
 
 """One request to all lights: one answer, which names what became of each."""
 
-from illuminator_ros.illuminator.fleet import enable_all
+from illuminator_ros.illuminator.group import enable_all
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 import pytest
@@ -82,7 +82,7 @@ def test_the_commands_go_out_together_and_the_answer_comes_with_the_slowest(flee
 
 def test_a_lost_light_is_named_and_not_commanded_and_does_not_spoil_the_success(fleet):
     lost = fleet.controller.lights[Address(1, 244)]
-    lost.lose('gone')
+    lost.lose('gone', fleet.now)
     result = fleet.wait_for(ask(fleet))
     assert result.success
     assert result.message.startswith('2 of 2 on; ')

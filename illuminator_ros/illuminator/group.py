@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Requests to all lights at once, with one answer."""
+"""Several lights switched at once."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ from collections.abc import Callable, Sequence
 import functools
 
 from .light import Light
-from .operation import Done, Result
+from ..payload.request import Done, Result
 
 
 def enable_all(
     lights: Sequence[Light], on: bool, now: float, done: Done, *,
-    name: Callable[[Light], str],
+    name: Callable[[Light], str], detail: str = '',
 ) -> None:
     """
     Switch all connected lights on or off, in parallel.
 
     :param done: called once, when the last light has answered. It is a success if all connected
         lights succeeded, of which there must be one; the message has the outcome of each.
-    :param name: returns what to call a light, for people.
+    :param name: returns the name of a light, for people.
+    :param detail: as for :meth:`Light.enable`.
     """
     connected = [light for light in lights if light.connected]
     outcomes: dict[Light, Result] = {}
@@ -45,7 +46,7 @@ def enable_all(
                 for one in lights], [outcomes[one].success for one in connected]), now)
 
     for light in connected:
-        light.enable(on, now, functools.partial(outcome, light))
+        light.enable(on, now, functools.partial(outcome, light), detail=detail)
     if not connected:
         lost = '; '.join(f'{name(light)}: {light.unreachable(now)}' for light in lights)
         done(Result(False, lost or 'no light has been heard yet'), now)

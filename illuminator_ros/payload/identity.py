@@ -12,43 +12,62 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Who a light is: COMPONENT_INFORMATION_BASIC, asked for when it is found and on request."""
+"""The identity of a component: COMPONENT_INFORMATION_BASIC."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import math
-from typing import TYPE_CHECKING
 
-from .identity import Identity
-from ..mavlink.command import Command, CommandResult, CommandStatus
-from ..mavlink.messages import INFORMATION_ID, MavCmd, result_name
-
-if TYPE_CHECKING:
-    from .light import Light
+from .request import Target
+from ..mavlink.command import CommandResult, CommandStatus
+from ..mavlink.messages import ComponentInformationBasic, result_name
 
 # s from the acknowledgement to the message.
 MESSAGE_TIMEOUT = 0.5
-# s after which it is asked for again where something more urgent went before.
-WAY_TIME = 1.0
-# How often a message that was acknowledged and has not come is asked for: it may be lost.
+# A message that was acknowledged and did not come is asked for this often: it may be lost.
 MAX_QUESTIONS = 3
-# s after which whoever needs an id for the light takes what there is.
+# s after which an id for the component is made from its address.
 SETTLING_TIME = 2.0
 
 Done = Callable[[str, float], None]
 
 
-class Identification:
-    """
-    Asks one light for its identity.
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """A COMPONENT_INFORMATION_BASIC; a field that the component leaves empty is ''."""
 
-    :ivar identity: what the light said, None before it has.
-    :ivar failure: why it said nothing, '' while that is open or it did.
+    vendor: str = ''
+    model: str = ''
+    software_version: str = ''
+    hardware_version: str = ''
+    serial_number: str = ''
+
+    @classmethod
+    def from_message(cls, message: ComponentInformationBasic) -> Identity:
+        """Read a message; a field that is full has no terminator, and some have odd bytes."""
+        return cls(*map(text, (
+            message.vendor_name, message.model_name, message.software_version,
+            message.hardware_version, message.serial_number)))
+
+
+def text(field: bytes) -> str:
+    """Return the printable text of a char field, up to its terminator if it has one."""
+    raw = field.partition(b'\0')[0].decode('utf-8', errors='replace')
+    return ''.join(c if c.isprintable() else '?' for c in raw).strip()
+
+
+class IdentityQuery:
+    """
+    Asks one component for its identity.
+
+    :ivar identity: None before the component has sent it.
+    :ivar failure: why it was not sent, '' while that is open or it was.
     """
 
-    def __init__(self, light: Light) -> None:
-        self._light = light
+    def __init__(self, target: Target) -> None:
+        self._target = target
         self.identity: Identity | None = None
         self.failure = ''
         self._message_until = math.inf
@@ -56,62 +75,41 @@ class Identification:
         self._asking = False
         self._questions = 0
         self._first_asked = math.inf
-        self._command: Command | None = None
-        self._gives_way = False
 
-    def settled(self, now: float) -> bool:
+    def is_settled(self, now: float) -> bool:
         """Return whether the identity is known, or will not be known soon."""
         return (self.identity is not None or bool(self.failure)
                 or now >= self._first_asked + SETTLING_TIME)
 
     def ask(self, now: float, done: Done | None = None) -> None:
-        """Ask; ``done`` is called with '' once the message is there, else with the reason."""
+        """Ask; ``done`` is called with '' once the message has come, else with the reason."""
         if done is not None:
             self._waiting.append(done)
-        if self._asking:
-            return
-        self._asking = True
-        self._questions = 0
-        self._first_asked = min(self._first_asked, now)
-        self._send(now)
+        if not self._asking:
+            self._asking = True
+            self._questions = 0
+            self._first_asked = min(self._first_asked, now)
+            self._send(now)
 
     def _send(self, now: float) -> None:
         self._questions += 1
         self._message_until = math.inf
-        self._command = Command(
-            self._light.address, MavCmd.REQUEST_MESSAGE, (float(INFORMATION_ID),))
-        self._light.sender.start(self._command, now, self._answered)
+        self._target.request_message(ComponentInformationBasic.id, now, self._answered)
 
-    def give_way(self, now: float) -> None:
-        """
-        Let another message be requested first, and ask again later.
-
-        One request is under way at a time, and a light that does not answer this one would hold
-        up the status that somebody waits for.
-        """
-        if self._command is not None:
-            self._gives_way = True
-            self._light.sender.cancel(self._command, now)
-            self._gives_way = False
-
-    def received(self, identity: Identity, now: float) -> None:
+    def take(self, identity: Identity, now: float) -> None:
         """Take the message."""
         self.identity = identity
         self._finish('', now)
 
-    def _answered(self, outcome: CommandResult, now: float) -> None:
+    def _answered(self, result: CommandResult, now: float) -> None:
         if not self._asking:
             return
-        if self._gives_way:
-            self._questions -= 1
-            self._message_until = now + WAY_TIME
-            return
-        if outcome.accepted:
+        if result.accepted:
             self._message_until = now + MESSAGE_TIMEOUT
-        elif outcome.status is CommandStatus.ANSWERED and outcome.result is not None:
-            self._finish(f'refused: {result_name(outcome.result)}', now)
+        elif result.status is CommandStatus.ANSWERED and result.result is not None:
+            self._finish(f'refused: {result_name(result.result)}', now)
         else:
-            self._finish(outcome.describe(), now)
+            self._finish(result.describe(), now)
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""

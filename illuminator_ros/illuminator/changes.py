@@ -1,0 +1,120 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The changes of a light: MAV_CMD_ILLUMINATOR_ON_OFF and MAV_CMD_DO_ILLUMINATOR_CONFIGURE."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .model import Configuration, DIMMING_FLAGS, flag_names, Status, unexpected_differences
+from ..mavlink.messages import MavCmd
+
+CONFIRMED = 'confirmed by ILLUMINATOR_STATUS'
+
+
+def _despite_heat(status: Status) -> str:
+    dimmed = ' and '.join(flag_names(status.error_flags & DIMMING_FLAGS))
+    return CONFIRMED + (f', but {dimmed}' if dimmed else '')
+
+
+def _with_flags(shown: str, status: Status) -> str:
+    return ', '.join(filter(None, (shown, *flag_names(status.error_flags))))
+
+
+@dataclass(frozen=True)
+class Switch:
+    """
+    Switches a light on or off.
+
+    :param instance: which light of the component; 0 is all of them.
+    """
+
+    on: bool
+    instance: int = 0
+    note: str = ''
+    command: int = MavCmd.ILLUMINATOR_ON_OFF
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """See :class:`Change`."""
+        return float(self.on), float(self.instance)
+
+    @property
+    def goal(self) -> str:
+        """See :class:`Change`."""
+        return 'on' if self.on else 'off'
+
+    def shown_by(self, status: Status) -> bool:
+        """See :class:`Change`."""
+        return status.enabled is self.on
+
+    def evidence(self, status: Status) -> str:
+        """See :class:`Change`."""
+        return _despite_heat(status) if self.on else CONFIRMED
+
+    def actual(self, status: Status) -> str:
+        """See :class:`Change`."""
+        shown = {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
+        return _with_flags(shown, status)
+
+
+@dataclass(frozen=True)
+class Configure:
+    """
+    Configures a light; the command carries all four fields.
+
+    :param names: the fields that are to change.
+    """
+
+    configuration: Configuration
+    names: list[str]
+    instance: int = 0
+    note: str = ''
+    command: int = MavCmd.DO_ILLUMINATOR_CONFIGURE
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """See :class:`Change`."""
+        return *self.configuration.params(), float(self.instance)
+
+    @property
+    def goal(self) -> str:
+        """See :class:`Change`."""
+        return self.configuration.describe(self.names)
+
+    def _missing(self, status: Status) -> list[str]:
+        return unexpected_differences(
+            self.configuration, status.configuration(self.configuration), status.error_flags,
+            step=True)
+
+    def shown_by(self, status: Status) -> bool:
+        """See :class:`Change`."""
+        return not self._missing(status)
+
+    def evidence(self, status: Status) -> str:
+        """See :class:`Change`."""
+        reported = status.configuration(self.configuration)
+        hidden = [name for name in self.configuration.differences(reported)
+                  if name in self.names]
+        if not hidden:
+            return CONFIRMED
+        if status.error_flags & DIMMING_FLAGS:
+            return _despite_heat(status)
+        return f'accepted (ILLUMINATOR_STATUS shows {reported.describe(hidden)})'
+
+    def actual(self, status: Status) -> str:
+        """See :class:`Change`."""
+        reported = status.configuration(self.configuration)
+        return _with_flags(reported.describe(self._missing(status)), status)

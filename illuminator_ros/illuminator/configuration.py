@@ -1,0 +1,486 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The configuration of a light: confirmed, requested, and to be restored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+import math
+from typing import Any
+
+from .changes import Configure
+from .events import (
+    AnyLightEvent,
+    Cause,
+    ConfigurationChanged,
+    ConfigurationRestored,
+    SetpointFailed,
+)
+from .model import (
+    checked,
+    Configuration,
+    FIELDS,
+    InvalidValue,
+    Limits,
+    NOTHING,
+    Status,
+    unexpected_differences,
+)
+from ..payload.events import RateLimit
+from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
+
+# s; rqt_reconfigure gives up after 1.0 s, and a set must have answered by then.
+CONFIGURE_LIMIT = 0.85
+# s between tries of overrides and restored configurations that got no answer.
+RESTORE_INTERVAL = 2.0
+# Attempts before giving up on a light that accepts a configuration but does not apply it.
+MAX_CONTRADICTIONS = 3
+# s without a status after which a complete set of overrides is sent all the same.
+STATUS_TIMEOUT = 3.0
+# %; set together with a strobe period where the duty cycle is 0, at which nothing strobes.
+DEFAULT_DUTY_CYCLE = 50.0
+# s after a command of ours in which a light may show what it asks for, and what it implies.
+LATE_TIME = 30.0
+IMPLIED_TIME = 2.0
+# s between two log lines on changes by other senders.
+REPORT_INTERVAL = 1.0
+
+
+class Origin(Enum):
+    """The origin of values that are to be sent."""
+
+    OVERRIDE = 'override'
+    RESTART = 'restart'
+
+
+@dataclass
+class Pending:
+    """
+    Values to be sent: overrides, or a configuration that a restart has undone.
+
+    :param attempts: how often the light has accepted them and shown others.
+    :param due: when they are sent next, s.
+    """
+
+    values: dict[str, Any]
+    origin: Origin
+    due: float
+    attempts: int = 0
+    was_warned: bool = False
+
+
+@dataclass
+class _Sent:
+    """The last configuration that was sent, and when, s."""
+
+    configuration: Configuration
+    names: list[str]
+    at: float
+    accepted: bool = False
+
+
+class ConfigurationManager:
+    """
+    Keeps one light configured.
+
+    :param emit: takes the events.
+    :ivar confirmed: the configuration that was last accepted from us or, where another sender
+        has changed it since, reported; None before the first status.
+    :ivar discrepancy: how the light differs from a configuration that it has accepted, ''
+        if it does not.
+    """
+
+    def __init__(
+        self, target: Target, emit: Callable[[AnyLightEvent], None], *, instance: int = 0,
+        restore: bool = True,
+    ) -> None:
+        self.confirmed: Configuration | None = None
+        self.discrepancy = ''
+        self._target = target
+        self._address = target.address
+        self._emit = emit
+        self._instance = instance
+        self._restore = restore
+        self._queue: RequestQueue[Status] = RequestQueue(target)
+        self._status: Status | None = None
+        self._shared_address = False
+        self._setpoint: float | None = None
+        self._pending: Pending | None = None
+        self._sent: _Sent | None = None
+        # A configuration that the light has accepted and then not shown.
+        self._unapplied: Configuration | None = None
+        # Whether it is open how the last command ended: it failed, or was superseded.
+        self._is_unconfirmed = False
+        # The last configuration that was requested or reported as changed: small steps away
+        # from it add up to a change.
+        self._reference: Configuration | None = None
+        self._rate = RateLimit(REPORT_INTERVAL)
+
+    @property
+    def is_changing(self) -> bool:
+        """Whether a command of ours is under way."""
+        return self._queue.current is not None
+
+    @property
+    def is_confirming(self) -> bool:
+        """Whether a request waits for a status."""
+        return self._queue.current is not None and self._queue.current.is_confirming
+
+    @property
+    def sent_at(self) -> float:
+        """When the last command was sent, s."""
+        return self._sent.at if self._sent else -math.inf
+
+    @property
+    def _limits(self) -> Limits:
+        return self._status.limits if self._status else Limits()
+
+    # Requests
+
+    def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
+        """
+        Change some fields with one command; the light is connected.
+
+        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
+        :param done: called once with the result.
+        """
+        try:
+            values = self._checked(changes)
+            self._goal(values)
+        except InvalidValue as error:
+            done(Result(False, str(error), permanent=True), now)
+            return
+
+        def finished(result: Result, now: float) -> None:
+            if result.success:
+                self._drop_pending(values)
+            done(result, now)
+
+        self._submit(values, now, finished)
+
+    def set_brightness(self, brightness: float, now: float) -> None:
+        """Take a setpoint of a stream, %, checked; the light is connected."""
+        current = self._queue.current
+        if (current is not None and current.is_stream and not current.is_finished
+                and isinstance(current.change, Configure)
+                and current.change.configuration.brightness == brightness):
+            # Under way already; the setpoint in between is overtaken.
+            self._setpoint = None
+            return
+        self._setpoint = brightness
+        self.poll(now, connected=True)
+
+    def set_desired(self, values: Mapping[str, Any], now: float) -> None:
+        """
+        Have values sent as soon as the light has reported its configuration.
+
+        :param values: by name, checked but for the limits that the light reports.
+        """
+        self._want({**(self._pending.values if self._pending else {}), **values},
+                   self._pending.origin if self._pending else Origin.OVERRIDE, now)
+
+    def _want(self, values: dict[str, Any], origin: Origin, now: float) -> None:
+        wait = 0.0 if self.confirmed else STATUS_TIMEOUT
+        self._pending = Pending(values, origin, now + wait)
+
+    def cancel(self, now: float) -> None:
+        """End all changes, and drop the values that are to be sent."""
+        self._pending = None
+        self._setpoint = None
+        self._queue.cancel('cancelled', now)
+
+    def _drop_pending(self, names: Iterable[str]) -> None:
+        """Note that fields have another value by now, or must not be sent."""
+        if self._pending:
+            for name in list(names):
+                self._pending.values.pop(name, None)
+            if not self._pending.values:
+                self._pending = None
+
+    def _checked(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: checked(name, value, self._limits) for name, value in changes.items()}
+
+    def _goal(self, values: Mapping[str, Any]) -> Configure:
+        """
+        Return the change that sets some fields.
+
+        :raises InvalidValue: if nothing is confirmed yet and the values are not complete.
+        """
+        note = ''
+        if self.confirmed is None:
+            missing = [name for name in FIELDS if name not in values]
+            if missing:
+                raise InvalidValue(
+                    'the light has not reported its configuration yet, so '
+                    f'{", ".join(missing)} must be set in the same call')
+            goal = Configuration(**values)
+        else:
+            if (values.get('strobe_period') and 'strobe_duty_cycle' not in values
+                    and not self.confirmed.strobe_duty_cycle):
+                values = {**values, 'strobe_duty_cycle': DEFAULT_DUTY_CYCLE}
+                note = ('strobe_duty_cycle was 0 %, at which nothing strobes, and was set to '
+                        f'{DEFAULT_DUTY_CYCLE:g} %')
+            goal = self._sendable(self.confirmed, values).with_changes(values)
+        return Configure(goal, list(values), self._instance, note)
+
+    def _sendable(
+        self, confirmed: Configuration, changes: Mapping[str, Any],
+    ) -> Configuration:
+        """
+        Return the confirmed configuration without values that the light's limits rule out.
+
+        A light that has once reported such a value would deny every change that carries it.
+        """
+        if self._status is None:
+            return confirmed
+        reported = self._status.configuration(confirmed)
+        ruled_out = {}
+        for name in FIELDS:
+            try:
+                if name != 'mode' and name not in changes:
+                    checked(name, getattr(confirmed, name), self._limits)
+            except InvalidValue:
+                ruled_out[name] = getattr(reported, name)
+        return confirmed.with_changes(ruled_out)
+
+    def _submit(
+        self, values: Mapping[str, Any], now: float, done: Done, *, is_stream: bool = False,
+    ) -> None:
+        def prepare(now: float) -> Configure:
+            # Requests before it in the queue may have changed the other fields.
+            change = self._goal(values)
+            self._sent = _Sent(change.configuration, change.names, now)
+            return change
+
+        def finished(
+            result: Result, change: Change[Status] | None, status: Status | None, now: float,
+        ) -> None:
+            self._is_unconfirmed = not result.success or result.superseded
+            if isinstance(change, Configure):
+                if self._sent:
+                    self._sent.accepted = result.success or result.contradicted
+                if result.success:
+                    self._accept(change.configuration, status)
+                elif result.contradicted:
+                    self._unapplied = change.configuration
+                    self.discrepancy = result.message
+            done(result, now)
+
+        self._queue.submit(Request(
+            self._target, prepare, finished, now=now, limit=now + CONFIGURE_LIMIT,
+            is_stream=is_stream), now)
+
+    # Reports
+
+    def restarted(self, now: float) -> None:
+        """Note that the light has restarted, so that its configuration may be gone."""
+        if self._restore and self.confirmed is not None:
+            confirmed = self.confirmed
+            # Overrides that have not been sent yet replace the values from before.
+            pending = self._pending.values if self._pending else {}
+            self._want({**{name: getattr(confirmed, name) for name in FIELDS
+                           if name != 'mode' or confirmed.mode}, **pending},
+                       Origin.RESTART, now)
+
+    def lost(self, message: str, now: float) -> None:
+        """Note that the light is lost; a setpoint must not take effect when it is heard again."""
+        self._queue.cancel_waiting(message, now)
+        if self._setpoint is not None:
+            self._setpoint = None
+            self._setpoint_failed(message)
+
+    def take(
+        self, report: Report[Status], now: float, *, can_follow: bool, switched_at: float,
+    ) -> None:
+        """
+        Confirm the request under way, or follow the change of another sender.
+
+        :param can_follow: whether the status shows a change for certain.
+        :param switched_at: when the light was last switched by us, s.
+        """
+        status = self._status = report.status
+        self._shared_address = report.shared_address
+        was_changing = self.is_changing
+        self._queue.take(report, now)
+        if was_changing or self.confirmed is None and not status.complete:
+            return
+        reported = status.configuration(self.confirmed or NOTHING)
+        if self._unapplied and not unexpected_differences(
+                self._unapplied, reported, status.error_flags, step=True):
+            self._applied()
+        if self.confirmed is None:
+            self._adopt(reported, Cause.FIRST_STATUS, now)
+            if self._pending:
+                self._pending.due = min(self._pending.due, now)
+        elif self._pending and self._pending.origin is Origin.RESTART:
+            wanted = self.confirmed.with_changes(self._pending.values)
+            if not unexpected_differences(wanted, reported, status.error_flags, step=True):
+                # It kept its configuration, or got it back from another sender.
+                self._pending = None
+        elif can_follow and not report.shared_address:
+            self._follow(status, self.confirmed, reported, switched_at, now)
+
+    def _accept(self, goal: Configuration, status: Status | None) -> None:
+        """
+        Note that the light has accepted a configuration, with the status that shows it.
+
+        Values that the light rounds to its own steps are confirmed as it shows them; values that
+        differ for another reason (heat, external sync) as they were sent.
+        """
+        if status:
+            reported = status.configuration(goal)
+            far = goal.differences(reported)
+            goal = goal.with_changes({
+                name: getattr(reported, name)
+                for name in goal.differences(reported, step=False) if name not in far})
+        self._applied()
+        self._adopt(goal, Cause.REQUEST, 0.0)
+
+    def _applied(self) -> None:
+        self._unapplied = None
+        self.discrepancy = ''
+
+    def _adopt(self, configuration: Configuration, cause: Cause, now: float) -> None:
+        old, self.confirmed = self.confirmed, configuration
+        if cause is not Cause.ROUNDING:
+            self._reference = configuration
+        names = [name for name in FIELDS
+                 if old is None or getattr(old, name) != getattr(configuration, name)]
+        if names:
+            left_out = self._rate.take(now) if cause is Cause.LIGHT else 0
+            self._emit(ConfigurationChanged(
+                self._address, configuration, names, cause, left_out))
+
+    def _follow(
+        self, status: Status, confirmed: Configuration, reported: Configuration,
+        switched_at: float, now: float,
+    ) -> None:
+        # Under external sync too: another sender may have changed what cannot be told apart.
+        names = unexpected_differences(
+            confirmed, reported, status.error_flags, step=False, external=False)
+        if not names:
+            return
+        far = unexpected_differences(
+            self._reference or confirmed, reported, status.error_flags, step=True,
+            external=False)
+        cause = Cause.ROUNDING
+        if far:
+            own = all(self._is_own(name, reported, switched_at, now) for name in far)
+            cause = Cause.REQUEST if own else Cause.LIGHT
+        self._adopt(confirmed.with_changes({name: getattr(reported, name) for name in names}),
+                    cause, now)
+
+    def _is_own(
+        self, name: str, reported: Configuration, switched_at: float, now: float,
+    ) -> bool:
+        """Return whether a change is a late or implied effect of a command of ours."""
+        if now <= switched_at + IMPLIED_TIME:
+            return True
+        if self._sent is None or now > self._sent.at + LATE_TIME:
+            return False
+        if name not in self._sent.configuration.differences(reported):
+            return True
+        return (self._sent.accepted and name not in self._sent.names
+                and now <= self._sent.at + IMPLIED_TIME)
+
+    # Time
+
+    def poll(self, now: float, *, connected: bool) -> None:
+        """Send what is to be sent, one command at a time."""
+        if self._setpoint is not None and (replaceable := self._replaceable):
+            replaceable.supersede(now)
+        self._queue.poll(now)
+        if self._queue.current is not None or not connected:
+            return
+        # First the values that are sent once: a stream of setpoints may not end.
+        if self._pending and now >= self._pending.due:
+            self._send_pending(self._pending, now)
+        if self._setpoint is not None and self._queue.current is None:
+            value, self._setpoint = self._setpoint, None
+            self._send_setpoint(value, now)
+
+    @property
+    def _replaceable(self) -> Request[Status] | None:
+        """Return the setpoint that is accepted but not confirmed: a newer one need not wait."""
+        current = self._queue.current
+        return current if current and current.is_stream and current.is_accepted else None
+
+    def _send_setpoint(self, value: float, now: float) -> None:
+        if (self.confirmed is not None and self.confirmed.brightness == value
+                and not self._is_unconfirmed and not self._shared_address):
+            return
+
+        def finished(result: Result, now: float) -> None:
+            if result.success:
+                self._drop_pending(['brightness'])
+            else:
+                self._setpoint_failed(result.message)
+
+        try:
+            self._goal({'brightness': value})
+        except InvalidValue as error:
+            self._setpoint_failed(str(error))
+        else:
+            self._submit({'brightness': value}, now, finished, is_stream=True)
+
+    def _setpoint_failed(self, message: str) -> None:
+        self._emit(SetpointFailed(self._address, message))
+
+    def _restored(self, success: bool, message: str) -> None:
+        self._emit(ConfigurationRestored(self._address, success, message))
+
+    def _send_pending(self, pending: Pending, now: float) -> None:
+        pending.due = now + RESTORE_INTERVAL
+        try:
+            self._goal(pending.values)
+        except InvalidValue as error:
+            # They still wait for a status; but the user should know.
+            pending.due = math.inf
+            self.discrepancy = f'{", ".join(pending.values)} not sent: {error}'
+            self._restored(False, self.discrepancy)
+            return
+        if self.confirmed is None:
+            pending.due += STATUS_TIMEOUT
+        for name, value in list(pending.values.items()):
+            try:
+                checked(name, value, self._limits)
+            except InvalidValue as error:
+                self._drop_pending([name])
+                self._restored(False, str(error))
+        if self._pending is not pending:
+            return
+
+        def finished(result: Result, now: float) -> None:
+            pending.attempts += result.contradicted
+            if (result.success or result.permanent
+                    or pending.attempts >= MAX_CONTRADICTIONS):
+                self._drop_pending(pending.values)
+                self._restored(result.success, result.message)
+            if not result.success:
+                self.discrepancy = result.message
+
+        self._submit(self._checked(pending.values), now, finished)
+
+    def next_deadline(self, *, connected: bool) -> float:
+        """Return when :meth:`poll` has something to do."""
+        if not connected:
+            return self._queue.next_deadline()
+        if self._setpoint is not None and (not self.is_changing or self._replaceable):
+            return -math.inf
+        if self.is_changing:
+            return self._queue.next_deadline()
+        return self._pending.due if self._pending else math.inf

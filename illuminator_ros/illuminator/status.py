@@ -1,0 +1,343 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Statuses in time: restarts of a light, late frames, several lights at one address."""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import Enum
+import math
+
+from .model import DIMMING_FLAGS, Mode, NOTHING, Status, unexpected_differences
+from ..payload.request import Report
+
+WRAP_MS = 1 << 32
+# s without progress after which a light has no clock.
+NO_CLOCK_TIME = 2.0
+# By how much a running light's uptime may lag behind our clock: s, and a share of the time.
+MAX_LAG = 0.5
+DRIFT = 0.05
+# s by which a light may seem to have started before its last status came: that one was late.
+BOOT_SLACK = 0.05
+# s; a frame is not delayed by more.
+MAX_DELAY = 30.0
+# The same where a second status proves it, s.
+PROVED_BOOT_SLACK = 2.0
+# s between the two statuses that prove a restart, and by how much their clocks may differ.
+RESTART_PROOF_TIME = 0.1
+RESTART_PROOF_ERROR = 0.05
+# The same where the light seems to have started before its last status.
+CLOCK_JUMP_PROOF_TIME = 5.0
+# How wrong the clock of a light may be, as a share: an oscillator without a crystal.
+CLOCK_ERROR = 0.02
+# s for which a status is compared with. A clock with a larger error makes statuses look old, but
+# by no more than a part of this, so they confirm a change a little later.
+COMPARED_TIME = 5.0
+
+
+def uptime_difference(new_ms: int, old_ms: int) -> int:
+    """Return the time from one uptime to another, ms, where the counter may have wrapped."""
+    return (new_ms - old_ms + WRAP_MS // 2) % WRAP_MS - WRAP_MS // 2
+
+
+class Uptime(Enum):
+    """The meaning of an uptime beside those before."""
+
+    RUNNING = 'running'
+    RESTARTED = 'restarted'
+    LATE = 'late'
+    NO_CLOCK = 'no clock'
+
+
+class UptimeClock:
+    """
+    Tells from uptimes whether a light runs on or has restarted, or whether a frame is late.
+
+    A frame that was delayed has a lower uptime, too. So a restart is proved by a second status
+    whose uptime goes on from the first as time does, unless the first is older than frames get.
+
+    :ivar is_suspecting: whether another status is needed to tell whether the light has restarted.
+    """
+
+    def __init__(self) -> None:
+        self.is_suspecting = False
+        self._last: tuple[int, float] | None = None
+        self._suspect: tuple[int, float] | None = None
+
+    def take(self, uptime_ms: int, now: float) -> Uptime:
+        """Return the meaning of an uptime; times are s."""
+        meaning = Uptime.RUNNING
+        if self._last is not None:
+            meaning = self._compare(uptime_ms, now, *self._last)
+        if meaning is not Uptime.LATE:
+            self._last = uptime_ms, now
+            self._suspect = None
+            self.is_suspecting = False
+        return meaning
+
+    def _compare(self, uptime_ms: int, now: float, last_ms: int, last_at: float) -> Uptime:
+        elapsed = now - last_at
+        if uptime_ms == last_ms:
+            # The same status twice or within a millisecond, or a light that has no clock.
+            return Uptime.RUNNING if elapsed < NO_CLOCK_TIME else Uptime.NO_CLOCK
+        ahead = uptime_difference(uptime_ms, last_ms) / 1000
+        lag = elapsed - ahead
+        may_have_restarted = uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
+        has_progressed = (uptime_ms - last_ms) % WRAP_MS < WRAP_MS // 2
+        if has_progressed and not (may_have_restarted and lag > MAX_LAG + DRIFT * elapsed):
+            return Uptime.RUNNING
+        if not has_progressed and may_have_restarted and lag > MAX_DELAY:
+            return Uptime.RESTARTED
+        may_have_restarted = uptime_ms <= 1000 * (elapsed + PROVED_BOOT_SLACK)
+        self.is_suspecting = may_have_restarted or lag > MAX_DELAY
+        if self._suspect is not None:
+            suspect_ms, suspect_at = self._suspect
+            waited = now - suspect_at
+            error = abs(uptime_difference(uptime_ms, suspect_ms) / 1000 - waited)
+            if error <= RESTART_PROOF_ERROR + DRIFT * waited:
+                is_proof = (waited >= RESTART_PROOF_TIME if may_have_restarted
+                            else lag > MAX_DELAY and waited >= CLOCK_JUMP_PROOF_TIME)
+                return Uptime.RESTARTED if is_proof else Uptime.LATE
+        self._suspect = uptime_ms, now
+        return Uptime.LATE
+
+
+class SendingTimes:
+    """
+    Tells when statuses were sent, at the latest, from their uptimes.
+
+    A frame that was delayed has an uptime that lags behind those of quicker frames. Where
+    nothing is known, or the light has no clock, a status counts as sent when it came.
+    """
+
+    def __init__(self) -> None:
+        # The least delayed status of late, and when it came: by then it had been sent.
+        self._uptime_ms = 0
+        self._came_at = -math.inf
+        # The uptimes differ by multiples of this: some lights count in seconds. 0 is no clock.
+        self._step_ms = 0
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether the uptimes progress, as far as is known."""
+        return bool(self._step_ms or self._uptime_ms)
+
+    def sent_by(self, uptime_ms: int, now: float) -> float:
+        """Return the latest time at which a status that has just come can have been sent, s."""
+        if self._came_at > -math.inf:
+            ahead_ms = uptime_difference(uptime_ms, self._uptime_ms)
+            self._step_ms = math.gcd(self._step_ms, ahead_ms)
+            slack = self._step_ms / 1000 + CLOCK_ERROR * (now - self._came_at)
+            sent_by = self._came_at + ahead_ms / 1000 + slack
+            if self._step_ms and sent_by < now < self._came_at + COMPARED_TIME:
+                return sent_by
+        self._uptime_ms, self._came_at = uptime_ms, now
+        return now
+
+
+# Changes back to a state shown before that prove several lights: the sixth status of A B A B A B
+# is the fourth. Another sender that switches a light on, off and on again makes one.
+ENOUGH_EVIDENCE = 4
+# Evidence does not grow beyond this, so that the verdict ends soon after the contradiction does.
+MAX_EVIDENCE = 6
+# Evidence that a status takes away if it agrees with the one before. Of two lights in turn, one
+# status in ten may get lost; one light may be flashed so that each third status differs.
+REPEAT_PENALTY = 2
+# Statuses that are remembered, and states of them, one for each light.
+MAX_RECENT = 8
+MAX_STATES = 4
+# s between two starting times that are those of two lights: the delay of a line varies by less.
+CLOCK_STEP = 1.5
+# s for which a light that was started at another time counts after its last status.
+SENDER_TIME = 10.0
+# Returns to a starting time that prove a light.
+ENOUGH_RETURNS = 2
+# Share by which the time between two statuses of one light may vary.
+GAP_MARGIN = 1.2
+
+
+class _Start:
+    """A starting time, ms on our clock, and the statuses that fit it."""
+
+    def __init__(self, number: int, start: float) -> None:
+        self.number = number
+        self.start = start
+        self.seen_at = -math.inf
+        self.returns = 0
+
+
+class AddressConflict:
+    """
+    Tells whether several lights send from one address.
+
+    ILLUMINATOR_STATUS does not say which light it is of: ArduSub sends one for each of its
+    lights from the autopilot's address, and two lights may have been given the same ids. Lights
+    are told apart by the states that they show in turn, and by when they were started. Two that
+    show the same and were started together are not told apart.
+
+    :ivar detected: whether several lights send.
+    :ivar can_follow: whether the newest status can be followed: it does not go back to a state
+        shown before, or it has been repeated.
+    :ivar sender: the light that has sent the newest status, by when it was started.
+    """
+
+    def __init__(self) -> None:
+        self.detected = False
+        self.can_follow = True
+        self.sender = 0
+        self._evidence = 0
+        # With the last one at the end, and when each was shown.
+        self._states: list[tuple[Status, float]] = []
+        self._gaps: deque[float] = deque(maxlen=MAX_RECENT)
+        self._starts: list[_Start] = []
+        self._count = 0
+        self._recent: deque[Status] = deque(maxlen=MAX_RECENT)
+
+    def take(self, status: Status, now: float, *, commanded: bool) -> None:
+        """
+        Take a status, late ones too.
+
+        :param commanded: whether a command of ours may have changed the light.
+        """
+        uptime = status.uptime_ms
+        has_clock = any(one.uptime_ms != uptime for one in self._recent)
+        if has_clock and any(one.uptime_ms == uptime and one == status for one in self._recent):
+            # The same frame, by another way.
+            return
+        if has_clock or not self._recent:
+            self._take_start(now * 1000.0 - uptime, now)
+        self._recent.append(status)
+        if not commanded:
+            repeated = self._take_state(status, now)
+            self.can_follow = repeated or not self._evidence
+        elif not self.detected:
+            # Changes that we make ourselves are no evidence.
+            self._states.clear()
+            self._evidence = 0
+            self.can_follow = True
+        self.detected = (self._evidence >= (1 if self.detected else ENOUGH_EVIDENCE)
+                         or len(self.senders(now)) > 1)
+
+    def senders(self, now: float) -> frozenset[int]:
+        """Return the lights that have sent lately, as far as starting times tell them apart."""
+        proved = [start.number for start in self._starts
+                  if start.returns >= ENOUGH_RETURNS and now - start.seen_at <= SENDER_TIME]
+        return frozenset(proved) if len(proved) > 1 else frozenset((self.sender,))
+
+    def span(self, now: float) -> float:
+        """Return the time in which each light sends a status, s; 0 where they are told apart."""
+        if not self.detected or len(self.senders(now)) > 1:
+            return 0.0
+        return GAP_MARGIN * max(self._gaps, default=0.0)
+
+    def _take_start(self, start: float, now: float) -> None:
+        self._starts = [one for one in self._starts if now - one.seen_at <= SENDER_TIME]
+        for one in self._starts:
+            difference = (start - one.start + WRAP_MS / 2) % WRAP_MS - WRAP_MS / 2
+            if abs(difference) < CLOCK_STEP * 1000.0:
+                break
+        else:
+            self._count += 1
+            one = _Start(self._count, start)
+            self._starts = [*self._starts[1 - MAX_STATES:], one]
+        one.returns += one.seen_at > -math.inf and one.number != self.sender
+        one.seen_at = now
+        one.start = start
+        self.sender = one.number
+
+    def _take_state(self, status: Status, now: float) -> bool:
+        """Return whether a status repeats the last state."""
+        for index, (state, at) in enumerate(reversed(self._states)):
+            if _same_state(state, status):
+                self._evidence += 1 if index else -REPEAT_PENALTY
+                self._evidence = min(max(self._evidence, 0), MAX_EVIDENCE)
+                if index:
+                    self._gaps.append(now - at)
+                del self._states[-1 - index]
+                self._states.append((status, now))
+                return not index
+        self._states = [*self._states[1 - MAX_STATES:], (status, now)]
+        return len(self._states) == 1
+
+
+def _same_state(one: Status, other: Status) -> bool:
+    """Return whether a light may show both without having been changed."""
+    if _shown(one) == _shown(other):
+        return True
+    if one.mode is other.mode is Mode.EXTERNAL_SYNC:
+        # Its output follows another signal.
+        return True
+    hot = (one.error_flags | other.error_flags) & DIMMING_FLAGS
+    if not hot and None not in (one.enabled, other.enabled) and one.enabled != other.enabled:
+        return False
+    if not one.complete or not other.complete:
+        return True
+    first, second = one.configuration(NOTHING), other.configuration(NOTHING)
+    names = unexpected_differences(first, second, 0, step=True)
+    return not [name for name in names if not (hot and name == 'brightness')]
+
+
+def _shown(status: Status) -> tuple[object, ...]:
+    return (status.enabled, status.mode, status.brightness, status.strobe_period,
+            status.strobe_duty_cycle)
+
+
+class StatusTracker:
+    """
+    Puts the statuses of one address in order.
+
+    :ivar conflict: whether they are those of several lights.
+    """
+
+    def __init__(self) -> None:
+        self.conflict = AddressConflict()
+        self._clock = UptimeClock()
+        self._sending_times = SendingTimes()
+
+    @property
+    def is_suspecting(self) -> bool:
+        """Whether another status is needed soon to tell whether the light has restarted."""
+        return self._clock.is_suspecting
+
+    def take(
+        self, status: Status, now: float, *, was_lost: bool, commanded: bool,
+    ) -> tuple[Report[Status] | None, bool]:
+        """
+        Return the report of a status, None if it is late, and whether the light has restarted.
+
+        :param was_lost: whether the light was lost since the newest status.
+        :param commanded: whether a command of ours may have changed the light.
+        """
+        conflict = self.conflict
+        conflict.take(status, now, commanded=commanded)
+        if conflict.detected:
+            # The uptimes of several lights say nothing about one another.
+            self._clock = UptimeClock()
+            return Report(status, now, True, True, conflict.sender, conflict.senders(now),
+                          conflict.span(now)), False
+        meaning = self._clock.take(status.uptime_ms, now)
+        if meaning is Uptime.LATE:
+            return None, False
+        restarted = meaning is Uptime.RESTARTED or meaning is Uptime.NO_CLOCK and was_lost
+        if restarted:
+            self._sending_times = SendingTimes()
+        sent_by = self._sending_times.sent_by(status.uptime_ms, now)
+        sender = conflict.sender
+        return Report(status, sent_by, self._sending_times.has_clock, sender=sender,
+                      senders=frozenset((sender,))), restarted
+
+    def lost(self) -> None:
+        """Forget the other lights at the address: the light is lost."""
+        self.conflict = AddressConflict()

@@ -1,0 +1,520 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A request to a device: a command, its acknowledgement, and the status that shows the change.
+
+MAV_RESULT_ACCEPTED says that the command is valid and was taken on, not that it is done
+(command protocol). So a status is requested after it, and only a status that was sent after the
+command and shows the change makes the request a success.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+import math
+from typing import Generic, Protocol, TypeVar
+
+from ..mavlink.command import Command, CommandResult, CommandSender, CommandStatus, format_seconds
+from ..mavlink.messages import Address, MavCmd, MavResult
+
+# s from the acknowledgement to the status that shows the change.
+CONFIRMATION_TIMEOUT = 1.0
+# s between requests for the status meanwhile, where one or its answer was lost.
+ASK_INTERVAL = 0.25
+# Requests that may wait for one device.
+MAX_WAITING = 32
+# The result of a request that was not carried out since another one overtook it.
+OVERTAKEN = 'cancelled by a later request'
+# s for which an acknowledgement, or a copy of it, may be under way.
+ACK_REACH = 5.0
+# s by which the statuses of a device without a clock may be late, until that was measured.
+UNKNOWN_DELAY = 0.75
+
+PERMANENT_RESULTS = frozenset((
+    MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_UNSUPPORTED_MAV_FRAME,
+    MavResult.COMMAND_LONG_ONLY, MavResult.COMMAND_INT_ONLY))
+
+S = TypeVar('S')
+S_contra = TypeVar('S_contra', contravariant=True)
+CommandDone = Callable[[CommandResult, float], None]
+
+
+class Target:
+    """
+    The device that requests go to.
+
+    :param ended: called with each command that has ended, after its own receiver.
+    :param kind: a noun for it, such as ``light``.
+    :param status_id: the message id of its status.
+    """
+
+    def __init__(
+        self, address: Address, commands: CommandSender, ended: CommandDone, *,
+        kind: str, status_id: int, status_name: str,
+    ) -> None:
+        self.address = address
+        self.kind = kind
+        self.status_name = status_name
+        self._commands = commands
+        self._ended = ended
+        self._status_id = status_id
+        self._status_requested = False
+        self._delays: deque[float] = deque(maxlen=8)
+
+    def send(
+        self, command: int, params: tuple[float, ...], now: float,
+        done: CommandDone = lambda result, now: None, *, limit: float = math.inf,
+        overtake: bool = False,
+    ) -> None:
+        """Send a command; see :meth:`CommandSender.start`."""
+        def ended(result: CommandResult, now: float) -> None:
+            done(result, now)
+            self._ended(result, now)
+
+        self._commands.start(
+            Command(self.address, command, params), now, ended, limit=limit, overtake=overtake)
+
+    def request_message(
+        self, message_id: int, now: float, done: CommandDone = lambda result, now: None,
+    ) -> None:
+        """Request one message."""
+        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done)
+
+    def request_status(self, now: float, done: CommandDone | None = None) -> None:
+        """Request the status; without ``done`` only where no such request is under way."""
+        if done is not None:
+            self.request_message(self._status_id, now, done)
+        elif not self._status_requested:
+            self._status_requested = True
+            self.request_message(self._status_id, now, self._status_answered)
+
+    def _status_answered(self, result: CommandResult, now: float) -> None:
+        self._status_requested = False
+
+    @property
+    def status_delay(self) -> float:
+        """Return by how much a status without a time may be late, s."""
+        return 1.25 * max(self._delays) + 0.05 if self._delays else UNKNOWN_DELAY
+
+    def note_status_delay(self, seconds: float) -> None:
+        """Note how long after a command the first status showed the change."""
+        self._delays.append(seconds)
+
+
+@dataclass(slots=True)
+class Report(Generic[S]):
+    """
+    A status that is newer than all before.
+
+    :param sent_by: the latest time at which it can have been sent, s.
+    :param has_clock: whether that was told from a time in the status.
+    :param shared_address: whether several devices send from the address.
+    :param sender: which of them has sent it, as far as they can be told apart.
+    :param senders: all that have reported lately.
+    :param span: s for which all statuses must agree so that each device has sent one.
+    """
+
+    status: S
+    sent_by: float
+    has_clock: bool = True
+    shared_address: bool = False
+    sender: int = 0
+    senders: frozenset[int] = frozenset((0,))
+    span: float = 0.0
+
+
+class Change(Protocol[S_contra]):
+    """A change of a device."""
+
+    @property
+    def command(self) -> int:
+        """The MAV_CMD that makes it."""
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """The params of the command."""
+
+    @property
+    def goal(self) -> str:
+        """Describe the state to be reached, for people."""
+
+    @property
+    def note(self) -> str:
+        """Describe a change that was not asked for but comes with it, '' if there is none."""
+
+    def shown_by(self, status: S_contra) -> bool:
+        """Return whether a status shows the change."""
+
+    def evidence(self, status: S_contra) -> str:
+        """Describe how far a status that does not contradict shows the change, for people."""
+
+    def actual(self, status: S_contra) -> str:
+        """Describe the state that a status shows instead, for people."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """
+    The outcome of a request.
+
+    :param success: whether the device accepted it and, if it sends a status, shows it.
+    :param message: the outcome for people.
+    :param permanent: whether the same request will fail again.
+    :param contradicted: whether the device accepted it and then showed something else.
+    :param superseded: whether the device accepted it, and a newer one was sent then.
+    :param note: a change that was not asked for but came with it, for people, '' if none.
+    """
+
+    success: bool
+    message: str
+    permanent: bool = False
+    contradicted: bool = False
+    superseded: bool = False
+    note: str = ''
+
+
+Done = Callable[[Result, float], None]
+
+
+class Phase(Enum):
+    """The phase of a request."""
+
+    WAITING = 'waiting'
+    SENT = 'sent'
+    CONFIRMING = 'confirming'
+    FINISHED = 'finished'
+
+
+class Step(Enum):
+    """An event that moves a request to another phase."""
+
+    SEND = 'send'
+    ACKNOWLEDGED = 'acknowledged'
+    SEND_AGAIN = 'send again'
+    FINISH = 'finish'
+
+
+TRANSITIONS: dict[tuple[Phase, Step], Phase] = {
+    (Phase.WAITING, Step.SEND): Phase.SENT,
+    (Phase.WAITING, Step.FINISH): Phase.FINISHED,
+    (Phase.SENT, Step.ACKNOWLEDGED): Phase.CONFIRMING,
+    (Phase.SENT, Step.SEND_AGAIN): Phase.SENT,
+    (Phase.SENT, Step.FINISH): Phase.FINISHED,
+    (Phase.CONFIRMING, Step.FINISH): Phase.FINISHED,
+}
+
+
+class Request(Generic[S]):
+    """
+    A change on its way.
+
+    :param prepare: returns the change when it is sent: requests before it may affect it.
+    :param done: called once, with the result, the change and the status that shows it; None
+        stands for a change that was not sent, and for a status that did not come.
+    :param limit: the time by which it ends, s.
+    :param is_stream: whether it is one of a stream of setpoints, which a newer one replaces.
+    :param overtakes: whether its command is sent beside one of its kind that is in progress.
+    """
+
+    def __init__(
+        self, target: Target, prepare: Callable[[float], Change[S]],
+        done: Callable[[Result, Change[S] | None, S | None, float], None], *, now: float,
+        limit: float, is_stream: bool = False, overtakes: bool = False,
+    ) -> None:
+        self.phase = Phase.WAITING
+        self.limit = limit
+        self.is_stream = is_stream
+        self.change: Change[S] | None = None
+        self._target = target
+        self._prepare = prepare
+        self._done = done
+        self.overtakes = overtakes
+        self._submitted = now
+        self._sent_at = math.inf
+        self._params: tuple[float, ...] = ()
+        # Times that it is sent again since acknowledgements of earlier commands may come.
+        self._repeats: int | None = None
+        self._outcome: CommandResult | None = None
+        self._before: S | None = None
+        self._has_status = False
+        self._acknowledged_at = math.inf
+        self._confirm_until = math.inf
+        self._ask_at = math.inf
+        self._contradiction: S | None = None
+        self._is_shared = False
+        self._is_outdated = False
+        self._shown_by: set[int] = set()
+        self._shown_since = math.inf
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it has ended."""
+        return self.phase is Phase.FINISHED
+
+    @property
+    def is_confirming(self) -> bool:
+        """Whether the device has acknowledged, and the status is awaited."""
+        return self.phase is Phase.CONFIRMING
+
+    def _step(self, step: Step) -> None:
+        self.phase = TRANSITIONS[self.phase, step]
+
+    def start(self, status: S | None, now: float) -> None:
+        """
+        Send the command.
+
+        :param status: the newest status, None if there is none.
+        """
+        self._before = status
+        self._has_status = status is not None
+        self.change = self._prepare(now)
+        self._step(Step.SEND)
+        self._sent_at = now
+        self._send(now)
+
+    def _send(self, now: float) -> None:
+        assert self.change is not None
+        self._params = self.change.params
+        self._target.send(
+            self.change.command, self._params, now, self._answered, limit=self.limit,
+            overtake=self.overtakes)
+
+    def _answered(self, outcome: CommandResult, now: float) -> None:
+        if self.is_finished:
+            return
+        if outcome.status is CommandStatus.CANCELLED:
+            self.fail(OVERTAKEN, now)
+        elif outcome.accepted and self._must_repeat(outcome, now):
+            self._step(Step.SEND_AGAIN)
+            self._send(now)
+        elif outcome.accepted or outcome.may_answer_earlier(now, ACK_REACH):
+            self._step(Step.ACKNOWLEDGED)
+            self._outcome = outcome
+            self._acknowledged_at = now
+            self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
+            # On the next poll, not immediately: many devices send a status after the
+            # acknowledgement by themselves.
+            self._ask_at = now
+        else:
+            self._refused(outcome, now)
+
+    def _must_repeat(self, outcome: CommandResult, now: float) -> bool:
+        """
+        Return whether the acknowledgement may be that of an earlier command that got none.
+
+        That one may be carried out only now and undo this one, which itself may be lost. So it
+        is sent until there were more acknowledgements than tries of the earlier command.
+        """
+        if self._repeats is None:
+            earlier = outcome.earlier
+            self._repeats = 0
+            if (earlier is not None and earlier.result is None
+                    and earlier.command.params != self._params
+                    and outcome.may_answer_earlier(now, ACK_REACH)):
+                self._repeats = earlier.tries
+        self._repeats -= 1
+        return self._repeats >= 0
+
+    def _refused(self, outcome: CommandResult, now: float) -> None:
+        answered = outcome.status is CommandStatus.ANSWERED
+        self._finish(Result(
+            False, f'{"refused: " if answered else ""}{outcome.describe()} '
+            f'({outcome.timing(now - self._submitted)})',
+            answered and outcome.result in PERMANENT_RESULTS), now)
+
+    def take(self, report: Report[S], now: float) -> None:
+        """
+        Take a status that is newer than all before.
+
+        One that was on its way already when the command was sent says nothing about it: with a
+        late acknowledgement, it would even confirm a change that was never made.
+        """
+        self._has_status = True
+        if not self.is_confirming:
+            return
+        assert self.change is not None
+        delay = 0.0 if report.has_clock else self._target.status_delay
+        self._is_shared = report.shared_address
+        shown = self.change.shown_by(report.status)
+        if shown and self._before is not None and not self.change.shown_by(self._before):
+            self._target.note_status_delay(now - self._sent_at)
+            self._before = None
+        wait = max(delay + ASK_INTERVAL, 2 * report.span)
+        self._confirm_until = max(
+            self._confirm_until, min(self._acknowledged_at + wait, self.limit))
+        if report.sent_by - delay < self._sent_at:
+            self._is_outdated = True
+        elif not shown:
+            self._contradiction = report.status
+            self._shown_by.clear()
+            self._shown_since = math.inf
+            if not self.is_accepted and now >= self._acknowledged_at + ASK_INTERVAL:
+                self._unconfirmed(now)
+        else:
+            # Each of several devices that report in turn must show it.
+            self._shown_by.add(report.sender)
+            self._shown_since = min(self._shown_since, now)
+            if report.senders <= self._shown_by and now >= self._shown_since + report.span:
+                self._finish(
+                    self._success(self.change.evidence(report.status), now), now, report.status)
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether the device has accepted, and the status is awaited."""
+        return self.is_confirming and self._outcome is not None and self._outcome.accepted
+
+    def supersede(self, now: float) -> None:
+        """End an accepted change without its confirmation: a newer one replaces it."""
+        self._finish(replace(self._success('accepted, superseded', now), superseded=True), now)
+
+    def poll(self, now: float) -> None:
+        """Request the status, or end."""
+        if not self.is_confirming:
+            return
+        if now >= self._confirm_until:
+            self._unconfirmed(now)
+        elif now >= self._ask_at:
+            self._ask_at = now + ASK_INTERVAL
+            self._target.request_status(now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return min(self._confirm_until, self._ask_at) if self.is_confirming else math.inf
+
+    def _unconfirmed(self, now: float) -> None:
+        assert self.change is not None and self._outcome is not None
+        name, address, kind = (
+            self._target.status_name, self._target.address, self._target.kind)
+        if not self.is_accepted:
+            self._refused(self._outcome, now)
+        elif self._contradiction is not None:
+            several = f', several {kind}s answer as {address}' if self._is_shared else ''
+            self._failure(f'but {name} shows {self.change.actual(self._contradiction)}{several}',
+                          now, contradicted=True)
+        elif self._shown_by:
+            self._failure(
+                f'but not each of several {kind}s that answer as {address} has sent {name}', now)
+        elif self._has_status:
+            later = 'later ' if self._is_outdated else ''
+            waited = format_seconds(now - self._acknowledged_at)
+            self._failure(f'but no {later}{name} came within {waited}', now)
+        else:
+            self._finish(self._success(
+                f'accepted, not confirmed (the {kind} sends no {name})', now), now)
+
+    def _success(self, how: str, now: float) -> Result:
+        assert self.change is not None and self._outcome is not None
+        timing = self._outcome.timing(now - self._submitted)
+        return Result(
+            True, f'{self.change.goal}, {how}: {self._outcome.describe()} ({timing})',
+            note=self.change.note)
+
+    def _failure(self, reason: str, now: float, *, contradicted: bool = False) -> None:
+        assert self.change is not None and self._outcome is not None
+        timing = self._outcome.timing(now - self._submitted)
+        self._finish(Result(
+            False, f'{self.change.goal} not confirmed: {self._outcome.describe()}, {reason} '
+            f'({timing})', contradicted=contradicted), now)
+
+    def fail(self, message: str, now: float) -> None:
+        """End without a success, if it has not ended."""
+        if not self.is_finished:
+            self._finish(Result(False, message), now)
+
+    def _finish(self, result: Result, now: float, status: S | None = None) -> None:
+        self._step(Step.FINISH)
+        self._done(result, self.change, status, now)
+
+
+class RequestQueue(Generic[S]):
+    """The requests of one kind to one device, in the order in which they were made."""
+
+    def __init__(self, target: Target) -> None:
+        self._target = target
+        self._requests: deque[Request[S]] = deque()
+        self._status: S | None = None
+
+    @property
+    def current(self) -> Request[S] | None:
+        """Return the request that is on its way."""
+        return self._requests[0] if self._requests else None
+
+    def __len__(self) -> int:
+        """Return how many requests are on their way or wait."""
+        return len(self._requests)
+
+    def submit(self, request: Request[S], now: float) -> None:
+        """Send a request, or put it behind the others."""
+        if len(self._requests) >= MAX_WAITING:
+            request.fail(f'{MAX_WAITING} requests are waiting for {self._target.kind} '
+                         f'{self._target.address} already', now)
+            return
+        self._requests.append(request)
+        if len(self._requests) == 1:
+            request.start(self._status, now)
+            self.poll(now)
+
+    def overtake(self, request: Request[S], now: float) -> None:
+        """Send a request before those that do not overtake, which are cancelled."""
+        overtaken = [one for one in self._requests if not one.overtakes]
+        self._requests = deque(one for one in self._requests if one.overtakes)
+        self.submit(request, now)
+        for one in overtaken:
+            one.fail(OVERTAKEN, now)
+
+    def cancel(self, message: str, now: float) -> None:
+        """End all requests, whether on their way or waiting."""
+        ended, self._requests = self._requests, deque()
+        for request in ended:
+            request.fail(message, now)
+
+    def cancel_waiting(self, message: str, now: float) -> None:
+        """End the requests that wait."""
+        waiting = list(self._requests)[1:]
+        self._requests = deque(list(self._requests)[:1])
+        for request in waiting:
+            request.fail(message, now)
+
+    def take(self, report: Report[S], now: float) -> None:
+        """Take a status that is newer than all before."""
+        self._status = report.status
+        if self._requests:
+            self._requests[0].take(report, now)
+
+    def poll(self, now: float) -> None:
+        """Do what is due, and start the request that has waited."""
+        if not self._requests:
+            return
+        for waiting in list(self._requests)[1:]:
+            if now >= waiting.limit:
+                waiting.fail('not sent: earlier requests took too long', now)
+        self._requests[0].poll(now)
+        while self._requests and self._requests[0].is_finished:
+            while self._requests and self._requests[0].is_finished:
+                self._requests.popleft()
+            if self._requests:
+                self._requests[0].start(self._status, now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        if not self._requests:
+            return math.inf
+        first, *waiting = self._requests
+        if first.is_finished:
+            return -math.inf
+        return min([first.next_deadline(), *(request.limit for request in waiting)])

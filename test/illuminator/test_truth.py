@@ -1,0 +1,285 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Answers and events are true: late frames, lost commands, several lights, double restarts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from illuminator_ros.illuminator.events import (
+    AnyLightEvent,
+    Cause,
+    LightSwitched,
+    Origin,
+    StatusReceived,
+)
+from illuminator_ros.mavlink.messages import Address, CommandAck, MavCmd, MavResult
+import pytest
+from support.back_to_back import BRIDGE, Pair
+from support.fake_light import FakeLight, LIGHT
+from support.faulty_wire import Faults
+from support.shared_address import SharedAddress
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+AUTOPILOT = Address(1, 1)
+
+
+def events_of(pair: Pair) -> list[AnyLightEvent]:
+    """Return the list that further events are added to."""
+    events: list[AnyLightEvent] = []
+    pair.controller.events.subscribe(events.append)
+    return events
+
+
+def switches(events: list[AnyLightEvent]) -> list[tuple[bool, Origin, str]]:
+    return [(one.on, one.origin, one.detail) for one in events if isinstance(one, LightSwitched)]
+
+
+# Several lights at one address
+
+@pytest.mark.parametrize(('rates', 'boots'), [
+    ((1.0, 1.0), (0.0, 0.0)), ((1.0, 1.0), (0.0, 500.0)), ((1.0, 0.2), (0.0, 500.0)),
+    ((0.2, 1.0), (0.0, 500.0))], ids=['one clock', 'equal rates', 'fast second', 'fast first'])
+def test_enable_fails_where_one_of_two_lights_at_an_address_does_not_obey(
+    rates: tuple[float, float], boots: tuple[float, float],
+) -> None:
+    lights = [FakeLight(AUTOPILOT, heartbeat_type=None, stream=rate) for rate in rates]
+    for light, boot in zip(lights, boots, strict=True):
+        light.boot = boot
+    lights[0].fields['enable'] = 1
+    pair = Pair(SharedAddress(*lights, offset=0.01)).settle(15.0)
+    assert pair.snapshot.shared_address
+    # The second light reports by itself only: it answers no command and no request.
+    lights[1].results = {ON_OFF: None, MavCmd.REQUEST_MESSAGE: None}
+    lights[1].applies = False
+    for _ in range(10):
+        result = pair.enable(True)
+        assert not result.success, result.message
+        pair.run(2.0)
+    assert pair.light.restarts <= 1
+
+
+def test_a_setpoint_equal_to_the_parameter_is_sent_while_an_address_is_shared() -> None:
+    lights = [FakeLight(AUTOPILOT, heartbeat_type=None, brightness=value)
+              for value in (100.0, 40.0)]
+    pair = Pair(SharedAddress(*lights, offset=0.01)).settle(10.0)
+    assert pair.snapshot.configuration is not None
+    pair.light.set_brightness(pair.snapshot.configuration.brightness, pair.now)
+    pair.run(1.0)
+    assert len({light.fields['brightness'] for light in lights}) == 1
+
+
+# Late frames
+
+@pytest.mark.parametrize('late', [2.0, 6.0, 20.0])
+def test_a_status_that_comes_late_neither_confirms_nor_restarts(
+    fake: FakeLight, faked: Pair, late: float,
+) -> None:
+    assert faked.enable(True).success
+    old = fake.status(faked.now)
+    assert faked.enable(False).success
+    faked.run(late)
+    fake.applies = False
+    fake.stream = 0.0
+    fake.answers.clear()
+    answer = faked.ask_enable(True)
+    faked.run(0.1)
+    fake.send(old)
+    assert not faked.wait_for(answer).success
+    assert faked.light.restarts == 0
+
+
+class Delayed(FakeLight):
+    """A light without a clock whose statuses are late."""
+
+    delay = 0.9
+
+    def __init__(self) -> None:
+        super().__init__(stream=0.1)
+        self.boot = None
+        self._late: list[tuple[float, Any]] = []
+        self._now = 0.0
+
+    def status(self, now: float) -> Any:
+        self._late.append((now, super().status(now)))
+        return next(one for at, one in reversed(self._late)
+                    if at <= now - self.delay or at == self._late[0][0])
+
+
+def test_a_late_status_without_a_time_does_not_confirm() -> None:
+    light = Delayed()
+    pair = Pair(light).settle()
+    for _ in range(2):
+        pair.enable(True)
+        pair.enable(False)
+    for _ in range(6):
+        light.applies = True
+        pair.enable(True)
+        pair.run(2.0)
+        light.fields['enable'] = 0
+        light.applies = False
+        pair.run(0.1)
+        assert not pair.enable(True).success
+        pair.run(2.0)
+
+
+def test_off_is_sent_until_an_acknowledgement_cannot_be_that_of_on(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    # The light acknowledges before it switches, its acknowledgement of on is late, and off is
+    # lost on the way.
+    fake.results[ON_OFF] = None
+    assert not faked.enable(True).success
+    fake.applies = False
+    faked.near.wire.faults = Faults(drop=1.0)
+    answer = faked.ask_enable(False)
+    fake.send(CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+    faked.run(0.01)
+    assert not answer.results
+    faked.run(4.0)
+    assert not answer.result.success
+
+
+def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[ON_OFF] = MavResult.DENIED
+    assert faked.enable(True).message.startswith('refused: MAV_RESULT_DENIED')
+    fake.results[ON_OFF] = MavResult.ACCEPTED
+    answer = faked.ask_enable(True)
+    faked.near.wire.receive(faked.now)
+    faked.controller.receive(
+        LIGHT, CommandAck(ON_OFF, MavResult.DENIED, 0, 0, *BRIDGE), faked.now)
+    fake.fields['enable'] = 1
+    assert faked.wait_for(answer).success
+
+
+def test_a_second_refusal_is_named_as_one(fake: FakeLight, faked: Pair) -> None:
+    fake.results[ON_OFF] = MavResult.DENIED
+    for _ in range(2):
+        answer = faked.ask_enable(True)
+        assert faked.wait_for(answer).message.startswith('refused: MAV_RESULT_DENIED')
+        assert answer.seconds < 0.5
+
+
+# Off overtakes
+
+@pytest.mark.parametrize('result', [MavResult.IN_PROGRESS, None])
+def test_off_overtakes_on_that_waits_or_is_in_progress(
+    fake: FakeLight, faked: Pair, result: MavResult | None,
+) -> None:
+    fake.results[ON_OFF] = result
+    ons = [faked.ask_enable(True) for _ in range(31)]
+    faked.run(0.45)
+    fake.results[ON_OFF] = MavResult.ACCEPTED
+    off = faked.ask_enable(False)
+    assert [command.param1 for command in faked.commands(ON_OFF, since=faked.now)] == [0.0]
+    assert faked.wait_for(off).success
+    assert off.seconds < 1.0
+    assert {on.result.success for on in ons} == {False}
+    assert {on.result.message for on in ons} == {'cancelled by a later request'}
+
+
+# Restarts
+
+def test_two_restarts_in_a_row_do_not_lose_the_configuration(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    assert faked.configure(brightness=5.0).success
+    faked.run(60.0)
+    fake.restart(faked.now)
+    faked.run(1.1)
+    fake.silent = True
+    fake.restart(faked.now)
+    faked.run(1.08)
+    fake.silent = False
+    faked.run(6.0)
+    assert fake.fields['brightness'] == 5.0
+    assert faked.snapshot.configuration is not None
+    assert faked.snapshot.configuration.brightness == 5.0
+
+
+# Events
+
+def test_each_switch_is_one_event_with_its_origin(fake: FakeLight, faked: Pair) -> None:
+    events = events_of(faked)
+    faked.light.enable(True, faked.now, lambda result, now: None, detail='service')
+    faked.run(40.0)
+    fake.fields['enable'] = 0
+    faked.run(3.0)
+    assert switches(events) == [
+        (True, Origin.REQUEST, 'service'), (False, Origin.OTHER_SENDER, '')]
+
+
+def test_a_switch_that_takes_effect_late_is_ours(fake: FakeLight, faked: Pair) -> None:
+    fake.apply_after = 4.0
+    events = events_of(faked)
+    assert not faked.enable(True).success
+    faked.run(6.0)
+    assert switches(events) == [(True, Origin.REQUEST, '')]
+
+
+@pytest.mark.parametrize('change', [
+    lambda pair: pair.configure(mode='external_sync'), lambda pair: pair.enable(True)],
+    ids=['configure', 'enable'])
+def test_a_field_that_a_command_of_ours_implies_is_ours(
+    fake: FakeLight, faked: Pair, change: Callable[[Pair], Any],
+) -> None:
+    assert change(faked).success
+    fake.fields['brightness'] = 70.0
+    faked.run(1.5)
+    assert Cause.LIGHT not in [cause for cause, _ in faked.recorder.changes]
+
+
+def test_changes_by_another_sender_are_limited_in_rate_and_counted(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    events = events_of(faked)
+    fake.stream = 0.005
+    for number in range(400):
+        fake.fields['brightness'] = 10.0 + number % 80
+        faked.run(0.005)
+    changes = [event.left_out for event in events if hasattr(event, 'cause')]
+    logged = [left_out for left_out in changes if left_out is not None]
+    assert len(changes) > 100
+    assert len(logged) <= 4
+    assert sum(logged) + len(logged) <= len(changes)
+
+
+def test_a_strobe_period_alone_also_sets_a_duty_cycle_that_is_0(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    result = faked.configure(strobe_period=1.0)
+    assert result.success
+    assert (fake.fields['strobe_period'], fake.fields['strobe_duty_cycle']) == (1.0, 50.0)
+    assert 'strobe_duty_cycle 50 %' in result.message
+    assert result.note.startswith('strobe_duty_cycle was 0 %')
+    assert faked.configure(strobe_duty_cycle=20.0).success
+    assert not faked.configure(strobe_period=2.0).note
+    assert fake.fields['strobe_duty_cycle'] == 20.0
+
+
+def test_a_request_is_answered_before_its_status_is_published(faked: Pair) -> None:
+    order: list[str] = []
+
+    def note(event: AnyLightEvent) -> None:
+        if isinstance(event, StatusReceived) and event.status.enabled:
+            order.append('status')
+
+    faked.controller.events.subscribe(note)
+    faked.light.enable(True, faked.now, lambda result, now: order.append('answer'))
+    faked.run(1.0)
+    assert order[:2] == ['answer', 'status']
