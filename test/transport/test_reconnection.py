@@ -22,8 +22,8 @@ import socket
 import threading
 from typing import Any, Protocol
 
-from illuminator_ros.illuminator import operation
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.payload import request
 import pytest
 from support.live_link import Bridge, Jump, Lights, LiveLink
 from support.ports import free_port
@@ -123,7 +123,7 @@ class _Router:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have no change fail because the machine stood still behind its acknowledgement."""
-    monkeypatch.setattr(operation, 'CONFIRMATION_TIMEOUT', PATIENCE)
+    monkeypatch.setattr(request, 'CONFIRMATION_TIMEOUT', PATIENCE)
 
 
 @pytest.fixture
