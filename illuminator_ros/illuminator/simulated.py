@@ -30,8 +30,6 @@ from .model import checked, Configuration, flag_names, InvalidValue, Mode
 from .simulated_lamp import SimulatedLamp
 from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
 from ..mavlink.messages import (
-    CommandInt,
-    CommandLong,
     INFORMATION_ID,
     MavCmd,
     MavResult,
@@ -40,10 +38,12 @@ from ..mavlink.messages import (
 from ..payload.faults import Behaviour
 from ..payload.settings import number
 from ..payload.simulated import (
+    AnyCommand,
     Change,
     CommandReply,
     ConsoleCommand,
     Description,
+    Reply,
     SimulatedComponents,
     SimulatedDevice,
     Snapshot,
@@ -130,7 +130,7 @@ class SimulatedIlluminator(SimulatedDevice):
         """Return the ILLUMINATOR_STATUS of this moment."""
         return self.lamp.status(self.behaviour, now)
 
-    def execute(self, command: CommandLong | CommandInt, now: float) -> CommandReply | None:
+    def execute(self, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""
         self.lamp.warm(now)
         if command.command == MavCmd.ILLUMINATOR_ON_OFF:

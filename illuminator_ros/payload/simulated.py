@@ -50,6 +50,7 @@ MAX_PEERS = 100
 PROGRESS_INTERVAL = 0.5
 
 Change = Callable[[], None]
+AnyCommand = CommandLong | CommandInt
 T_contra = TypeVar('T_contra', contravariant=True)
 R_co = TypeVar('R_co', covariant=True)
 
@@ -59,6 +60,10 @@ class CommandReply(NamedTuple):
 
     result: MavResult
     change: Change | None = None
+
+
+# None where the device does not support the command.
+Reply = CommandReply | None
 
 
 class Snapshot(NamedTuple):
@@ -128,7 +133,7 @@ class SimulatedDevice(ABC):
         """Return a message of this moment, None if the device does not have it."""
 
     @abstractmethod
-    def execute(self, command: CommandLong | CommandInt, now: float) -> CommandReply | None:
+    def execute(self, command: AnyCommand, now: float) -> Reply:
         """Return the reply to a command, None if the device does not support it."""
 
     @abstractmethod

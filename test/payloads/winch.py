@@ -25,31 +25,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command import Command, CommandSender, Done
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandInt,
-    CommandLong,
-    define,
-    Float,
-    Heartbeat,
-    Int16,
-    MavResult,
-    Message,
-    UInt32,
-    UInt64,
-)
+from illuminator_ros.payload import simulated
 from illuminator_ros.payload.events import Listeners
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.registry import PayloadType
-from illuminator_ros.payload.simulated import (
-    Change,
-    CommandReply,
-    ConsoleCommand,
-    SimulatedDevice,
-    SimulatedType,
-    Snapshot,
-)
 
 WINCH = PayloadType(
     'winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
@@ -60,26 +41,26 @@ DO_WINCH = 42600
 WINCH_RELATIVE_LENGTH_CONTROL = 1
 
 
-@define(9005, 'WINCH_STATUS')
+@mav.define(9005, 'WINCH_STATUS')
 @dataclass(slots=True)
-class WinchStatus(Message):
+class WinchStatus(mav.Message):
     """See above."""
 
-    time_usec: UInt64
-    line_length: Float
-    speed: Float
-    tension: Float
-    voltage: Float
-    current: Float
-    temperature: Int16
-    status: UInt32
+    time_usec: mav.UInt64
+    line_length: mav.Float
+    speed: mav.Float
+    tension: mav.Float
+    voltage: mav.Float
+    current: mav.Float
+    temperature: mav.Int16
+    status: mav.UInt32
 
 
 @dataclass(frozen=True)
 class WinchReport:
     """The released line of a winch, m."""
 
-    address: Address
+    address: mav.Address
     line_length: float
 
 
@@ -90,21 +71,21 @@ class WinchClient:
     :ivar events: a :class:`WinchReport` for each status.
     """
 
-    messages = (Heartbeat, WinchStatus)
+    messages = (mav.Heartbeat, WinchStatus)
 
     def __init__(self, commands: CommandSender) -> None:
         self.events: Listeners[WinchReport] = Listeners()
-        self.winches: set[Address] = set()
+        self.winches: set[mav.Address] = set()
         self._commands = commands
 
-    def release(self, winch: Address, length: float, now: float, done: Done) -> None:
+    def release(self, winch: mav.Address, length: float, now: float, done: Done) -> None:
         """Release line, m, or wind it in if negative; ``done`` gets the outcome."""
         self._commands.start(
             Command(winch, DO_WINCH, (1, WINCH_RELATIVE_LENGTH_CONTROL, length)), now, done)
 
-    def receive(self, source: Address, message: object, now: float) -> None:
+    def receive(self, source: mav.Address, message: object, now: float) -> None:
         """See :meth:`Payload.receive`."""
-        if isinstance(message, Heartbeat) and message.type == MAV_TYPE_WINCH:
+        if isinstance(message, mav.Heartbeat) and message.type == MAV_TYPE_WINCH:
             self.winches.add(source)
         elif isinstance(message, WinchStatus) and source in self.winches:
             self.events.emit(WinchReport(source, message.line_length))
@@ -123,7 +104,7 @@ class WinchClient:
         return float('inf')
 
 
-class SimulatedWinch(SimulatedDevice):
+class SimulatedWinch(simulated.SimulatedDevice):
     """A winch that releases and winds in at once."""
 
     changes = frozenset({DO_WINCH})
@@ -145,31 +126,30 @@ class SimulatedWinch(SimulatedDevice):
             return WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
         return None
 
-    def execute(self, command: CommandLong | CommandInt, now: float) -> CommandReply | None:
+    def execute(self, command: simulated.AnyCommand, now: float) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
         if command.command != DO_WINCH:
             return None
         length = self.line_length + command.param3
         if command.param2 != WINCH_RELATIVE_LENGTH_CONTROL or not length >= 0:
-            return CommandReply(MavResult.DENIED)
-        return CommandReply(MavResult.ACCEPTED, partial(self.set_length, length))
+            return simulated.CommandReply(mav.MavResult.DENIED)
+        return simulated.CommandReply(mav.MavResult.ACCEPTED, partial(self.set_length, length))
 
     def set_length(self, length: float) -> None:
         """Release or wind in until so much of the line is released, m."""
         self.line_length = length
 
-    def snapshot(self, now: float) -> Snapshot:
+    def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
-        text = f'{self.line_length:.1f} m released'
-        return Snapshot(text, (text,))
+        return simulated.Snapshot(f'{self.line_length:.1f} m released', (self.line_length,))
 
-    def _release(self, words: list[str], now: float) -> Change:
+    def _release(self, words: list[str], now: float) -> simulated.Change:
         return partial(self.set_length, self.line_length + float(words[0]))
 
-    commands = {'release': ConsoleCommand('release M', 'release line', _release, (1,))}
+    commands = {'release': simulated.ConsoleCommand('release M', 'release line', _release, (1,))}
 
 
-SIMULATED = SimulatedType(
+SIMULATED = simulated.SimulatedType(
     'winch', 'winches', SimulatedWinch,
     make=lambda settings, address, several: SimulatedWinch(),
-    address=lambda settings: Address(1, 169))
+    address=lambda settings: mav.Address(1, 169))

@@ -18,14 +18,8 @@ from __future__ import annotations
 
 from illuminator_ros.mavlink.messages import Heartbeat
 from illuminator_ros.payload.checks import command, heartbeat, whole_run
+from illuminator_ros.payload.checks import requirement as base
 from illuminator_ros.payload.checks.payload_checks import PayloadChecks
-from illuminator_ros.payload.checks.requirement import (
-    Conditions,
-    fail_if,
-    MESSAGES,
-    Requirement,
-    requirement,
-)
 from illuminator_ros.payload.checks.session import Session
 from illuminator_ros.payload.checks.stream import interval_requirements
 from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTROL, WinchStatus
@@ -34,7 +28,7 @@ from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTR
 class WinchTester:
     """Releases line, and winds in as much at the end."""
 
-    def __init__(self, session: Session, conditions: Conditions) -> None:
+    def __init__(self, session: Session, conditions: base.Conditions) -> None:
         self.session = session
         self.conditions = conditions
         self.saved = ''
@@ -56,16 +50,17 @@ class WinchTester:
         return [] if await self.length() == float(self.saved) else ['line_length']
 
 
-@requirement('release', 'releases line when commanded', MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
+@base.requirement('release', 'releases line when commanded', base.MESSAGES, 'MAV_CMD_DO_WINCH',
+                  changes=True)
 async def release(tester: WinchTester) -> None:
     """Release 2 m, and compare the status."""
     before = await tester.length()
     one = await tester.session.command(DO_WINCH, 1, WINCH_RELATIVE_LENGTH_CONTROL, 2.0)
     after = await tester.length()
-    fail_if([None if after == before + 2.0 else one.finding(f'{before} m, then {after} m')])
+    base.fail_if([None if after == before + 2.0 else one.finding(f'{before} m, then {after} m')])
 
 
-REQUIREMENTS: tuple[Requirement[WinchTester], ...] = (
+REQUIREMENTS: tuple[base.Requirement[WinchTester], ...] = (
     heartbeat.heartbeat, heartbeat.heartbeat_autopilot, command.unknown_command,
     *interval_requirements(WinchStatus), release, *whole_run.ACKNOWLEDGEMENTS)
 CHECKS = PayloadChecks(
