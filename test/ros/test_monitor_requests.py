@@ -14,7 +14,6 @@
 
 """Which requests of the monitor wait for which, with services that answer when a test says so."""
 
-import threading
 from typing import Any
 
 from illuminator_ros.cli.monitor.key_bindings import dim, strobe, switch
@@ -57,7 +56,7 @@ class Bench:
         self.fleet.seen(['/bow'], 0.0)
         self.fleet.take('/bow', 'enabled', False, 0.0)
         self.fleet.agreed('/bow', 50.0)
-        self.requests = Requests(self, '/bow', self.fleet, threading.Lock(), lambda: self.now)
+        self.requests = Requests(self, '/bow', self.fleet, lambda: self.now)
         self.enable = self.clients['/bow/enable']
         self.setter = self.clients['/bow/set_parameters_atomically']
         self.getter = self.clients['/bow/get_parameters']

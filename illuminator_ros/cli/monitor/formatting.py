@@ -79,23 +79,18 @@ def temperature(value: float | None) -> str:
     return UNKNOWN if value is None else f'{value:.1f} C'
 
 
-def percent(diagnosis: Diagnosis | None, key: str) -> str:
-    """Return a value of the diagnostics that is a share, %."""
+def measured(diagnosis: Diagnosis | None, key: str) -> str:
+    """Return a value of the diagnostics with the unit of its key: ``_percent`` or ``_ms``."""
     value = diagnosis.number(key) if diagnosis else None
-    return UNKNOWN if value is None else f'{value:.2g} %' if value < 10 else f'{value:.0f} %'
-
-
-def milliseconds(diagnosis: Diagnosis | None, key: str) -> str:
-    """Return a value of the diagnostics that is a time, ms."""
-    value = diagnosis.number(key) if diagnosis else None
-    return UNKNOWN if value is None else f'{value:.2g} ms' if value < 10 else f'{value:.0f} ms'
+    unit = '%' if key.endswith('percent') else 'ms'
+    return UNKNOWN if value is None else f'{value:{".2g" if value < 10 else ".0f"}} {unit}'
 
 
 def link_quality(link: Diagnosis) -> str:
     """Return loss and round trip times of a link."""
-    return (f'{percent(link, "loss_percent")} lost, round trip '
-            f'{milliseconds(link, "round_trip_p50_ms")}, 95 % of them within '
-            f'{milliseconds(link, "round_trip_p95_ms")}')
+    return (f'{measured(link, "loss_percent")} lost, round trip '
+            f'{measured(link, "round_trip_p50_ms")}, 95 % of them within '
+            f'{measured(link, "round_trip_p95_ms")}')
 
 
 def age(seconds: float) -> str:

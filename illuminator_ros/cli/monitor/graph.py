@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
 import functools
 from typing import Any
 
@@ -76,17 +75,12 @@ class Graph:
     """
     Keeps a fleet up to date, in the thread of its node's executor.
 
-    :param lock: guards the fleet.
     :param clock: returns the time, s.
     """
 
-    def __init__(
-        self, node: Node, fleet: Fleet, lock: AbstractContextManager[Any],
-        clock: Callable[[], float],
-    ) -> None:
+    def __init__(self, node: Node, fleet: Fleet, clock: Callable[[], float]) -> None:
         self._node = node
         self._fleet = fleet
-        self._lock = lock
         self._clock = clock
         self._subscriptions: dict[str, list[Any]] = {}
         self._requests: dict[str, Requests] = {}
@@ -110,17 +104,13 @@ class Graph:
         """Find new and gone lights, and give up requests without an answer."""
         topics = self._node.get_topic_names_and_types()
         names = lights_among(topics, self._node.count_publishers)
-        now = self._clock()
-        with self._lock:
-            new = self._fleet.seen(names, now)
-        for name in new:
+        for name in self._fleet.seen(names, self._clock()):
             self._subscriptions[name] = [
                 self._node.create_subscription(
                     type_, f'{name}/{topic}', functools.partial(self._take, name, topic),
                     STREAM_QOS if topic == 'temperature' else STATE_QOS)
                 for topic, type_ in TOPICS.items()]
-            self._requests[name] = Requests(
-                self._node, name, self._fleet, self._lock, self._clock)
+            self._requests[name] = Requests(self._node, name, self._fleet, self._clock)
         for requests in self._requests.values():
             requests.poll()
 
@@ -133,27 +123,23 @@ class Graph:
             self._jobs.popleft()()
 
     def _submit(self, name: str, ask: Ask) -> None:
-        with self._lock:
-            light = self._fleet.get(name)
-            request = ask(light) if light else None
-            if request is None:
-                self._fleet.acted(name, 'not asked', Outcome.FAILED,
-                                  'its brightness is not known yet', self._clock())
-        if request is not None:
+        with self._fleet.light(name) as light:
+            request = ask(light)
+        if request is None:
+            self._fleet.acted(name, 'not asked', Outcome.FAILED,
+                              'its brightness is not known yet', self._clock())
+        elif name in self._requests:
             self._requests[name].submit(request)
 
     def _clear_gone(self) -> None:
-        with self._lock:
-            names = self._fleet.clear_gone()
-        for name in names:
+        for name in self._fleet.clear_gone():
             self._requests.pop(name).destroy()
             for subscription in self._subscriptions.pop(name):
                 self._node.destroy_subscription(subscription)
 
     def _take(self, name: str, topic: str, message: Any) -> None:
         value = message.temperature if topic == 'temperature' else message.data
-        with self._lock:
-            self._fleet.take(name, topic, value, self._clock())
+        self._fleet.take(name, topic, value, self._clock())
 
     def _diagnosed(self, array: Any) -> None:
         for status in array.status:
@@ -161,13 +147,11 @@ class Graph:
             # The name of the status has the node's name without its namespace.
             name, kind = values.get('node', ''), status.name.rpartition(': ')[2]
             diagnosis = Diagnosis(status.level[0], status.message, values)
-            with self._lock:
-                self._fleet.diagnosed(name, kind, diagnosis, self._clock())
+            self._fleet.diagnosed(name, kind, diagnosis, self._clock())
 
     def _changed(self, event: Any) -> None:
         for parameter in [*event.new_parameters, *event.changed_parameters]:
             if parameter.name == 'brightness':
                 value = parameter_value_to_python(parameter.value)
                 if isinstance(value, float):
-                    with self._lock:
-                        self._fleet.agreed(event.node, value)
+                    self._fleet.agreed(event.node, value)

@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+import contextlib
+import copy
 from dataclasses import dataclass, field
 from enum import Enum
 import math
+import threading
 from typing import Any
 
 from ...illuminator.model import flag_names
@@ -151,56 +154,61 @@ class Light:
 
 
 class Fleet:
-    """All lights that were discovered, by name."""
+    """All lights that were discovered, by name; callable from any thread."""
 
     def __init__(self) -> None:
         self._lights: dict[str, Light] = {}
+        self._lock = threading.Lock()
 
     @property
     def lights(self) -> list[Light]:
         """Return the lights, sorted by their names."""
         return [self._lights[name] for name in sorted(self._lights)]
 
-    def get(self, name: str | None) -> Light | None:
-        """Return a light, None if there is none of this name."""
-        return self._lights.get(name or '')
+    def snapshot(self) -> list[Light]:
+        """Return copies of the lights, sorted by their names."""
+        with self._lock:
+            return copy.deepcopy(self.lights)
+
+    @contextlib.contextmanager
+    def light(self, name: str) -> Iterator[Light]:
+        """Yield a light to read or change; changes of an unknown one are discarded."""
+        with self._lock:
+            yield self._lights.get(name) or Light(name, 0.0)
 
     def seen(self, names: Iterable[str], now: float) -> list[str]:
         """Take the names of the lights in the graph; return the new ones."""
         present = set(names)
-        for light in self._lights.values():
-            if light.name in present:
-                if light.gone_at is not None:
+        with self._lock:
+            for light in self._lights.values():
+                if light.name not in present:
+                    light.gone_at = now if light.gone_at is None else light.gone_at
+                elif light.gone_at is not None:
                     # Another bridge may serve it now, with another setpoint.
                     light.gone_at = light.setpoint = None
-            elif light.gone_at is None:
-                light.gone_at = now
-        new = sorted(present - set(self._lights))[:MAX_LIGHTS - len(self._lights)]
-        for name in new:
-            self._lights[name] = Light(name, now)
+            new = sorted(present - set(self._lights))[:MAX_LIGHTS - len(self._lights)]
+            self._lights |= {name: Light(name, now) for name in new}
         return new
 
     def clear_gone(self) -> list[str]:
         """Remove the lights that left the graph, and return their names."""
-        gone = [light.name for light in self._lights.values() if light.gone_at is not None]
-        for name in gone:
-            del self._lights[name]
+        with self._lock:
+            gone = [light.name for light in self._lights.values() if light.gone_at is not None]
+            for name in gone:
+                del self._lights[name]
         return gone
 
     def take(self, name: str, topic: str, value: Any, now: float) -> None:
         """Take a value that a light has published."""
-        light = self._lights.get(name)
-        if light is None:
-            return
-        light.heard_at = now
-        light.values[topic] = printable(value) if isinstance(value, str) else value
-        if topic == 'temperature' and math.isfinite(value):
-            light.temperatures.add(value, now)
+        with self.light(name) as light:
+            light.heard_at = now
+            light.values[topic] = printable(value) if isinstance(value, str) else value
+            if topic == 'temperature' and math.isfinite(value):
+                light.temperatures.add(value, now)
 
     def agreed(self, name: str, brightness: float) -> None:
         """Take the parameter brightness of a light, %."""
-        light = self._lights.get(name)
-        if light is not None:
+        with self.light(name) as light:
             light.setpoint = brightness
 
     def diagnosed(self, name: str, kind: str, diagnosis: Diagnosis, now: float) -> None:
@@ -209,21 +217,18 @@ class Fleet:
 
         :param kind: ``link`` or ``lamp``; others are ignored.
         """
-        light = self._lights.get(name)
-        if light is None:
-            return
-        light.heard_at = now
         clean = Diagnosis(diagnosis.level, printable(diagnosis.message), {
             printable(key): printable(value) for key, value in diagnosis.values.items()})
-        if kind == 'link':
-            light.link = clean
-        elif kind == 'lamp':
-            light.lamp = clean
+        with self.light(name) as light:
+            light.heard_at = now
+            if kind == 'link':
+                light.link = clean
+            elif kind == 'lamp':
+                light.lamp = clean
 
     def acted(self, name: str, text: str, outcome: Outcome, answer: str, now: float) -> None:
         """Take the outcome of a request to a light."""
-        light = self._lights.get(name)
-        if light is not None:
+        with self.light(name) as light:
             light.action = Action(text, outcome, printable(answer), now)
 
 

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
@@ -52,13 +51,11 @@ class Requests:
     """
 
     def __init__(
-        self, node: Node, name: str, fleet: Fleet, lock: AbstractContextManager[Any],
-        clock: Callable[[], float],
+        self, node: Node, name: str, fleet: Fleet, clock: Callable[[], float],
     ) -> None:
         self._node = node
         self._name = name
         self._fleet = fleet
-        self._lock = lock
         self._clock = clock
         self._clients = {service: node.create_client(type_, f'{name}/{service.value}')
                          for service, type_ in _TYPES.items()}
@@ -89,9 +86,8 @@ class Requests:
         if self._asked is not None and now >= self._asked[1]:
             self._getter.remove_pending_request(self._asked[0])
             self._asked = None
-        with self._lock:
-            light = self._fleet.get(self._name)
-            known = light is None or light.gone_at is not None or light.setpoint is not None
+        with self._fleet.light(self._name) as light:
+            known = light.gone_at is not None or light.setpoint is not None
         if not known and self._asked is None and self._getter.service_is_ready():
             future = self._getter.call_async(GetParameters.Request(names=['brightness']))
             self._asked = future, now + ANSWER_LIMIT
@@ -126,8 +122,7 @@ class Requests:
             return
         if one.request.service is Service.SET:
             if response.result.successful and 'brightness' in one.request.value:
-                with self._lock:
-                    self._fleet.agreed(self._name, one.request.value['brightness'])
+                self._fleet.agreed(self._name, one.request.value['brightness'])
             self._end(one, response.result.successful, response.result.reason)
         else:
             self._end(one, response.success, response.message)
@@ -146,16 +141,13 @@ class Requests:
         self._asked = None
         if future.exception() is None and future.result() is not None:
             values = [parameter_value_to_python(value) for value in future.result().values]
-            with self._lock:
-                light = self._fleet.get(self._name)
+            with self._fleet.light(self._name) as light:
                 # A parameter event that came meanwhile is newer.
-                if (light is not None and light.setpoint is None and values
-                        and isinstance(values[0], float)):
+                if light.setpoint is None and values and isinstance(values[0], float):
                     light.setpoint = values[0]
 
     def _note(self, request: Request, outcome: Outcome, answer: str) -> None:
-        with self._lock:
-            self._fleet.acted(self._name, request.text, outcome, answer, self._clock())
+        self._fleet.acted(self._name, request.text, outcome, answer, self._clock())
 
     def _show_wanted(self) -> None:
         wanted: dict[str, Any] = {}
@@ -165,10 +157,8 @@ class Requests:
                 wanted |= request.value
             elif request.service is Service.ENABLE:
                 wanted['enabled'] = request.value
-        with self._lock:
-            light = self._fleet.get(self._name)
-            if light is not None:
-                light.wanted = wanted
+        with self._fleet.light(self._name) as light:
+            light.wanted = wanted
 
 
 def _message(request: Request) -> Any:

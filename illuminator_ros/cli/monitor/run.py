@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-import copy
 import sys
 import threading
 import time
@@ -78,22 +77,18 @@ class Monitor:
     The lights that a node discovers, in a thread of its own.
 
     :ivar clock: returns the time, s.
+    :ivar lights: returns copies of the lights as they are now.
     """
 
     def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
         self.clock = clock
-        self._fleet = Fleet()
-        self._lock = threading.Lock()
-        self.graph = Graph(node, self._fleet, self._lock, clock)
+        fleet = Fleet()
+        self.lights = fleet.snapshot
+        self.graph = Graph(node, fleet, clock)
         self._executor = NodeExecutor(node.context, NodeLog(node.get_logger()))
         self._executor.add_node(node)
         self._thread = threading.Thread(target=self._executor.run, name='ros', daemon=True)
         self._thread.start()
-
-    def lights(self) -> list[Light]:
-        """Return the lights as they are now."""
-        with self._lock:
-            return copy.deepcopy(self._fleet.lights)
 
     def end(self) -> None:
         """End the thread."""
