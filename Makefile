@@ -1,4 +1,5 @@
-# On a machine without ROS: make demo, make test. With ROS sourced, the same with its rclpy.
+# Without ROS, make demo and make test install ROS 2 wheels into .venv; with ROS sourced they use
+# its rclpy.
 PYTHON_IN_VENV := .venv/bin/python
 TESTS ?= test
 
@@ -9,14 +10,15 @@ BENCH ?=
 .PHONY: help demo test check lint unit fuzz soak bench clean environment
 
 help:
-	@echo 'make demo    a simulated light and the bridge: the main job, shown'
-	@echo 'make test    all tests, and the linters'
-	@echo 'make unit    the tests that need no ROS'
-	@echo 'make lint    ruff, mypy and the linters of ROS'
-	@echo 'make fuzz    hostile input to both sides of the link for SECONDS=60'
-	@echo 'make soak    simulator and bridge with random faults for SECONDS=60'
-	@echo 'make bench   every target measured beside its peers, 5 minutes'
-	@echo 'make clean   remove .venv and what was built'
+	@echo 'make demo    run a simulated light and the bridge, and show what they do'
+	@echo 'make test    run all checks and tests'
+	@echo 'make unit    run the tests that need no ROS'
+	@echo 'make check   run ruff and mypy'
+	@echo 'make lint    run ruff, mypy and the linters of ROS'
+	@echo 'make fuzz    send hostile input to both sides of the link for SECONDS=60'
+	@echo 'make soak    run simulator and bridge with random faults for SECONDS=60'
+	@echo 'make bench   measure each target beside its peers, 5 minutes; options in BENCH'
+	@echo 'make clean   remove .venv and all build files'
 
 environment:
 	@python3 tools/environment.py
