@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the command lines of the executables without ROS have in common."""
+"""Options that the executables without ROS share."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ..mavlink.signing_files import keyed, TimestampStore
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says in one line what is wrong; the usage would bury it."""
+    """A parser whose error is one line without the usage."""
 
     def error(self, message: str) -> NoReturn:
         """See :meth:`argparse.ArgumentParser.error`."""
@@ -47,7 +47,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def number(low: float, high: float) -> Callable[[str], float]:
-    """Return what reads a number of a range."""
+    """Return a function that reads a number within a range."""
     def read(text: str) -> float:
         value = float(text)
         if not low <= value <= high:
@@ -58,7 +58,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
 
 
 def integer(low: int, high: int) -> Callable[[str], int]:
-    """Return what reads an integer of a range."""
+    """Return a function that reads an integer within a range."""
     def read(text: str) -> int:
         value = int(text)
         if not low <= value <= high:
@@ -77,7 +77,7 @@ def address(text: str) -> Address:
     system, slash, component = text.partition('/')
     if not (slash and system.isdecimal() and component.isdecimal()
             and 1 <= int(system) <= 255 and int(component) <= 255):
-        raise ValueError(f'{text!r} is no address such as 1/243')
+        raise ValueError(f'{text!r} is not an address such as 1/243')
     return Address(int(system), int(component))
 
 
@@ -91,7 +91,7 @@ def add_signing(parser: argparse.ArgumentParser) -> None:
 
 def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampStore | None]:
     """
-    Return what the options of message signing ask for.
+    Return the signing that the options select.
 
     :param name: whose time stamps are kept.
     :raises ValueError: if a key is given and not used, which would look like protection.

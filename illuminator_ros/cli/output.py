@@ -33,13 +33,13 @@ WRITE_SIZE = 4096
 
 class OutputQueue:
     """
-    Stands between descriptors of this process and their readers.
+    A queue between descriptors of this process and their readers.
 
     Each descriptor leads to a pipe that never blocks, also for C code that holds the
     interpreter's lock. A thread writes what comes from there as fast as it is read. Lines that do
     not fit into the queue are dropped; their number is written once there is room again.
 
-    :param descriptors: such as 1 and 2; those that are closed are left alone.
+    :param descriptors: such as 1 and 2; closed ones are ignored.
     """
 
     def __init__(self, *descriptors: int) -> None:
@@ -108,12 +108,12 @@ class _Stream:
         self._dropping = False
 
     def redirect(self) -> None:
-        """Have the descriptor lead here."""
+        """Redirect the descriptor to this queue."""
         os.dup2(self._input, self.descriptor)
         os.close(self._input)
 
     def cut_off(self) -> None:
-        """Have the descriptor lead nowhere, so that the source comes to its end."""
+        """Redirect the descriptor to /dev/null, so that the source ends."""
         with open(os.devnull, 'wb') as nowhere:
             os.dup2(nowhere.fileno(), self.descriptor)
 

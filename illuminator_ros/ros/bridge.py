@@ -45,14 +45,14 @@ from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
 from ..payload.registry import PayloadType
 
-# s; SIGINT and SIGTERM end the process within 1 s, these and the leaving of ROS included.
+# s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
 THREADS_LIMIT = 0.1
-# s between looks at the diagnostics, and at least between two that events cause.
+# s between checks of the diagnostics, and the minimum between two checks after events.
 TICK = 0.25
 CHECK_INTERVAL = 0.02
-# s between looks for another node of the same name.
+# s between checks for another node of the same name.
 NAMES_INTERVAL = 5.0
 # Characters of a node's full name: topics and services below it, with the prefixes and suffixes
 # of the middleware, must have at most 255.
@@ -63,7 +63,7 @@ class Bridge:
     """
     Connects the nodes of payloads with one link.
 
-    :param node: the first node, that of the first payload.
+    :param node: the node of the first payload.
     :param arguments: the command line, which the nodes of further devices follow too.
     :param types: the kinds of payloads that the parameter ``payloads`` may name.
     :raises ParameterError: if a parameter is wrong.
@@ -91,7 +91,7 @@ class Bridge:
         self.link = Link(
             parameters.url, self.component, label=parameters.connection_url,
             on_event=self._link_event, signing=signing, store=store)
-        # Set where there is something to do before the next tick.
+        # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()
         self._closed = threading.Event()
@@ -118,7 +118,7 @@ class Bridge:
                 self._executor.add_node(own)
         for warning in misspelt(node):
             self.log.warning(warning)
-        # A whole number of ticks makes a period, which would else now and then be one too long.
+        # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(
             parameters.diagnostics_period / TICK)
 
@@ -141,15 +141,15 @@ class Bridge:
         self.pool.join(deadline)
         for payload in self._payloads:
             payload.close()
-        # At once, so that other nodes see that they are gone.
+        # At once, so that other nodes notice the end.
         for node in self.nodes:
             node.destroy_node()
 
     def end(self) -> None:
         """
-        Bring the devices into the state in which they are left, and have :meth:`run` return.
+        Bring the devices into their final state, and make :meth:`run` return.
 
-        It does not need the executor, which may be busy. Takes 0.75 s at most; callable from any
+        Does not need the executor, which may be busy. Takes 0.75 s at most; callable from any
         thread, once.
         """
         self._ended.set()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages as they go on the wire (CDR, little endian): publishing bytes takes half the time."""
+"""Serialised messages (CDR, little endian): publishing bytes takes half the time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def serializer(type_: Any) -> Callable[[Any], Any]:
     """
     Return what a publisher publishes for a value of ``data``.
 
-    :param type_: a message class; the messages of one that is not known here are left as they are.
+    :param type_: a message class; messages of unknown classes are not serialised.
     """
     pack = _PACK.get(type_)
     if pack is not None:

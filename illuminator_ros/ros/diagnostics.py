@@ -15,9 +15,9 @@
 """
 /diagnostics (REP 107): findings, statuses, and the status of the link.
 
-Snapshots are made in the link's thread; all else is a pure function of them. Keys bear their
-unit, and a value that is a number is nothing but that number, so that it can be plotted. Times
-are s on the link's clock.
+Snapshots are made in the link's thread; everything else is a pure function of them. Keys have
+their unit, and a numeric value is a plain number, so that it can be plotted. Times are s on the
+link's clock.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from ..mavlink.messages import Address
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
-# s in which a device may be looked for before its absence is an error.
+# s until the absence of a device is an error.
 DISCOVERY_GRACE = 10.0
-# % of the frames of a device that may be lost without a warning.
+# % of lost frames of a device above which there is a warning.
 LOSS_WARNING = 5.0
 
 # A level and a text for people.
@@ -48,7 +48,7 @@ Value = str | int | float | bool | None
 @dataclass(frozen=True)
 class Report:
     """
-    One DiagnosticStatus to be.
+    The content of one DiagnosticStatus.
 
     :param name: without the node's name, such as ``link``.
     :param fine: the message where there is no finding.
@@ -109,7 +109,7 @@ class LinkSnapshot:
 
 
 def link_snapshot(link: Link, component: Component, url: str, now: float) -> LinkSnapshot:
-    """Return what is known of the link; in its thread."""
+    """Return a snapshot of the link; call it in the link's thread."""
     state = link.state()
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
     commands = component.commands
@@ -155,7 +155,7 @@ def link_snapshot(link: Link, component: Component, url: str, now: float) -> Lin
 
 def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
     """
-    Return the likeliest reason why an open link brings no device, for people.
+    Return the likeliest reason why no device is found on an open link, for people.
 
     :param device: such as ``an illuminator``.
     """
@@ -168,10 +168,10 @@ def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
     if link.unsigned and not link.frames_received:
         return f'{link.unsigned} frames refused because they are not signed'
     if link.frames_received:
-        return f'{link.frames_received} frames came, none from {device}'
+        return f'{link.frames_received} frames received, none from {device}'
     if link.bytes_received:
-        return f'{link.bytes_received} bytes came and no good frame, as with a wrong baud rate'
-    return 'nothing comes in'
+        return f'{link.bytes_received} bytes received, no valid frame; check the baud rate'
+    return 'nothing is received'
 
 
 def link_findings(
@@ -197,7 +197,7 @@ def link_findings(
             f'no {what} connected for {format_seconds(waited)}'
             + (f': {absence}' if link.state.is_open else '')))
     if device in link.unanswering and link.unchecked:
-        findings.append((WARN, 'commands go unanswered, and the others sign their frames while '
+        findings.append((WARN, 'commands are not answered, and others sign their frames while '
                                'signing_mode is off'))
     loss = link.devices.get(device, {}).get('loss_percent') if device else None
     if isinstance(loss, float) and loss > LOSS_WARNING:

@@ -29,7 +29,7 @@ from .node import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 
-# s for which the link's thread may take to answer, at most.
+# Longest wait for the link's thread, s.
 SNAPSHOT_TIMEOUT = 1.0
 
 # Makes reports of a snapshot that was taken in the link's thread; a pure function.
@@ -81,7 +81,7 @@ class DiagnosticsPublisher:
             self._sources.pop(source, None)
 
     def look(self, now: float) -> LinkSnapshot:
-        """Return what is known of the link; in its thread."""
+        """Return a snapshot of the link; call it in the link's thread."""
         return link_snapshot(self._link, self._component, self._url, now)
 
     def poll(self, tolerance: float) -> None:

@@ -15,9 +15,9 @@
 """
 An executor that keeps its wait set, and services that answer later.
 
-rclpy makes lists, a wait set, a task and three coroutines anew for each callback, and passes
-through all of that twice more after it. That takes 0.2 ms before and 0.2 ms after the callback
-of a service, which itself takes 0.01 ms.
+For each callback rclpy makes new lists, a wait set, a task and three coroutines, and does so
+twice more afterwards. That takes 0.2 ms before and 0.2 ms after the callback of a service, which
+itself takes 0.01 ms.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from .log import NodeLog
 
-# s between looks at the calls where rclpy's own loop is used.
+# s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1
 
 # Takes a request and the function that sends the response, from any thread. Messages and
@@ -90,17 +90,17 @@ class NodeExecutor(SingleThreadedExecutor):
         self._release()
 
     def end(self) -> None:
-        """Have :meth:`run` return; callable from any thread."""
+        """Make :meth:`run` return; callable from any thread."""
         self._ended.set()
         self.call(lambda: None)
 
     def call(self, function: Callable[[], None]) -> None:
-        """Have a function called in the executor's thread; callable from any thread."""
+        """Call a function in the executor's thread; callable from any thread."""
         self._calls.append(function)
         self._wakeup.trigger()
 
     def wake(self) -> None:
-        """See :meth:`Executor.wake`: an entity or node has come or gone."""
+        """See :meth:`Executor.wake`: an entity or node was added or removed."""
         super().wake()
         if hasattr(self, '_stale'):
             self._stale.set()
@@ -161,7 +161,7 @@ class NodeExecutor(SingleThreadedExecutor):
             else:
                 respond(service.callback(request, service.srv_type.Response()))
         except Exception:
-            # The client gets an answer, whatever is wrong with us.
+            # The client gets an answer after internal errors, too.
             respond(service.srv_type.Response())
             raise
 
@@ -182,7 +182,7 @@ class NodeExecutor(SingleThreadedExecutor):
 
 
 def _send(service: Any, header: Any, response: Any) -> None:
-    # A node may have gone with its light.
+    # The node of a forgotten device may be gone.
     with contextlib.suppress(InvalidHandle):
         service.send_response(response, header)
         # The client may wait for this processor.
@@ -190,7 +190,7 @@ def _send(service: Any, header: Any, response: Any) -> None:
 
 
 class _Entities:
-    """A wait set and all that is added to it, kept from being destroyed meanwhile."""
+    """A wait set and its entities, which it protects from destruction."""
 
     def __init__(
         self, services: list[Any], subscriptions: list[Any], guards: list[Any], context: Context,
@@ -214,7 +214,7 @@ class _Entities:
 
     @classmethod
     def of(cls, nodes: list[Any], wakeup: GuardCondition, context: Context) -> _Entities | None:
-        """Return those of nodes, None if a node has others than services and subscriptions."""
+        """Return the entities of nodes, None if not all are services and subscriptions."""
         if any(True for node in nodes
                for others in (node.timers, node.clients, node.waitables) for _ in others):
             return None

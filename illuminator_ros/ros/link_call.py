@@ -25,7 +25,7 @@ from ..mavlink.link import Link
 
 T = TypeVar('T')
 
-# Requests of one kind that wait for their answers at a time.
+# Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
 
 # A request: called in the link's thread with the time, s, and with the function that it must
@@ -51,7 +51,7 @@ class LinkCalls:
         self, request: Request[T], answer: Callable[[T], None], refuse: Callable[[str], None],
     ) -> None:
         """
-        Have a request carried out, without waiting for the link.
+        Start a request without waiting for the link.
 
         One of the two is called once, in any thread.
 

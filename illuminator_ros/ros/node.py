@@ -31,14 +31,14 @@ from .link_call import LinkCalls, MAX_PENDING
 from .log import NodeLog
 from ..mavlink.link import Link
 
-# A late subscriber gets the last value.
+# Late subscribers get the last value.
 STATE_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# Publishers of both kinds are heard.
+# Matches reliable and best-effort publishers.
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-# Requests that the middleware keeps while others are taken; more than LinkCalls lets wait.
+# Requests that the middleware queues; more than LinkCalls lets wait.
 SERVICE_QOS = QoSProfile(depth=2 * MAX_PENDING, reliability=ReliabilityPolicy.RELIABLE)
 
 
@@ -46,7 +46,7 @@ class PayloadNode(Node):
     """
     A node without rclpy's parameter services and QoS events.
 
-    An executor would wait for an event of each publisher and subscription, and memory is theirs.
+    An executor would wait for an event of each publisher and subscription, which also take memory.
 
     :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Nodes that come and go with their devices, run by few threads."""
+"""Nodes of further devices, made and removed while the process runs, on few threads."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ from .log import NodeLog
 from .node import PayloadNode
 from .parameters import ParameterError
 
-# Threads for all nodes but the first. Each more costs a thread; each node more on one costs it
-# 5 us a callback.
+# Threads for all nodes except the first. Each further node on a thread costs 5 us a callback.
 EXECUTORS = 1
-# s to the next try to make a node, doubling up to the last.
+# s to the next attempt to make a node, from the first to the longest.
 RETRY_DELAYS = (0.5, 30.0)
 
 
@@ -53,7 +52,7 @@ class NodePool:
 
     :param first: the process's first node; the others share its namespace and context.
     :param arguments: the ROS arguments that the nodes follow.
-    :param wake: has :meth:`work` called soon.
+    :param wake: requests a call of :meth:`work`.
     """
 
     def __init__(
@@ -75,7 +74,7 @@ class NodePool:
         """
         Make a node soon; callable from any thread.
 
-        What fails is tried again.
+        A failure is tried again.
 
         :param device: the device of the node, for people.
         :param serve: gives the node its interface; called by :meth:`work`.
@@ -92,7 +91,7 @@ class NodePool:
         self._wake()
 
     def work(self) -> bool:
-        """Remove the nodes that are not wanted and make one that is; return whether more wait."""
+        """Remove unwanted nodes and make one wanted node; return whether more must be made."""
         now = time.monotonic()
         with self._lock:
             unwanted, self._unwanted = self._unwanted, []
@@ -109,7 +108,7 @@ class NodePool:
         except ParameterError as error:
             self._log.error(f'{wanted.device} gets no node: {error}')
         except Exception as error:
-            # Threads, descriptors or memory may be short for a while.
+            # Threads, descriptors or memory may be short temporarily.
             self._log.error(f'{wanted.device} gets no node yet: {error}; trying again in '
                             f'{wanted.delay:g} s', f'node {key}')
             wanted.due = time.monotonic() + wanted.delay

@@ -16,9 +16,8 @@
 The parameter services of a node whose parameters live in a device.
 
 rclpy's own answer from synchronous callbacks: while one waits for the device, the executor
-stands still, and each parameter of a list is a command of its own. With these, a set waits for
-the device's acknowledgement while everything else goes on, and the values of one call go out in
-one command.
+is blocked, and each parameter of a list needs a command of its own. Here a set waits for the
+device's acknowledgement without blocking, and the values of one call are one command.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ from .log import NodeLog
 from .parameters import DeviceParameters
 from ..mavlink.link import Link
 
-# Names in one request; longer lists would hold up the other services of the node.
+# Names in one request; longer lists would delay the other services of the node.
 MAX_NAMES = 1000
 # Requests that wait in the middleware, each of the size of a few parameters.
 QUEUE_DEPTH = 100

@@ -48,7 +48,7 @@ _TYPES: dict[type, tuple[Parameter.Type, str]] = {
 
 
 class ParameterError(ValueError):
-    """A parameter that the node cannot start with; the message names it and says why."""
+    """A wrong parameter; the message names it and gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,10 @@ class ParameterSpec:
     """
     One parameter.
 
-    :param default: its type is that of the parameter; for a parameter of a device only the type
-        counts.
+    :param default: it defines the type; the value is not used for a parameter of a device.
     :param unit: of the value and of its range, '' for none.
     :param low: and ``high``, the range of a number, both ends included.
-    :param choices: the values of a string, where they are few.
+    :param choices: the permitted values of a string.
     :param constraints: other conditions on the value, for people.
     """
 
@@ -96,7 +95,7 @@ class ParameterSpec:
         """
         Return the descriptor that tools show.
 
-        :param high: the upper end of the range where it is another than that of the table.
+        :param high: the upper end of the range, if it differs from the table.
         """
         unit = f' [{self.unit}]' if self.unit else ''
         constraints = self.constraints
@@ -294,9 +293,9 @@ class DeviceParameters:
         return '' if result.successful else str(result.reason)
 
     def set_high(self, name: str, high: float) -> None:
-        """Show another upper end of the range of a number; its value is made to fit."""
+        """Show another upper end of the range of a number; its value is limited to it."""
         value = self._node.get_parameter_or(name).value
-        # rclpy cannot describe anew what has no value; that follows with the first one.
+        # rclpy cannot change the descriptor of a parameter without a value; the first value does.
         if isinstance(value, float) and math.isfinite(high):
             self._showing = True
             try:

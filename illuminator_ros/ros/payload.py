@@ -30,19 +30,19 @@ from ..mavlink.command import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.link import Link
 
-# Takes the outcome of the shutdown of one device: its key, the severity (of logging) and a line.
+# Takes the outcome of the shutdown of one device: its key, the severity (logging) and a line.
 ShutdownReport = Callable[[Hashable, int, str], None]
 
 
 @dataclass(frozen=True)
 class Host:
     """
-    What the bridge offers to the ROS half of one payload.
+    The services that the bridge offers to the ROS half of one payload.
 
     :param node: the payload's own node.
     :param nodes: makes nodes of further devices.
     :param values: of the payload's read-only parameters.
-    :param check_diagnostics: has levels compared at once; callable from any thread.
+    :param check_diagnostics: checks the levels at once; callable from any thread.
     """
 
     node: Node
@@ -56,22 +56,22 @@ class Host:
 
 
 class ServedPayload:
-    """A payload that is served. All but :meth:`close` is called in the link's thread."""
+    """A payload that is served. All but :meth:`close` runs in the link's thread."""
 
     def poll(self, now: float) -> None:
         """Do what is due; called a few times a second."""
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """
-        Bring devices into the state in which they are left; the bridge ends.
+        Bring devices into their final state, because the bridge ends.
 
-        :param report: called once for each device with what became of it, then or later.
-        :return: by the keys of the devices, the line for one that is not reported in time.
+        :param report: called once for each device with its outcome, at once or later.
+        :return: by the keys of the devices, the line for a device that is not reported in time.
         """
         return {}
 
     def close(self) -> None:
-        """Take back what others would go on to show, before the nodes are destroyed."""
+        """Remove what other programs would continue to show, before the nodes are destroyed."""
 
 
 @dataclass(frozen=True)

@@ -70,8 +70,8 @@ def diagnostics(light: ServedLight, recorded: Diagnostics) -> Iterator[Diagnosti
     ({'error_status': 3}, ERROR, 'switched off because it is too hot; dimmed because it is hot'),
     ({'error_status': 8}, WARN, 'unknown flags 0x8'),
     ({'error_status': 0x80000000}, WARN, 'unknown flags 0x80000000'),
-    ({'brightness': math.nan}, WARN, 'not believable: brightness nan'),
-    ({'temp_c': math.inf}, WARN, 'not believable: temp_c inf'),
+    ({'brightness': math.nan}, WARN, 'implausible: brightness nan'),
+    ({'temp_c': math.inf}, WARN, 'implausible: temp_c inf'),
 ])
 def test_fault_in_a_status_is_published_at_once_and_so_is_its_end(
     light: ServedLight, diagnostics: Diagnostics, report: dict[str, float], level: bytes,

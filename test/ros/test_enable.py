@@ -224,7 +224,7 @@ def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
 ) -> None:
     with running_bridge(own_ros.domain, port):
         assert no_light_messages(own_ros) == {
-            f'no light connected: none heard yet on udp 127.0.0.1:{port}: nothing comes in'}
+            f'no light connected: none heard yet on udp 127.0.0.1:{port}: nothing is received'}
         assert Parameters(own_ros).get('brightness') == [None]
 
 

@@ -55,13 +55,13 @@ def test_missing_light_is_logged_once_and_answers_name_the_likeliest_reason(
         CLOCK.forward(5 * NO_LIGHT_GRACE)
 
         stranger.sendto(bytes(range(90)), ('127.0.0.1', port))
-        while 'nothing comes in' in (message := own_ros.enable().message):
+        while 'nothing is received' in (message := own_ros.enable().message):
             pass
-        assert '90 bytes came and no good frame, as with a wrong baud rate' in message
+        assert '90 bytes received, no valid frame; check the baud rate' in message
         stranger.sendto(frame_of(heartbeat(AUTOPILOT), source=Address(1, 1)), ('127.0.0.1', port))
-        while 'no good frame' in (message := own_ros.enable().message):
+        while 'no valid frame' in (message := own_ros.enable().message):
             pass
-        assert '1 frames came, none from an illuminator' in message
+        assert '1 frames received, none from an illuminator' in message
         with ServedLight(port), ServedLight(port, source=Address(1, 244)):
             bridge.wait_for('light 1/243')
             bridge.wait_for('light 1/244')

@@ -91,6 +91,6 @@ def test_light_that_requires_signing_is_recognised_while_signing_is_off(
         diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
 
         pass_time_until(lambda: any(
-            'commands go unanswered' in array.status[0].message
+            'commands are not answered' in array.status[0].message
             and 'signing_mode is off' in array.status[0].message
             for array in list(diagnostics.messages)))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What simulated lights do, in a line each."""
+"""The state of each simulated component, a line each."""
 
 from __future__ import annotations
 
@@ -56,23 +56,23 @@ def look(component: SimulatedComponent[Any], now: float) -> Look:
 
 
 class PlainView:
-    """Plain lines, for each light when it does something else."""
+    """Plain lines, one for each change of a component."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._shown: dict[str, Look] = {}
 
     def show(self, looks: Sequence[Look]) -> None:
-        """Take what the lights do now."""
+        """Take the present state of the components."""
         for one in looks:
             if one.differs(self._shown.get(one.name)):
                 self._shown[one.name] = one
                 self.say(str(one))
 
     def say(self, text: str, *, typed: str | None = None) -> None:
-        """Write something else, unless it is nothing."""
+        """Write a text, unless it is empty."""
         if text:
-            # The lights go on where nobody reads what they do any more.
+            # The simulation continues without a reader.
             with contextlib.suppress(OSError):
                 print(text, file=self._stream, flush=True)
 
@@ -81,7 +81,7 @@ class LiveView:
     """
     A line for each light on a terminal, always up to date, and a line to type in below.
 
-    What is typed stands where the cursor is; that is left where it was.
+    Input is echoed at the cursor, which stays in place.
     """
 
     PROMPT = '> '
@@ -92,7 +92,7 @@ class LiveView:
         self._height = 0
 
     def show(self, looks: Sequence[Look]) -> None:
-        """Take what the lights do now."""
+        """Take the present state of the components."""
         size = shutil.get_terminal_size()
         room = max(size.lines - SPARE_LINES, 1)
         lines = [str(one) for one in looks[:room]]
@@ -104,13 +104,13 @@ class LiveView:
             self.say('')
         elif lines != self._lines:
             self._lines = lines
-            # Save the cursor, go up, write each line over the old one, and come back.
+            # Save the cursor, go up, write each line over the old one, and restore the cursor.
             text = ''.join(f'{line}\x1b[K\r\n' for line in lines)
             self._write(f'\x1b7\x1b[{len(lines)}A\r{text}\x1b8')
 
     def say(self, text: str, *, typed: str | None = None) -> None:
         """
-        Write something else, and the lights below it again.
+        Write a text, and the components below it again.
 
         :param typed: the line that it answers; the cursor then stands below that.
         """

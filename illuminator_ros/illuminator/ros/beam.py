@@ -30,15 +30,15 @@ from ...ros.node import STATE_QOS
 
 Point = tuple[float, float, float]
 
-# Triangles of a cone: enough to look round.
+# Triangles of a cone, so that it looks round.
 SIDES = 24
-# Opacity at 100 % brightness: what stands in the beam must be seen.
+# Opacity at 100 % brightness: objects in the beam must stay visible.
 MAX_ALPHA = 0.5
 # Red, green, blue.
 WARM_WHITE = (1.0, 0.95, 0.75)
 RED = (1.0, 0.0, 0.0)
-# s between publications of a beam that does not change, and for which viewers show it without
-# one: the beam of a bridge that was killed does not stay.
+# s between publications of an unchanged beam, and until viewers remove a beam, so that the beam
+# of a killed bridge disappears.
 REFRESH = 1.0
 LIFETIME = 5
 # For which a bridge that ends waits until its beam was removed.
@@ -138,7 +138,7 @@ class BeamPublisher:
         """Remove the beam, after the link's thread has ended."""
         if self._beam.alpha:
             self._show(replace(self._beam, on=False))
-            # What a publisher has sent last may be lost when it is destroyed.
+            # The last message of a publisher may be lost when it is destroyed.
             self._publisher.wait_for_all_acked(REMOVAL_TIMEOUT)
 
     def _show(self, beam: Beam) -> None:

@@ -35,7 +35,7 @@ from ...ros.diagnostics import (
     why_nothing_is_heard,
 )
 
-# s without a status from a light that has sent some: it is asked for one every 2.5 s.
+# s without a status from a light that has sent some; one is requested every 2.5 s.
 STATUS_SILENCE = 10.0
 
 # The consequence of each flag for the user of the light.
@@ -60,7 +60,7 @@ class LightsHeard:
     """
     The lights on a link.
 
-    :param some: the first few, those that are not served included.
+    :param some: the first few, including lights that are not served.
     :param limit_reached: whether there are more than are taken.
     """
 
@@ -112,7 +112,7 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[Finding]:
         if silence > max(STATUS_SILENCE, 3 * light.status_interval):
             findings.append((WARN, f'no status for {format_seconds(silence)}'))
         if status.invalid:
-            findings.append((WARN, f'not believable: {", ".join(status.invalid)}'))
+            findings.append((WARN, f'implausible: {", ".join(status.invalid)}'))
     if light.shared_address:
         findings.append((WARN, f'several lights answer as {light.address}: their statuses '
                                'contradict one another'))

@@ -54,15 +54,15 @@ from ...ros.node import CommandTopic, RequestService
 from ...ros.parameters import misspelt
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
-# s without a light, after which the log says once why there is none.
+# s without a light until the log gives the reason, once.
 NO_LIGHT_DELAY = 5.0
-# s from the first light on, in which those that are switched on with it are heard.
+# s after the first light in which lights that start together are heard.
 NAMES_DELAY = 10.0
 
 
 class Lights(ServedPayload):
     """
-    Gives each light on the link a node. In the link's thread, but for :meth:`close`.
+    Gives each light on the link a node. In the link's thread, except :meth:`close`.
 
     :raises ParameterError: if a parameter is wrong.
     """
@@ -146,7 +146,7 @@ class Lights(ServedPayload):
             self._host.nodes.remove(address)
 
     def _forgive_loss(self, address: Address) -> None:
-        """Do not count the step back of a restarted light's sequence numbers as loss."""
+        """Do not count the restarted sequence numbers of a light as loss."""
         counter = self._host.link.state().traffic.sources.get(address)
         if counter:
             counter.forgive()
@@ -190,7 +190,7 @@ class Lights(ServedPayload):
             node.poll()
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
-        """See :meth:`ServedPayload.shut_down`: switch all off, or name those that are left on."""
+        """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""
         lights = self._client.commanded_or_found
         if not self._host.values['off_on_shutdown']:
             on = [light for light in lights if light.status and light.status.enabled]

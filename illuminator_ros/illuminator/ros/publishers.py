@@ -46,7 +46,7 @@ from ...ros.log import NodeLog
 from ...ros.node import NodeInterface, Publication, STREAM_QOS
 from ...ros.parameters import DeviceParameters
 
-# One value of each status, by topic. ``enabled`` is first: it is the one that is waited for.
+# One value of each status, by topic. ``enabled`` is first, since callers wait for it.
 STATUS_TOPICS: dict[str, tuple[Any, Callable[[Status], object]]] = {
     'enabled': (Bool, lambda status: status.enabled),
     'brightness': (Float32, lambda status: status.brightness),
@@ -66,10 +66,10 @@ _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 class LightPublishers:
     """
-    Publishes the events of one light, in the link's thread: there is no other thread between.
+    Publishes the events of one light, in the link's thread, without a change of threads.
 
     :param interface: has :data:`PUBLICATIONS`.
-    :param check_diagnostics: called where a level may have changed.
+    :param check_diagnostics: called if a level may have changed.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class LightPublishers:
         status = event.status
         publish = self._interface.publish
         for name, (_, read) in STATUS_TOPICS.items():
-            # A value that is not believable is None.
+            # An implausible value is None.
             if (value := read(status)) is not None:
                 publish(name, value)
         if event.temperature is not None:
