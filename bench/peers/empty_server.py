@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -30,7 +29,7 @@ def main() -> None:
     rclpy.init()
     node = rclpy.create_node(sys.argv[1] if len(sys.argv) > 1 else 'empty')
 
-    def answer(request: Any, response: Any) -> Any:
+    def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         response.success = True
         return response
 

@@ -24,7 +24,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from typing import Any
 
 os.environ['MAVLINK20'] = '1'
 
@@ -42,7 +41,7 @@ def main() -> None:
     rclpy.init()
     node = rclpy.create_node('straightforward')
 
-    def answer(request: Any, response: Any) -> Any:
+    def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         connection.mav.command_long_send(1, 243, ON_OFF, 0, float(request.data), 0, 0, 0, 0, 0, 0)
         while True:
             ack = connection.recv_match(type='COMMAND_ACK', blocking=True, timeout=1.0)

@@ -26,7 +26,6 @@ from collections.abc import Iterator
 import contextlib
 import socket
 import time
-from typing import Any
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float64
@@ -59,11 +58,11 @@ def measure(bench: Bench) -> Iterator[Row]:
         counts = dict.fromkeys(CALLED, 0)
         first_at = 0.0
 
-        def came_first(message: Any) -> None:
+        def came_first(message: Bool) -> None:
             nonlocal first_at
             first_at = time.monotonic()
 
-        def came(message: Any) -> None:
+        def came(message: Float64) -> None:
             at = time.monotonic()
             counts[OURS] += 1
             # The value that a late subscriber gets first was sent before it was there.
@@ -71,7 +70,7 @@ def measure(bench: Bench) -> Iterator[Row]:
             took[FIRST].append((first_at - sent) * 1e3)
             took[OURS].append((at - sent) * 1e3)
 
-        def came_bare(message: Any) -> None:
+        def came_bare(message: Float64) -> None:
             at = time.monotonic()
             counts[now] += 1
             took[now].append((at - message.data) * 1e3)

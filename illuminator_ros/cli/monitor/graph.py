@@ -27,6 +27,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
@@ -35,7 +36,7 @@ from .model import Diagnosis, Fleet, Outcome
 from .requests import Requests
 
 # The topics of a light with their types.
-TOPICS: dict[str, Any] = {
+TOPICS: dict[str, type[Any]] = {
     'connected': Bool, 'enabled': Bool, 'brightness': Float32, 'error_flags': UInt32,
     'mode': String, 'strobe_period': Float32, 'strobe_duty_cycle': Float32, 'uptime': Float64,
     'temperature': Temperature,
@@ -50,7 +51,7 @@ EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 QUERY_INTERVAL = 0.5
 
 
-def type_name(type_: Any) -> str:
+def type_name(type_: type[object]) -> str:
     """Return the name of a message type in the graph."""
     return f'{type_.__module__.split(".")[0]}/msg/{type_.__name__}'
 
@@ -82,7 +83,7 @@ class Graph:
         self._node = node
         self._fleet = fleet
         self._clock = clock
-        self._subscriptions: dict[str, list[Any]] = {}
+        self._subscriptions: dict[str, list[Subscription]] = {}
         self._requests: dict[str, Requests] = {}
         # Calls from other threads.
         self._jobs: deque[Callable[[], None]] = deque()
@@ -141,7 +142,7 @@ class Graph:
         value = message.temperature if topic == 'temperature' else message.data
         self._fleet.take(name, topic, value, self._clock())
 
-    def _diagnosed(self, array: Any) -> None:
+    def _diagnosed(self, array: DiagnosticArray) -> None:
         for status in array.status:
             values: Mapping[str, str] = {pair.key: pair.value for pair in status.values}
             # The name of the status has the node's name without its namespace.
@@ -149,7 +150,7 @@ class Graph:
             diagnosis = Diagnosis(status.level[0], status.message, values)
             self._fleet.diagnosed(name, kind, diagnosis, self._clock())
 
-    def _changed(self, event: Any) -> None:
+    def _changed(self, event: ParameterEvent) -> None:
         for parameter in [*event.new_parameters, *event.changed_parameters]:
             if parameter.name == 'brightness':
                 value = parameter_value_to_python(parameter.value)

@@ -62,7 +62,7 @@ class Requests:
         self._getter = node.create_client(GetParameters, f'{name}/get_parameters')
         self._pending: dict[Service, _Pending] = {}
         self._waiting: dict[Service, Request] = {}
-        self._asked: tuple[Any, float] | None = None
+        self._asked: tuple[Future[GetParameters.Response], float] | None = None
 
     def submit(self, request: Request) -> None:
         """Send a request, or let it wait for the pending one."""
@@ -137,7 +137,7 @@ class Requests:
             self._send(waiting)
         self._show_wanted()
 
-    def _got(self, future: Any) -> None:
+    def _got(self, future: Future[GetParameters.Response]) -> None:
         self._asked = None
         if future.exception() is None and future.result() is not None:
             values = [parameter_value_to_python(value) for value in future.result().values]

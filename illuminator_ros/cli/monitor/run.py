@@ -170,7 +170,7 @@ def _watch(
                 lights = monitor.lights()
                 bindings.update(lights)
                 view = ViewState(lights, bindings.selected, monitor.clock(), bindings.show_help,
-                              ascii_only=ascii_only)
+                                 ascii_only=ascii_only)
                 live.update(screen(view, console.width, console.height), refresh=True)
                 data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
                 for key in decoder.feed(data):
