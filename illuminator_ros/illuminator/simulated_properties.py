@@ -124,8 +124,8 @@ class Profile:
 
 
 PROFILES = {
-    'default': Profile('follows the protocol in all that it does'),
-    # The emulator of the developer guide, as it is and not as it should be.
+    'default': Profile('follows the protocol in everything'),
+    # The emulator of the developer guide, with its deviations from the protocol.
     'reference': Profile(
         'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
         'status at 1 Hz or not at all',

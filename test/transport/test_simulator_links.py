@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The simulator's process on links of every kind, with the drone's side at the other end."""
+"""The simulator's process on each kind of link, with a client at the other end."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from support.ptys import PtyDevice
     ('tcp://127.0.0.1:{}', 'tcpin:127.0.0.1:{}'),
     ('tcp-l://127.0.0.1:{}', 'tcpout://127.0.0.1:{}'),
 ], ids=['UDP, sends', 'UDP, listens', 'TCP client', 'TCP server'])
-def test_its_lights_are_found_and_switched(
+def test_a_light_of_the_simulator_is_found_and_switched_on_each_kind_of_link(
     run: Callable[..., Any], lights: str, drone: str,
 ) -> None:
     port = free_port(socket.SOCK_STREAM if 'tcp' in lights else socket.SOCK_DGRAM)
@@ -44,7 +44,7 @@ def test_its_lights_are_found_and_switched(
         assert run(Bridge(drone.format(port))).enable(True).success
 
 
-def test_it_serves_a_serial_line(tmp_path: Path) -> None:
+def test_the_simulator_sends_frames_on_a_serial_line(tmp_path: Path) -> None:
     pytest.importorskip('serial', reason='pyserial is not installed')
     device, decoder = PtyDevice(tmp_path), Decoder()
     frames: list[Any] = []

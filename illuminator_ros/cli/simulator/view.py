@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The state of each simulated component, a line each."""
+"""The views of simulated components: plain lines, or a live view on a terminal."""
 
 from __future__ import annotations
 
@@ -56,32 +56,32 @@ def look(component: SimulatedComponent[Any], now: float) -> Look:
 
 
 class PlainView:
-    """Plain lines, one for each change of a component."""
+    """Plain lines, for each light when it does something else."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._shown: dict[str, Look] = {}
 
     def show(self, looks: Sequence[Look]) -> None:
-        """Take the present state of the components."""
+        """Show the present state of the components."""
         for one in looks:
             if one.differs(self._shown.get(one.name)):
                 self._shown[one.name] = one
                 self.say(str(one))
 
     def say(self, text: str, *, typed: str | None = None) -> None:
-        """Write a text, unless it is empty."""
+        """Write a text that is not empty, such as an event or an answer."""
         if text:
-            # The simulation continues without a reader.
+            # A closed output must not end the simulation.
             with contextlib.suppress(OSError):
                 print(text, file=self._stream, flush=True)
 
 
 class LiveView:
     """
-    A line for each light on a terminal, always up to date, and a line to type in below.
+    A current line for each component on a terminal, and a line for commands below.
 
-    Input is echoed at the cursor, which stays in place.
+    The cursor stays in the line that a person types.
     """
 
     PROMPT = '> '
@@ -92,7 +92,7 @@ class LiveView:
         self._height = 0
 
     def show(self, looks: Sequence[Look]) -> None:
-        """Take the present state of the components."""
+        """Show the present state of the components."""
         size = shutil.get_terminal_size()
         room = max(size.lines - SPARE_LINES, 1)
         lines = [str(one) for one in looks[:room]]
@@ -104,7 +104,7 @@ class LiveView:
             self.say('')
         elif lines != self._lines:
             self._lines = lines
-            # Save the cursor, go up, write each line over the old one, and restore the cursor.
+            # Save the cursor, go up, overwrite each line, and restore the cursor.
             text = ''.join(f'{line}\x1b[K\r\n' for line in lines)
             self._write(f'\x1b7\x1b[{len(lines)}A\r{text}\x1b8')
 
