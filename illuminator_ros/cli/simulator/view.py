@@ -56,7 +56,7 @@ def look(component: SimulatedComponent[Any], now: float) -> Look:
 
 
 class PlainView:
-    """Plain lines, for each light when it does something else."""
+    """Plain lines, one for each change of a component."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
