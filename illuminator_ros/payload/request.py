@@ -249,6 +249,7 @@ class Request(Generic[S]):
         self._params: tuple[float, ...] = ()
         # Times that it is sent again since acknowledgements of earlier commands may come.
         self._repeats: int | None = None
+        self._was_repeated = False
         self._outcome: CommandResult | None = None
         self._before: S | None = None
         self._has_status = False
@@ -328,9 +329,16 @@ class Request(Generic[S]):
                     and outcome.may_answer_earlier(now, ACK_REACH)):
                 self._repeats = earlier.tries
         self._repeats -= 1
+        self._was_repeated |= self._repeats >= 0
         return self._repeats >= 0
 
     def _refused(self, outcome: CommandResult, now: float) -> None:
+        if self._was_repeated and outcome.result is None:
+            assert self.change is not None
+            self._finish(Result(
+                False, f'{self.change.goal} not confirmed: the acknowledgement may be that of an '
+                f'earlier command ({outcome.timing(now - self._submitted)})'), now)
+            return
         answered = outcome.status is CommandStatus.ANSWERED
         self._finish(Result(
             False, f'{"refused: " if answered else ""}{outcome.describe()} '

@@ -187,7 +187,8 @@ def test_two_callers_each_get_the_answer_to_their_own_request(
 
     on, also_off = ros.start_enable(True), ros.start_enable(False)
 
-    assert on.result().message.startswith('on, confirmed')
+    # Off overtakes on.
+    assert on.result().message == 'cancelled by a later request'
     assert also_off.result().message.startswith('off, confirmed')
     assert off.fake.fields['enable'] == 0
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
+from illuminator_ros.illuminator.configuration import CONFIGURE_LIMIT
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
@@ -157,12 +158,23 @@ class Judge:
     def _received(self, request: Request, kind: type, since: float) -> list[tuple[float, Any]]:
         return [(at, message) for at, source, message in self._pair.near.received
                 if source == request.light.address and isinstance(message, kind)
-                and since <= at <= request.answer.ended_at]
+                and since < at <= request.answer.ended_at]
 
     def _acks(self, request: Request) -> list[tuple[float, Any]]:
         since = self._tries(request)[0][0]
         return [(at, ack) for at, ack in self._received(request, CommandAck, since)
                 if ack.command == request.kind and ack.result == MavResult.ACCEPTED]
+
+    def _accepted(self, request: Request) -> bool:
+        # A command that is sent again may be acknowledged in the same moment.
+        return any(ack.command == request.kind and ack.result == MavResult.ACCEPTED
+                   for _, ack in self._received(
+                       request, CommandAck, self._tries(request)[0][0] - 1e-6))
+
+    def _doubtful(self, request: Request) -> str:
+        # A setpoint may have been under way when it was published again.
+        since = request.answer.asked_at - CONFIGURE_LIMIT
+        return '' if self._received(request, CommandAck, since) else 'not acknowledged'
 
     def _taken(self, request: Request) -> str:
         states = self._witnesses[request.light.address].states(
@@ -170,7 +182,7 @@ class Judge:
         return '' if any(state.matches(request.wish) for state in states) else 'never done'
 
     def _confirmed(self, request: Request) -> str:
-        if not self._acks(request):
+        if not self._accepted(request):
             return 'not accepted'
         wish, states = self._states(request)
         return '' if any(state.matches(wish) for state in states) else 'never done'
@@ -179,15 +191,15 @@ class Judge:
         return 'acknowledged' if self._acks(request) else ''
 
     def _not_shown(self, request: Request) -> str:
-        if not self._acks(request):
+        if not self._accepted(request):
             return 'not accepted'
         wish, states = self._states(request)
         return 'as wished all the time' if all(s.matches(wish) for s in states) else ''
 
     def _no_status(self, request: Request) -> str:
-        acks = self._acks(request)
-        if not acks:
+        if not self._accepted(request):
             return 'not accepted'
+        acks = self._acks(request) or [(self._tries(request)[0][0], None)]
         sent_at, newest = self._tries(request)[0][0], 0
         boot = START - self._witnesses[request.light.address].lamp.uptime_ms(START) / 1000
         for at, status in self._received(request, IlluminatorStatus, 0.0):
@@ -218,6 +230,7 @@ TAKEN = 'taken as agreed'
 _CHECKS: dict[str, tuple[str, bool, Callable[[Judge, Request], str]]] = {
     'confirmed by ILLUMINATOR_STATUS': ('confirmed', True, Judge._confirmed),
     TAKEN: ('confirmed', True, Judge._taken),
+    'may be that of an earlier command': ('doubtful', False, Judge._doubtful),
     'no acknowledgement': ('no acknowledgement', False, Judge._not_acknowledged),
     'but ILLUMINATOR_STATUS shows': ('not shown', False, Judge._not_shown),
     'ILLUMINATOR_STATUS came within': ('no status', False, Judge._no_status),
