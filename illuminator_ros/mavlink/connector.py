@@ -28,7 +28,7 @@ from .url import Url
 # s between tries: the first, doubling up to the last.
 FIRST_PAUSE, LAST_PAUSE = 0.05, 0.5
 # s between the beginnings of two tries, at most: a try may itself take almost as long, and the
-# link is to be back within 1 s of the other side.
+# link must be open within 1 s of the other side.
 LONGEST_PERIOD = 0.9
 
 _log = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ class Backoff:
     """
     The pauses between tries.
 
-    :param jitter: returns a number of 0..1, so that several bridges do not knock in step.
+    :param jitter: returns a number of 0..1, so that several bridges do not try in step.
     """
 
     def __init__(self, jitter: Callable[[], float] = random.random) -> None:
@@ -50,18 +50,18 @@ class Backoff:
         self._failures += 1
 
     def succeeded(self) -> None:
-        """Note that what was opened works, so that its loss is answered at once."""
+        """Note that the channel has lasted, so that the next try after its loss is immediate."""
         self._failures = 0
 
     def answered(self) -> None:
-        """Note that what was opened leads somewhere; if it does not last, the pause is short."""
+        """Note that a frame was received; if the channel does not last, the pause is short."""
         self._failures = min(self._failures, 1)
 
     def pause(self, spent: float) -> float:
         """
         Return how long to wait before the next try, s.
 
-        :param spent: what the last one took, s.
+        :param spent: the time that the last try took, s.
         """
         if not self._failures:
             return 0.0
@@ -72,60 +72,70 @@ class Backoff:
 
 class Connector:
     """
-    Tries to open a connection URL in a thread that ends when it has succeeded.
+    Tries to open a connection URL, in a thread that ends when it has succeeded.
 
-    Every try counts as failed until :meth:`succeeded` says otherwise: what can be opened need
-    not lead anywhere.
+    Every try counts as failed until ``backoff.succeeded()`` says otherwise: a channel that can be
+    opened need not lead anywhere.
 
     :param opened: called in that thread with the open channel, never after :meth:`stop`.
     :param failed: called in that thread with the reason, after each failure.
+    :param ended: called in that thread if it ends without a channel.
     """
 
     def __init__(
         self, url: Url, opened: Callable[[Channel], None], failed: Callable[[str], None],
-        *, backoff: Backoff | None = None,
+        ended: Callable[[], None] = lambda: None, *, backoff: Backoff | None = None,
     ) -> None:
         self._url = url
         self._opened = opened
         self._failed = failed
-        self._backoff = backoff or Backoff()
+        self._ended = ended
+        self.backoff = backoff or Backoff()
         self._stopping = threading.Event()
-        # Held while a channel changes hands, so that none is handed over to nobody.
+        # s that the last try took.
+        self._spent = 0.0
+        # Held while a channel is handed over, so that none is after the stop.
         self._handing_over = threading.Lock()
 
     def start(self) -> None:
-        """Start to try; the first try comes at once unless the last channel was of no use."""
+        """
+        Start to try; the first try is immediate unless the last channel was of no use.
+
+        :raises RuntimeError: if no thread can be started.
+        """
         threading.Thread(target=self._run, name='mavlink-open', daemon=True).start()
 
     def stop(self) -> None:
-        """Give up; what a try that is under way still opens is closed again."""
+        """Give up; a channel that a running try still opens is closed again."""
         with self._handing_over:
             self._stopping.set()
 
-    def answered(self) -> None:
-        """Note that something came over the channel; see :meth:`Backoff.answered`."""
-        self._backoff.answered()
-
-    def succeeded(self) -> None:
-        """Note that the channel works, so that the next loss is answered at once."""
-        self._backoff.succeeded()
-
     def _run(self) -> None:
-        spent = 0.0
-        while not self._stopping.wait(self._backoff.pause(spent)):
-            self._backoff.failed()
-            begun = time.monotonic()
-            try:
-                channel = open_channel(self._url)
-            except OSError as error:
-                self._failed(error.strerror or str(error))
-            except Exception as error:
-                _log.exception('internal error while opening')
-                self._failed(repr(error))
-            else:
-                self._hand_over(channel)
-                return
-            spent = time.monotonic() - begun
+        try:
+            while not self._try():
+                pass
+        except BaseException:
+            self._ended()
+            raise
+
+    def _try(self) -> bool:
+        """Try once, after the pause; return whether to end."""
+        if self._stopping.wait(self.backoff.pause(self._spent)):
+            return True
+        self.backoff.failed()
+        begun = time.monotonic()
+        try:
+            channel = open_channel(self._url)
+        except OSError as error:
+            self._failed(error.strerror or str(error))
+        except Exception as error:
+            _log.exception('internal error while opening')
+            self._failed(repr(error))
+        else:
+            self._hand_over(channel)
+            return True
+        self._spent = time.monotonic() - begun
+        return False
 
     def _hand_over(self, channel: Channel) -> None:
         with self._handing_over:

@@ -12,43 +12,99 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The way out of a link: sequence numbers, framing and signing; no I/O, and time is passed in."""
+"""The sending side of a link: sequence numbers, framing and signing; no I/O, no clock."""
 
 from __future__ import annotations
 
+from collections import deque
 import random
-from typing import Any
 
 from .frame import encode_frame, Frame
-from .loopback_filter import LoopbackFilter
-from .messages import Address, encode_payload
-from .signing import Signing
+from .messages import Address, encode_payload, Message
+from .signing import Signing, stamp_of
+
+# s for which an unsigned frame may come back. Each second that is remembered is one more sequence
+# number with which the heartbeat of another sender with our address would pass for ours.
+MEMORY = 1.0
+MAX_FRAMES = 64
+# Time stamps of signed frames, which are unique: they may come back at any time.
+MAX_STAMPS = 4096
+
+_Key = tuple[Address, int, int, bytes]
+
+
+class LoopbackFilter:
+    """Tells our own frames that come back from those of another sender with our address."""
+
+    def __init__(self) -> None:
+        self._sent: deque[tuple[float, _Key]] = deque(maxlen=MAX_FRAMES)
+        # In the order of sending.
+        self._stamps: dict[int, None] = {}
+
+    def sent(self, source: Address, sequence: int, message_id: int, payload: bytes,
+             now: float) -> None:
+        """Note a frame that is sent."""
+        self._sent.append((now, (source, sequence, message_id, payload.rstrip(b'\0'))))
+
+    def signed(self, stamp: int) -> None:
+        """Note the time stamp of a frame that is sent signed."""
+        self._stamps[stamp] = None
+        if len(self._stamps) > MAX_STAMPS:
+            del self._stamps[next(iter(self._stamps))]
+
+    def has(self, frame: Frame, now: float) -> bool:
+        """Return whether a frame is one of ours."""
+        if frame.signature is not None and stamp_of(frame.signature) in self._stamps:
+            return True
+        key = (frame.source, frame.sequence, frame.message_id, frame.payload.rstrip(b'\0'))
+        return any(now - at <= MEMORY and key == sent for at, sent in self._sent)
 
 
 class FrameWriter:
     """
     Makes frames of messages, and recognises them when they come back.
 
+    :param version: 1 or 2, of all frames.
     :ivar sequences: the next sequence number of each address that was sent from.
+    :raises ValueError: if the frames must be signed and MAVLink 1 cannot.
     """
 
-    def __init__(self, signing: Signing) -> None:
+    def __init__(self, signing: Signing, version: int = 2) -> None:
+        if version not in (1, 2):
+            raise ValueError(f'MAVLink version {version} is neither 1 nor 2')
+        if version == 1 and signing.signs:
+            raise ValueError('MAVLink 1 frames cannot be signed: switch signing off, '
+                             'or use MAVLink 2')
         self.sequences: dict[Address, int] = {}
         self._signing = signing
-        self._echoes = LoopbackFilter()
+        self._version = version
+        self._loopback = LoopbackFilter()
 
-    def frame(self, source: Address, message: Any, now: float, unix_time: float) -> bytes:
-        """Return a message as it goes on the wire."""
-        # Begun anywhere: two that were started together with one address are then told apart.
-        sequence = self.sequences.get(source, random.randrange(256))
-        self.sequences[source] = (sequence + 1) & 0xFF
+    def frame(self, source: Address, message: Message, now: float, unix_time: float) -> bytes:
+        """
+        Return a message as it goes on the wire.
+
+        :raises ValueError: if MAVLink 1 cannot carry the message.
+        :raises struct.error: if a value does not fit into its field.
+        """
         payload = encode_payload(message)
-        self._echoes.sent(source, sequence, message.id, payload, now)
+        if self._version == 1:
+            payload = payload[:message.base_size]
+        sequence = self.sequences.get(source, -1)
+        if sequence < 0:
+            # Two programs that were started together with one address are then told apart.
+            sequence = random.randrange(256)
+        signs = self._signing.signs
         frame = encode_frame(
-            message.id, payload, sequence=sequence, source=source,
-            crc_extra=message.crc_extra, signed=self._signing.signs)
-        return self._signing.sign(frame, unix_time) if self._signing.signs else frame
+            message.id, payload, sequence=sequence, source=source, crc_extra=message.crc_extra,
+            signed=signs, version=self._version)
+        self.sequences[source] = (sequence + 1) & 0xFF
+        self._loopback.sent(source, sequence, message.id, payload, now)
+        if signs:
+            frame = self._signing.sign(frame, unix_time)
+            self._loopback.signed(self._signing.timestamp)
+        return frame
 
-    def is_echo(self, frame: Frame, now: float) -> bool:
+    def is_loopback(self, frame: Frame, now: float) -> bool:
         """Return whether a frame is one of ours that has come back."""
-        return frame.source in self.sequences and self._echoes.has(frame, now)
+        return frame.source in self.sequences and self._loopback.has(frame, now)

@@ -16,57 +16,74 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
-import functools
+import copy
+import logging
 import math
 import selectors
+import socket
+import struct
+import threading
 import time
 from typing import Any
 
 from .component import Endpoint
 from .connector import Connector
-from .frame import Frame
+from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
-from .link_state import LinkEvent, LinkState
-from .messages import decode_payload
+from .link_state import LinkEvent, LinkInput, LinkSnapshot, LinkStatus
+from .messages import Address, decode_payload, Message
 from .receiver import Receiver
 from .router import Router
 from .signing import Signing
 from .signing_files import TimestampKeeper, TimestampStore
-from .standing import Standing
 from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
-from .worker import Worker
 
-# s; the loop looks around this often even where nothing is due.
+# s; the loop polls this often even where nothing is due.
 IDLE = 1.0
-# A busy link rests for REST s after a turn with more frames than this, so that one turn reads
-# many of them: each turn costs as much as several frames. A call waits no longer than that.
-MAX_FRAMES_BEFORE_REST = 16
+# A busy link rests for REST s after a turn with more frames than this, so that the next turn
+# reads many of them: a turn costs as much as several frames. A call waits no longer than that.
+MAX_FRAMES_WITHOUT_REST = 16
 REST = 0.0005
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
-# s that a channel stays open, or a frame over it, until it counts as one that leads somewhere.
+# s that a channel stays open until it is proved without a frame.
 PROBATION = 1.0
-# s without anything good from anybody, longer than between heartbeats; and then between
-# greetings. A router that has restarted passes nothing on to us until it has heard us.
+# s without a frame from any peer, longer than between heartbeats; and then between greetings. A
+# router that has restarted forwards nothing to us until it has heard us.
 SILENCE = 1.5
-KNOCK_INTERVAL = 0.25
+GREETING_INTERVAL = 0.25
+# s between snapshots while there is traffic.
+SNAPSHOT_INTERVAL = 0.25
+# s until a thread that could not be started is tried again.
+THREAD_RETRY_INTERVAL = 0.25
+# s; after a fault of ours the loop goes on no faster, and logs no more of them, than this.
+FAULT_PAUSE = 0.1
+FAULT_LOG_INTERVAL = 1.0
+
+_log = logging.getLogger(__name__)
+# Each frame in a line, at DEBUG.
+_frame_log = logging.getLogger('illuminator_ros')
 
 
-class Link(Worker):
+class Link:
     """
     Runs an endpoint over a connection URL in a thread of its own, and reopens what is lost.
 
     All of the endpoint is called from that thread and no other; :meth:`call` brings work to it.
 
     :param on_event: called in the link's thread when the link is opened, lost, or cannot be
-        opened at first. A channel that is lost again before it has proved to lead anywhere
-        counts as not opened.
-    :param store: where the time stamps of signing outlive us; None keeps them nowhere.
+        opened at first; at a limited rate.
+    :param store: keeps the time stamps of signing for the next run; None keeps them nowhere.
+    :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
+    :param clock: s, monotonic.
     :param wall_clock: s, Unix time, for the signing time stamps.
+    :param selector: waits for the transport.
+    :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
     def __init__(
@@ -74,100 +91,198 @@ class Link(Worker):
         on_event: Callable[[LinkEvent], None] = lambda event: None,
         signing: Signing | None = None,
         store: TimestampStore | None = None,
+        mavlink_version: int = 2,
         clock: Callable[[], float] = time.monotonic,
         wall_clock: Callable[[], float] = time.time,
+        selector: selectors.BaseSelector | None = None,
     ) -> None:
-        super().__init__('mavlink-link', clock)
         self.endpoint = endpoint
-        self._classes = {cls.id: cls for cls in endpoint.messages}
-        self._signing = signing or Signing()
-        self._timestamps = TimestampKeeper(self._signing, store)
-        self._store_due = 0.0
+        self.clock = clock
         self._wall_clock = wall_clock
-        self._opener = Connector(url, self._opened_elsewhere, self._failed_elsewhere)
+        self._on_event = on_event
+        self._label = label
+        self._signing = signing or Signing()
+        self._writer = FrameWriter(self._signing, mavlink_version)
+        self._classes = {cls.id: cls for cls in endpoint.messages}
+        if mavlink_version == 1 and (
+                too_high := [c.name for c in endpoint.messages if c.id > MAX_ID_V1]):
+            raise ValueError(f'{", ".join(too_high)} cannot be sent with MAVLink 1, which has no '
+                             f'message ids above {MAX_ID_V1}: use MAVLink 2')
+        self._timestamps = TimestampKeeper(self._signing, store)
+        self._connector = Connector(
+            url, self._opened_elsewhere, self._failed_elsewhere, self._connector_ended)
+        self._connecting = False
+        self._connect_at = -math.inf
         self._channel: Channel | None = None
-        self._departure = FrameWriter(self._signing)
-        self._reception = Receiver(self._signing)
-        self._routes = Router()
+        self._receiver = Receiver(self._signing)
+        self._router = Router()
         self._traffic = Traffic()
-        self._standing = Standing(label, functools.partial(self._guarded, on_event), clock())
-        # When the channel counts as one that leads somewhere, infinity once it does; and
-        # whether the one before never did.
+        self._status = LinkStatus(label, clock())
+        # When the channel is proved without a frame, and whether a frame was received over it.
         self._proven_at = math.inf
-        self._doubtful = False
-        # Whether a frame has come over the channel.
-        self._spoken = False
-        self._knock_at = math.inf
+        self._frame_received = False
+        self._greet_at = math.inf
+        self._store_due = 0.0
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
-        self._stirred = False
+        self._work_pending = False
         # Good frames received before this turn.
-        self._frames_seen = 0
+        self._frames_before = 0
+        self._snapshot_due = 0.0
+        self._snapshot = self.snapshot(clock())
+        self._calls: deque[Callable[[float], None]] = deque()
+        self._wake_out, self._wake_in = socket.socketpair()
+        self._wake_out.setblocking(False)
+        self._wake_in.setblocking(False)
+        self._selector = selector or selectors.DefaultSelector()
+        self._selector.register(self._wake_out, selectors.EVENT_READ)
+        self._stopping = threading.Event()
+        self._starting = threading.Lock()
+        # s that the next turn must wait at least: there was a fault.
+        self._pause = 0.0
+        self._fault_log_due = -math.inf
+        self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
 
-    def stop(self, timeout: float = 1.0) -> None:
-        """See :meth:`Worker.stop`; the transport is closed."""
-        self._opener.stop()
-        super().stop(timeout)
+    def start(self) -> None:
+        """Start the thread."""
+        with self._starting:
+            if not self._stopping.is_set():
+                self._thread.start()
 
-    def state(self) -> LinkState:
-        """Return the link's condition."""
-        channel, standing = self._channel, self._standing
-        reason = standing.reason
-        return LinkState(
-            not reason, standing.since, channel.name if channel else standing.label, reason,
-            standing.openings, self._routes.peer_count(self.clock()), self._traffic,
-            self._reception.counters, self._signing.counters)
+    def stop(self, timeout: float = 1.0) -> None:
+        """
+        Close the transport and end the thread; it cannot be started again.
+
+        :param timeout: how long to wait for the thread, s.
+        """
+        self._connector.stop()
+        with self._starting:
+            self._stopping.set()
+            if self._thread.ident is None:
+                self._release()
+        self._wake()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join(timeout)
+
+    def is_running(self) -> bool:
+        """Return whether the thread runs."""
+        return self._thread.is_alive()
+
+    def call(self, function: Callable[[float], None]) -> None:
+        """Have ``function(now)`` called in the thread, unless that has ended."""
+        self._calls.append(function)
+        self._wake()
+
+    def state(self) -> LinkSnapshot:
+        """Return the newest snapshot; it is at most 0.25 s behind the link's thread."""
+        return self._snapshot
+
+    def _wake(self) -> None:
+        # A full buffer has woken the thread already; a closed one has no thread to wake.
+        with contextlib.suppress(OSError):
+            self._wake_in.send(b'\0')
 
     def _opened_elsewhere(self, channel: Channel) -> None:
         self.call(lambda now: self._opened(channel, now))
 
     def _failed_elsewhere(self, reason: str) -> None:
-        self.call(lambda now: self._standing.failed(reason))
+        self.call(lambda now: self._status.failed(reason))
+
+    def _connector_ended(self) -> None:
+        self.call(self._connect_later)
 
     # In the link's thread
 
-    def _begin(self) -> None:
-        self._opener.start()
+    def snapshot(self, now: float) -> LinkSnapshot:
+        """Return the link at this moment."""
+        channel, status = self._channel, self._status
+        return LinkSnapshot(
+            status.state, status.since, channel.name if channel else self._label, status.reason,
+            status.openings, self._router.peer_count(now), self._traffic.snapshot(now),
+            copy.copy(self._receiver.counters), copy.copy(self._signing.counters))
 
-    def _end(self) -> None:
+    def reset_loss(self, source: Address) -> None:
+        """Forget recent losses of a component: it has begun to count its frames anew."""
+        if counter := self._traffic.sources.get(source):
+            counter.reset_loss()
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._run_once()
+            except Exception:
+                self._log_fault()
+                self._stopping.wait(FAULT_PAUSE)
         # No channel is handed over any more, and one that just was is among the calls.
-        self._opener.stop()
+        self._connector.stop()
         self._run_calls()
-        self._guarded(self._timestamps.keep, True)
+        self._safe_call(self._timestamps.keep, self._wall_clock(), True)
         self._close()
-        self._standing.stopped(self.clock())
+        self._status.take(LinkInput.STOPPED, self.clock())
+        self._snapshot = self.snapshot(self.clock())
+        self._release()
 
-    def _turn(self) -> None:
-        due = min(self._due, self._reception.next_deadline())
+    def _release(self) -> None:
+        self._selector.close()
+        self._wake_out.close()
+        self._wake_in.close()
+
+    def _run_once(self) -> None:
+        """Wait for the transport, a call or a deadline, and do what follows."""
+        due = min(self._due, self._receiver.next_deadline())
         now = self.clock()
         wait = min(max(due - now, self._pause), IDLE)
         self._pause = 0.0
-        for handle, events in self._ready(wait):
-            if self._channel is not None:
-                self._serve(handle, events)
+        for key, events in self._selector.select(wait):
+            if key.fileobj is self._wake_out:
+                with contextlib.suppress(BlockingIOError):
+                    self._wake_out.recv(4096)
+            elif self._channel is not None:
+                self._serve(key.fileobj, events)
         now = self.clock()
-        frames = self._reception.counters.frames
-        if frames > self._frames_seen + MAX_FRAMES_BEFORE_REST:
+        frames = self._receiver.counters.frames
+        if frames > self._frames_before + MAX_FRAMES_WITHOUT_REST:
             time.sleep(REST)
-        self._frames_seen = frames
-        if self._stirred or self._calls or now >= due:
+        self._frames_before = frames
+        if self._work_pending or self._calls or now >= due:
             self._work()
 
     def _work(self) -> None:
         """Do what others asked for, and what is due."""
-        self._stirred = False
+        self._work_pending = False
         self._run_calls()
+        now = self.clock()
         if self._channel is not None:
-            self._look_after(self._channel, self.clock())
-        self._guarded(self.endpoint.poll, self.clock())
+            self._poll_channel(self._channel, now)
+        elif not self._connecting and now >= self._connect_at:
+            self._connect(now)
+        self._safe_call(self.endpoint.poll, self.clock())
         self._flush()
-        if self.clock() >= self._store_due:
-            self._store_due = self.clock() + STORE_INTERVAL
-            self._guarded(self._timestamps.keep)
-        self._due = min(self.endpoint.next_deadline(), self._knock_at, self._proven_at,
-                        self._store_due)
+        now = self.clock()
+        if now >= self._store_due:
+            self._store_due = now + STORE_INTERVAL
+            self._safe_call(self._timestamps.keep, self._wall_clock(), False)
+        self._report(now)
+        self._due = min(
+            self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
+            self._status.next_deadline(), self._snapshot_due,
+            math.inf if self._channel is not None or self._connecting else self._connect_at)
+
+    def _report(self, now: float) -> None:
+        """Make a snapshot if the last one is out of date, and report the newest event."""
+        if (self._status.state is not self._snapshot.state
+                or self._status.reason != self._snapshot.reason or now >= self._snapshot_due):
+            self._snapshot = self.snapshot(now)
+            self._snapshot_due = math.inf
+        while event := self._status.event(now):
+            self._safe_call(self._on_event, event)
+
+    def _traffic_seen(self, now: float) -> None:
+        if self._snapshot_due == math.inf:
+            self._snapshot_due = now + SNAPSHOT_INTERVAL
+            self._due = min(self._due, self._snapshot_due)
 
     def _serve(self, handle: Any, events: int) -> None:
         assert self._channel is not None
@@ -185,109 +300,162 @@ class Link(Worker):
     def _take(self, channel: Channel, peer: Peer, data: bytes) -> None:
         self._traffic.bytes_received += len(data)
         now = self.clock()
-        frames = self._reception.take(peer, data, now, self._wall_clock())
+        self._traffic_seen(now)
+        frames = self._receiver.take(peer, data, now, self._wall_clock())
         if frames:
             for frame in frames:
                 self._accept(channel, peer, frame, now)
             self._flush()
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
-        if self._departure.is_echo(frame, now):
+        source = frame.source
+        if source in self._writer.sequences and self._writer.is_loopback(frame, now):
             return
-        if not self._spoken:
-            self._spoken = self._stirred = True
-            self._opener.answered()
-            self._believe(channel, now)
-        self._knock_at = now + SILENCE
-        self._traffic.count(frame.source, frame.sequence)
+        if not self._frame_received:
+            self._frame_received = self._work_pending = True
+            self._connector.backoff.answered()
+            self._status.take(LinkInput.PROVED, now, channel.name)
+        self._greet_at = now + SILENCE
+        self._traffic.count(source, frame.sequence)
         if channel.heard(peer, now):
-            self._stirred = True
-            self._guarded(self.endpoint.link_opened, now)
-        self._routes.heard(frame.source, peer, now)
+            self._work_pending = True
+            if _frame_log.isEnabledFor(logging.DEBUG):
+                _frame_log.debug('new peer %s on %s', peer, channel.name)
+            self._safe_call(self.endpoint.link_opened, now)
+        self._router.heard(source, peer, now)
         cls = self._classes.get(frame.message_id)
         if cls is not None:
-            self._stirred = True
-            self._guarded(self.endpoint.receive, frame.source,
-                          decode_payload(cls, frame.payload), now)
+            self._work_pending = True
+            message = decode_payload(cls, frame.payload)
+            if _frame_log.isEnabledFor(logging.DEBUG):
+                _frame_log.debug('received from %s: %s', source, message)
+            self._safe_call(self.endpoint.receive, source, message, now)
 
-    def _look_after(self, channel: Channel, now: float) -> None:
+    def _poll_channel(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
-            # It has lasted, so its loss will be answered at once.
+            # The channel has lasted, so its loss is answered immediately.
             self._proven_at = math.inf
-            self._opener.succeeded()
-            self._believe(channel, now)
-        for peer, frame in self._reception.give_up(now, self._wall_clock()):
+            self._connector.backoff.succeeded()
+            self._status.take(LinkInput.PROVED, now, channel.name)
+        for peer, frame in self._receiver.give_up(now, self._wall_clock()):
             self._accept(channel, peer, frame, now)
-        if now >= self._knock_at:
-            self._knock_at = now + KNOCK_INTERVAL
-            self._guarded(self.endpoint.link_opened, now)
+        if now >= self._greet_at:
+            self._greet_at = now + GREETING_INTERVAL
+            self._safe_call(self.endpoint.link_opened, now)
 
     def _flush(self) -> None:
-        """Send what the endpoint has to say; without a channel it is said to nobody."""
+        """Send the messages of the endpoint; without a channel they are dropped."""
         outgoing = self.endpoint.outgoing
         while outgoing and self._channel is not None:
             channel, now = self._channel, self.clock()
             all_peers = channel.peers(now)
-            peers = self._routes.towards(outgoing[0][1], all_peers, now)
-            # What goes the same way goes together: its receiver is then woken only once.
-            frames = []
-            while outgoing and self._routes.towards(outgoing[0][1], all_peers, now) == peers:
-                source, message = outgoing.popleft()
-                frames.append(self._departure.frame(source, message, now, self._wall_clock()))
+            # Frames for the same peers are sent together: each receiver is then woken only once.
+            frames: list[bytes] = []
+            peers: Sequence[Peer] = ()
+            while outgoing:
+                source, message = outgoing[0]
+                towards = self._router.towards(message, all_peers, now)
+                if frames and towards != peers:
+                    break
+                peers = towards
+                outgoing.popleft()
+                self._write(frames, source, message, now)
             try:
-                self._send(channel, frames, peers)
+                if frames:
+                    self._send(channel, frames, peers)
             except OSError as error:
                 self._lost(error)
         outgoing.clear()
 
+    def _write(self, frames: list[bytes], source: Address, message: Message, now: float) -> None:
+        try:
+            frames.append(self._writer.frame(source, message, now, self._wall_clock()))
+        except (ValueError, struct.error):
+            self._log_fault()
+        else:
+            if _frame_log.isEnabledFor(logging.DEBUG):
+                _frame_log.debug('sent from %s: %s', source, message)
+
     def _send(self, channel: Channel, frames: list[bytes], peers: Sequence[Peer]) -> None:
+        self._traffic_seen(self.clock())
         dropped = channel.dropped
         channel.send(frames, peers)
         self._traffic.frames_dropped += channel.dropped - dropped
         self._traffic.frames_sent += len(frames) * len(peers)
         self._traffic.bytes_sent += sum(map(len, frames)) * len(peers)
 
+    def _connect(self, now: float) -> None:
+        try:
+            self._connector.start()
+            self._connecting = True
+        except RuntimeError as error:
+            self._status.failed(f'{error}; trying again')
+            self._connect_at = now + THREAD_RETRY_INTERVAL
+
+    def _connect_later(self, now: float) -> None:
+        self._connecting = False
+        self._connect_at = now + THREAD_RETRY_INTERVAL
+
     def _opened(self, channel: Channel, now: float) -> None:
+        self._connecting = False
         if self._stopping.is_set():
             channel.close()
             return
         self._channel = channel
         self._proven_at = now + PROBATION
-        self._spoken = False
-        self._knock_at = now + KNOCK_INTERVAL
-        channel.register(self._selector)
-        self._guarded(self.endpoint.link_opened, now)
+        self._frame_received = False
+        self._greet_at = now + GREETING_INTERVAL
+        try:
+            channel.register(self._selector)
+        except (OSError, ValueError) as error:
+            self._lost(OSError(f'cannot wait for {channel.name}: {error}'))
+            return
+        self._safe_call(self.endpoint.link_opened, now)
         self._flush()
-        # Sending the first heartbeat may already have shown that it leads nowhere.
-        if not self._doubtful:
-            self._standing.opened(channel.name, now)
-
-    def _believe(self, channel: Channel, now: float) -> None:
-        """Have a channel count as open that was doubted until now."""
-        if self._standing.reason:
-            self._standing.opened(channel.name, now)
+        # Sending the first heartbeat may already have failed.
+        if self._channel is channel:
+            self._status.take(LinkInput.OPENED, now, channel.name)
 
     def _lost(self, error: OSError) -> None:
+        """Close the channel; the next poll opens it again."""
         if self._channel is None:
             return
-        self._stirred = True
-        name = self._channel.name
-        self._doubtful = self._proven_at < math.inf and not self._spoken
+        self._work_pending = True
+        self._connect_at = -math.inf
+        name, now = self._channel.name, self.clock()
         self._close()
-        self._opener.start()
-        now = self.clock()
         reason = error.strerror or str(error)
-        self._standing.lost(name, reason, now)
-        self._guarded(self.endpoint.link_closed, now, reason)
+        self._status.take(LinkInput.CLOSED, now, name, reason)
         self._traffic.restart()
+        self._safe_call(self.endpoint.link_closed, now, reason)
 
     def _close(self) -> None:
         if self._channel is None:
             return
-        self._unregister_all()
+        for key in list(self._selector.get_map().values()):
+            if key.fileobj is not self._wake_out:
+                self._selector.unregister(key.fileobj)
         channel, self._channel = self._channel, None
         with contextlib.suppress(OSError):
             channel.close()
-        self._proven_at = self._knock_at = math.inf
-        self._reception.clear()
-        self._routes.clear()
+        self._proven_at = self._greet_at = math.inf
+        self._receiver.clear()
+        self._router.clear()
+
+    def _safe_call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Call what is not ours: its fault must not end the thread."""
+        try:
+            function(*arguments)
+        except Exception:
+            self._pause = FAULT_PAUSE
+            self._log_fault()
+
+    def _log_fault(self) -> None:
+        """Log the exception that is handled, at a limited rate."""
+        if self.clock() >= self._fault_log_due:
+            self._fault_log_due = self.clock() + FAULT_LOG_INTERVAL
+            _log.exception('internal error in the link')
+
+    def _run_calls(self) -> None:
+        for _ in range(len(self._calls)):
+            self._safe_call(self._calls.popleft(), self.clock())

@@ -12,15 +12,78 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What others are told of a link."""
+"""The connection state of a link, and what other threads learn of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 
 from .frame import DecoderCounters
 from .signing import SigningCounters
 from .statistics import Traffic
+
+# Different reasons for not opening that are reported before the first opening.
+MAX_REASONS = 16
+# Events that are reported at once, and s until one more may be: a server that accepts and closes
+# would fill the log.
+MAX_EVENTS = 20
+EVENT_INTERVAL = 10.0
+
+
+class LinkState(Enum):
+    """
+    The states of a link.
+
+    ::
+
+        OPENING -- opened --> UNPROVEN -- proved --> OPEN -- closed --> LOST -- opened --> UNPROVEN
+                                  | closed
+                                  v
+                              RETRYING -- opened --> DOUBTFUL -- proved --> OPEN
+
+    A transport is proved by a frame, or by staying open for a time. It counts as open until it
+    is lost, but one that follows an unproven one does not: a TCP server that closes each
+    connection is not a link.
+    """
+
+    OPENING = 'opening'
+    UNPROVEN = 'unproven'
+    OPEN = 'open'
+    LOST = 'lost'
+    RETRYING = 'retrying'
+    DOUBTFUL = 'doubtful'
+    STOPPED = 'stopped'
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the link counts as open."""
+        return self in (LinkState.UNPROVEN, LinkState.OPEN)
+
+
+class LinkInput(Enum):
+    """What changes the state of a link."""
+
+    OPENED = 'opened'
+    PROVED = 'proved'
+    CLOSED = 'closed'
+    STOPPED = 'stopped'
+
+
+# Inputs that are not here leave the state as it is.
+TRANSITIONS: dict[tuple[LinkState, LinkInput], LinkState] = {
+    (LinkState.OPENING, LinkInput.OPENED): LinkState.UNPROVEN,
+    (LinkState.LOST, LinkInput.OPENED): LinkState.UNPROVEN,
+    (LinkState.RETRYING, LinkInput.OPENED): LinkState.DOUBTFUL,
+    (LinkState.UNPROVEN, LinkInput.PROVED): LinkState.OPEN,
+    (LinkState.DOUBTFUL, LinkInput.PROVED): LinkState.OPEN,
+    (LinkState.OPENING, LinkInput.CLOSED): LinkState.RETRYING,
+    (LinkState.LOST, LinkInput.CLOSED): LinkState.RETRYING,
+    (LinkState.UNPROVEN, LinkInput.CLOSED): LinkState.RETRYING,
+    (LinkState.DOUBTFUL, LinkInput.CLOSED): LinkState.RETRYING,
+    (LinkState.OPEN, LinkInput.CLOSED): LinkState.LOST,
+    **{(state, LinkInput.STOPPED): LinkState.STOPPED for state in LinkState},
+}
 
 
 @dataclass(frozen=True)
@@ -31,31 +94,34 @@ class LinkEvent:
     :param name: the transport, or the URL where there is none.
     :param reason: why it is not open.
     :param was_open: whether it is lost, and not just not open yet.
+    :param unreported: openings and losses before this one that were not reported.
     """
 
     is_open: bool
     name: str
     reason: str = ''
     was_open: bool = False
+    unreported: int = 0
 
     def __str__(self) -> str:
+        more = f' ({self.unreported} more changes not reported)' if self.unreported else ''
         if self.is_open:
-            return f'link open: {self.name}'
+            return f'link open: {self.name}{more}'
         what = 'lost' if self.was_open else 'not open'
-        return f'link {what}: {self.name}: {self.reason}; trying again'
+        return f'link {what}: {self.name}: {self.reason}; trying again{more}'
 
 
-@dataclass
-class LinkState:
+@dataclass(frozen=True)
+class LinkSnapshot:
     """
-    A link's condition, to be read from any thread.
+    A link at a moment, made by its thread and never changed; for any thread.
 
     :param since: when it was opened or lost, on the link's clock, s.
     :param openings: how often it was opened.
-    :param peers: how many have lately sent something good.
+    :param peers: how many have sent an authenticated frame within 10 s.
     """
 
-    is_open: bool
+    state: LinkState
     since: float
     name: str
     reason: str
@@ -66,6 +132,83 @@ class LinkState:
     signing: SigningCounters
 
     @property
+    def is_open(self) -> bool:
+        """Whether the link counts as open."""
+        return self.state.is_open
+
+    @property
     def failure(self) -> str:
         """Return what is not open and why, for people; '' while the link is open."""
         return '' if self.is_open else f'{self.name} is not open: {self.reason}'
+
+
+class LinkStatus:
+    """
+    The state of a link, and the events that are to be reported.
+
+    :param label: the name of the link while there is no transport.
+    :ivar since: when it was opened or lost, s.
+    :ivar reason: why it is not open, '' where it is.
+    :ivar openings: how often it was opened.
+    """
+
+    def __init__(self, label: str, now: float) -> None:
+        self.state = LinkState.OPENING
+        self.since = now
+        self.reason = 'not opened yet'
+        self.openings = 0
+        self._label = label
+        self._reasons: set[str] = set()
+        self._unreported = 0
+        self._allowed = float(MAX_EVENTS)
+        self._allowed_at = now
+        self._events: list[LinkEvent] = []
+
+    def take(self, input_: LinkInput, now: float, name: str = '', reason: str = '') -> None:
+        """Change the state; ``reason`` says why a transport was closed."""
+        was_open = self.state.is_open
+        self.state = TRANSITIONS.get((self.state, input_), self.state)
+        if self.state.is_open and not was_open:
+            self.since, self.reason = now, ''
+            self.openings += 1
+            self._report(LinkEvent(True, name))
+        elif self.state is LinkState.STOPPED:
+            self.since, self.reason = now, 'stopped'
+        elif was_open and not self.state.is_open:
+            self.since, self.reason = now, reason
+            self._report(LinkEvent(False, name, reason, was_open=True))
+        elif input_ is LinkInput.CLOSED:
+            self.failed(reason)
+
+    def failed(self, reason: str) -> None:
+        """Note why a transport could not be opened."""
+        self.reason = reason
+        # Once it has been open, its loss was one line in the log and its return will be another.
+        if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self.openings:
+            self._reasons.add(reason)
+            self._report(LinkEvent(False, self._label, reason))
+
+    def _report(self, event: LinkEvent) -> None:
+        self._events.append(event)
+        if len(self._events) > 2:
+            del self._events[0]
+            self._unreported += 1
+
+    def event(self, now: float) -> LinkEvent | None:
+        """Return the next event if it may be reported now, once."""
+        if not self._events:
+            return None
+        self._allowed = min(
+            self._allowed + (now - self._allowed_at) / EVENT_INTERVAL, MAX_EVENTS)
+        self._allowed_at = now
+        if self._allowed < 1:
+            return None
+        self._allowed -= 1
+        unreported, self._unreported = self._unreported, 0
+        return replace(self._events.pop(0), unreported=unreported)
+
+    def next_deadline(self) -> float:
+        """Return when a waiting event may be reported, infinity if there is none."""
+        if not self._events:
+            return float('inf')
+        return self._allowed_at + max(1 - self._allowed, 0) * EVENT_INTERVAL

@@ -50,9 +50,9 @@ class Router:
         return len(self._ways)
 
     def peer_count(self, now: float) -> int:
-        """Return how many peers lead somewhere; from any thread."""
-        return len({peer for ways in self._ways.copy().values()
-                    for peer, heard in ways.copy().items() if now - heard <= EXPIRY})
+        """Return how many peers lead somewhere."""
+        return len({peer for ways in self._ways.values()
+                    for peer, heard in ways.items() if now - heard <= EXPIRY})
 
     def heard(self, source: Address, peer: Peer, now: float) -> None:
         """Note that a component was heard over a peer."""

@@ -39,6 +39,9 @@ NEW_STREAM_TICKS = 60 * TICKS_PER_SECOND
 # How far ahead of our clock a peer is followed: 10 years. A computer without a battery may wake
 # up some years in the past; a receiver that forgets the rollover of GPS weeks is 19.6 years off.
 FOLLOWED_TICKS = 10 * 365 * 86_400 * TICKS_PER_SECOND
+# A clock that is no further behind the time stamps of this link is taken to be right: another
+# clock has been ahead. One that is further behind has no battery.
+CLOCK_TOLERANCE_TICKS = 86_400 * TICKS_PER_SECOND
 MAX_STREAMS = 256
 KEY_SIZE = 32
 
@@ -68,6 +71,19 @@ class SigningCounters:
     # Signed, but not looked at: the mode is off.
     unchecked: int = 0
 
+    @property
+    def refusals(self) -> str:
+        """The refused frames and why, for people; '' where there are none."""
+        return ', '.join(f'{number} frames refused: {reason}' for number, reason in (
+            (self.bad, 'signed with another key'),
+            (self.replayed, 'time stamps too old or repeated (replay protection); '
+                            'compare the clocks of both sides')) if number)
+
+
+def stamp_of(signature: bytes) -> int:
+    """Return the time stamp of the 13 bytes behind a signed frame."""
+    return int.from_bytes(signature[1:7], 'little')
+
 
 def ticks(unix_time: float) -> int:
     """Return a Unix time (s) as a time stamp of the signing protocol."""
@@ -96,6 +112,8 @@ class Signing:
     timestamp: int = 0
     counters: SigningCounters = field(default_factory=SigningCounters)
     _streams: dict[tuple[int, Address], int] = field(default_factory=dict)
+    # Streams with older time stamps may have been forgotten.
+    _forgotten: int = 0
 
     def __post_init__(self) -> None:
         if self.mode is SigningMode.OFF:
@@ -138,10 +156,10 @@ class Signing:
     def _fresh(self, frame: Frame, unix_time: float) -> bool:
         """Return whether the time stamp is new for its stream, and remember it if so."""
         assert frame.signature is not None
-        stamp = int.from_bytes(frame.signature[1:7], 'little')
+        stamp = stamp_of(frame.signature)
         stream = (frame.signature[0], frame.source)
         last = self._streams.get(stream)
-        oldest = max(self.timestamp, ticks(unix_time)) - NEW_STREAM_TICKS
+        oldest = max(self._reference(unix_time) - NEW_STREAM_TICKS, self._forgotten)
         if last is None:
             if stamp < oldest or not self._room(oldest):
                 return False
@@ -154,6 +172,16 @@ class Signing:
             self.timestamp = max(self.timestamp, stamp)
         return True
 
+    def _reference(self, unix_time: float) -> int:
+        """
+        Return the time stamp that new streams are compared with.
+
+        It is not the last one used, which may be ahead of the right time: after a crash, or after
+        a clock of ours or of a peer was wrong for a moment.
+        """
+        clock = ticks(unix_time)
+        return clock if self.timestamp - clock <= CLOCK_TOLERANCE_TICKS else self.timestamp
+
     def _room(self, oldest: int) -> bool:
         """
         Return whether one more stream can be remembered.
@@ -163,7 +191,7 @@ class Signing:
         the clock.
         """
         if len(self._streams) >= MAX_STREAMS:
-            self.timestamp = max(self.timestamp, oldest + NEW_STREAM_TICKS)
+            self._forgotten = oldest
             for stream in [s for s, stamp in self._streams.items() if stamp < oldest]:
                 del self._streams[stream]
         return len(self._streams) < MAX_STREAMS

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import logging
 import os
@@ -28,10 +29,11 @@ from .signing import KEY_SIZE, MAX_TICKS, Signing, SigningMode, ticks, TICKS_PER
 
 MIN_PASSPHRASE = 8
 MAX_KEY_FILE = 4096
-# The stored time stamp runs ahead of the last one used by this much, so that a crash between
-# two stores repeats none. The specification asks for a store at least once a minute. It is not
-# more than a new stream may be behind, so others with the right time are still believed.
-STORE_MARGIN = 60 * TICKS_PER_SECOND
+# The stored time stamp is ahead of the clock, and of the last one used, by this much, so that a
+# crash before the next store repeats none. Time stamps that are ahead of the clock only count
+# frames, so that repeated crashes do not add up. Peers accept a new stream 60 s behind.
+CLOCK_MARGIN = 45 * TICKS_PER_SECOND
+FRAMES_MARGIN = TICKS_PER_SECOND // 2
 
 _log = logging.getLogger(__name__)
 
@@ -54,17 +56,12 @@ def load_key(path: str) -> bytes:
         raise KeyFileError('no key file is given')
     path = os.path.expanduser(path)
     try:
-        # Without waiting: a FIFO without a writer would hold up the start for ever.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        with open(descriptor, 'rb') as file:
-            mode = os.fstat(descriptor).st_mode
-            content = file.read(MAX_KEY_FILE + 1) if stat.S_ISREG(mode) else b''
+        content = _read(path)
+        mode = os.stat(path).st_mode
     except OSError as error:
         raise KeyFileError(f'key file {path!r}: {error.strerror}') from None
     except ValueError as error:
         raise KeyFileError(f'key file {path!r}: {error}') from None
-    if not stat.S_ISREG(mode):
-        raise KeyFileError(f'key file {path!r} is no regular file')
     if stat.S_IMODE(mode) & 0o077:
         raise KeyFileError(
             f'key file {path!r} can be read by others (mode {stat.S_IMODE(mode):04o}); '
@@ -72,8 +69,8 @@ def load_key(path: str) -> bytes:
     if len(content) > MAX_KEY_FILE:
         raise KeyFileError(f'key file {path!r} is longer than {MAX_KEY_FILE} bytes')
     text = content.rstrip(b'\r\n')
-    if re.fullmatch(rb'[0-9A-Fa-f]{64}', text):
-        return bytes.fromhex(text.decode())
+    if re.fullmatch(rb'[0-9A-Fa-f]{64}', content.strip()):
+        return bytes.fromhex(content.decode())
     printable = _printable(text)
     if len(content) == KEY_SIZE and not printable:
         return content
@@ -83,6 +80,15 @@ def load_key(path: str) -> bytes:
             f'hexadecimal digits, nor a passphrase of at least {MIN_PASSPHRASE} printable '
             'characters')
     return hashlib.sha256(text).digest()
+
+
+def _read(path: str) -> bytes:
+    # Without waiting: a FIFO without a writer would hold up the start for ever.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with open(descriptor, 'rb') as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, 'not a regular file')
+        return file.read(MAX_KEY_FILE + 1)
 
 
 def _printable(text: bytes) -> bool:
@@ -96,14 +102,23 @@ class TimestampStore:
     """
     The last time stamp used with a key, kept over restarts.
 
-    Lies in ``$ROS_HOME/illuminator_ros`` (``~/.ros/illuminator_ros``), a file per key file and
-    component.
+    The file is in ``$ROS_HOME/illuminator_ros`` (``~/.ros/illuminator_ros``), one for each key
+    file and component.
+
+    :raises KeyFileError: if there is no home directory.
     """
 
     def __init__(self, key_file: str, name: str, directory: Path | None = None) -> None:
-        home = Path(os.environ.get('ROS_HOME') or Path.home() / '.ros')
-        tag = hashlib.sha256(f'{os.path.realpath(key_file)}\0{name}'.encode()).hexdigest()[:16]
-        self.path = (directory or home / 'illuminator_ros') / f'signing-{tag}'
+        if directory is None:
+            try:
+                home = Path(os.environ.get('ROS_HOME') or Path.home() / '.ros')
+            except RuntimeError:
+                raise KeyFileError('signing keeps its time stamps in the home directory, and '
+                                   'there is none: set HOME or ROS_HOME') from None
+            directory = home / 'illuminator_ros'
+        path = os.path.realpath(os.path.expanduser(key_file))
+        tag = hashlib.sha256(f'{path}\0{name}'.encode()).hexdigest()[:16]
+        self.path = directory / f'signing-{tag}'
 
     def begin(self, unix_time: float) -> int:
         """
@@ -116,20 +131,21 @@ class TimestampStore:
     def load(self) -> int:
         """Return the time stamp that is stored, 0 where none is."""
         try:
-            timestamp = int(self.path.read_text())
+            timestamp = int(_read(str(self.path)))
         except (OSError, ValueError):
             return 0
         return timestamp if 0 <= timestamp <= MAX_TICKS else 0
 
-    def store(self, timestamp: int, *, last: bool = False) -> None:
+    def store(self, timestamp: int, unix_time: float = 0.0, *, last: bool = False) -> None:
         """
         Replace the stored time stamp.
 
-        :param last: no other will be used in this run, so the next goes on right behind it.
-            Otherwise each restart would take the time stamps further ahead of the clock.
+        :param unix_time: now, s; 0 where there is no clock.
+        :param last: no other will be used in this run, so the next continues right behind it.
         :raises OSError: if the directory cannot be written.
         """
-        following = timestamp if last else timestamp + STORE_MARGIN
+        following = timestamp if last else max(
+            timestamp + FRAMES_MARGIN, ticks(unix_time) + CLOCK_MARGIN)
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         scratch = self.path.with_name(f'{self.path.name}.{os.getpid()}')
         try:
@@ -158,7 +174,7 @@ def keyed(
 
 class TimestampKeeper:
     """
-    Stores the time stamp for the next run ("Timestamp Handling"), until that fails.
+    Stores the time stamp for the next run ("Timestamp Handling").
 
     :param store: None keeps it nowhere.
     """
@@ -166,13 +182,18 @@ class TimestampKeeper:
     def __init__(self, signing: Signing, store: TimestampStore | None) -> None:
         self._signing = signing
         self._store = store
+        self._failed = False
 
-    def keep(self, last: bool = False) -> None:
-        """Store it; see :meth:`TimestampStore.store`."""
-        if self._store is not None:
-            try:
-                self._store.store(self._signing.timestamp, last=last)
-            except OSError as error:
-                self._store = None
-                _log.error('cannot keep the signing time stamp, a restart may repeat some: %s',
-                           error)
+    def keep(self, unix_time: float, last: bool = False) -> None:
+        """Store it; see :meth:`TimestampStore.store`. A failure is logged once until it ends."""
+        if self._store is None:
+            return
+        try:
+            self._store.store(self._signing.timestamp, unix_time, last=last)
+        except OSError as error:
+            if not self._failed:
+                _log.error('cannot store the signing time stamp, trying again: a restart may '
+                           'repeat some: %s', error)
+            self._failed = True
+        else:
+            self._failed = False

@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from .messages import Address
 
@@ -27,28 +29,37 @@ MAX_SOURCES = 256
 WINDOW = 64
 _ALL_SEEN = (1 << WINDOW) - 1
 # s
-LATELY = 10.0
+RECENT = 10.0
 
 
-@dataclass(slots=True)
-class Lately:
-    """By how much a counter has grown in the last :data:`LATELY` to twice that, s."""
+class WindowedCounter(NamedTuple):
+    """
+    A growing counter, and its growth in the last :data:`RECENT` to twice that, s.
 
-    _marks: list[tuple[float, int]] = field(default_factory=list)
+    :param samples: at most two of time (s) and count, the older first.
+    """
 
-    def over(self, count: int, now: float) -> int:
-        """Return the growth until now. To be asked now and then, with a growing counter."""
-        return count - self._mark(count, now)[1]
+    total: int = 0
+    time: float = 0.0
+    samples: tuple[tuple[float, int], ...] = ()
 
-    def rate(self, count: int, now: float) -> float:
-        """Return the growth per second."""
-        then, before = self._mark(count, now)
-        return (count - before) / (now - then) if now > then else 0.0
+    def sample(self, total: int, now: float) -> WindowedCounter:
+        """Return the counter with its new total."""
+        samples = self.samples
+        if not samples or now - samples[-1][0] >= RECENT:
+            samples = (*samples[-1:], (now, total))
+        return WindowedCounter(total, now, samples)
 
-    def _mark(self, count: int, now: float) -> tuple[float, int]:
-        if not self._marks or now - self._marks[-1][0] >= LATELY:
-            self._marks = [*self._marks[-1:], (now, count)]
-        return self._marks[0]
+    @property
+    def growth(self) -> int:
+        """The growth within the window."""
+        return self.total - self.samples[0][1] if self.samples else 0
+
+    @property
+    def rate(self) -> float:
+        """The growth per second."""
+        elapsed = self.time - self.samples[0][0] if self.samples else 0.0
+        return self.growth / elapsed if elapsed > 0 else 0.0
 
 
 @dataclass(slots=True)
@@ -69,8 +80,8 @@ class SequenceCounter:
     _next: int = -1
     # Bit i is set where number newest - i has come.
     _seen: int = 0
-    _lost_lately: Lately = field(default_factory=Lately)
-    _received_lately: Lately = field(default_factory=Lately)
+    _recently_lost: WindowedCounter = WindowedCounter()
+    _recently_received: WindowedCounter = WindowedCounter()
 
     def add(self, sequence: int) -> None:
         """Take the number of a frame that has come."""
@@ -105,15 +116,20 @@ class SequenceCounter:
         """Forget the numbers but not the counts: what comes next follows on nothing."""
         self._newest = self._next = -1
 
-    def forgive(self) -> None:
-        """Have nothing lost lately: the sender has begun to count anew, so numbers are missing."""
-        self._lost_lately = Lately()
-        self._received_lately = Lately()
+    def reset_loss(self) -> None:
+        """Have nothing lost recently: the sender has begun to count anew."""
+        self._recently_lost = self._recently_received = WindowedCounter()
 
-    def recent_loss(self, now: float) -> float:
-        """Return the share of frames lost lately, %."""
-        lost = self._lost_lately.over(self.lost, now)
-        received = self._received_lately.over(self.received - self.duplicate, now)
+    def sample(self, now: float) -> None:
+        """Update the recent loss."""
+        self._recently_lost = self._recently_lost.sample(self.lost, now)
+        self._recently_received = self._recently_received.sample(
+            self.received - self.duplicate, now)
+
+    @property
+    def recent_loss(self) -> float:
+        """The share of frames lost recently, %, as of the last sample."""
+        lost, received = self._recently_lost.growth, self._recently_received.growth
         return 100.0 * max(lost, 0) / (lost + received) if lost + received > 0 else 0.0
 
 
@@ -132,22 +148,33 @@ class Traffic:
     frames_dropped: int = 0
     sources: dict[Address, SequenceCounter] = field(default_factory=dict)
     _frames_of_others: int = 0
-    _in: Lately = field(default_factory=Lately)
-    _out: Lately = field(default_factory=Lately)
+    _in: WindowedCounter = WindowedCounter()
+    _out: WindowedCounter = WindowedCounter()
 
     @property
     def frames_received(self) -> int:
-        """Those that came with the right checksum; from any thread."""
+        """Those that came with the right checksum."""
         return self._frames_of_others + sum(
-            counter.received for counter in list(self.sources.values()))
+            counter.received for counter in self.sources.values())
 
-    def received_rate(self, now: float) -> float:
-        """Return the bytes that came per second lately."""
-        return self._in.rate(self.bytes_received, now)
+    @property
+    def received_rate(self) -> float:
+        """The bytes received per second recently, as of the last sample."""
+        return self._in.rate
 
-    def sent_rate(self, now: float) -> float:
-        """Return the bytes that went out per second lately."""
-        return self._out.rate(self.bytes_sent, now)
+    @property
+    def sent_rate(self) -> float:
+        """The bytes sent per second recently, as of the last sample."""
+        return self._out.rate
+
+    def snapshot(self, now: float) -> Traffic:
+        """Update the recent values and return a copy."""
+        self._in = self._in.sample(self.bytes_received, now)
+        self._out = self._out.sample(self.bytes_sent, now)
+        for counter in self.sources.values():
+            counter.sample(now)
+        return replace(self, sources={
+            source: copy(counter) for source, counter in self.sources.items()})
 
     def count(self, source: Address, sequence: int) -> None:
         """Count a frame with the right checksum."""

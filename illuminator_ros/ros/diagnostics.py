@@ -27,10 +27,10 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from ..mavlink import link_state
 from ..mavlink.command import format_seconds
 from ..mavlink.component import Component
 from ..mavlink.link import Link
-from ..mavlink.link_state import LinkState
 from ..mavlink.messages import Address
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -94,7 +94,7 @@ class LinkSnapshot:
     :param devices: values of single devices, by address.
     """
 
-    state: LinkState
+    state: link_state.LinkSnapshot
     taken_at: float
     address: Address
     address_conflict: bool
@@ -121,7 +121,7 @@ def link_snapshot(link: Link, component: Component, url: str, now: float) -> Lin
             'frames_lost': counter.lost,
             'frames_duplicate': counter.duplicate,
             'frames_reordered': counter.reordered,
-            'loss_percent': counter.recent_loss(now),
+            'loss_percent': counter.recent_loss,
             'round_trip_p50_ms': None if p50 is None else p50 * 1000,
             'round_trip_p95_ms': None if p95 is None else p95 * 1000,
         }
@@ -139,8 +139,8 @@ def link_snapshot(link: Link, component: Component, url: str, now: float) -> Lin
             'frames_dropped': traffic.frames_dropped,
             'bytes_received': traffic.bytes_received,
             'bytes_sent': traffic.bytes_sent,
-            'bytes_received_per_s': traffic.received_rate(now),
-            'bytes_sent_per_s': traffic.sent_rate(now),
+            'bytes_received_per_s': traffic.received_rate,
+            'bytes_sent_per_s': traffic.sent_rate,
             'crc_errors': decoding.crc_errors,
             'commands_sent': commands.counters.sent,
             'commands_resent': commands.counters.resent,

@@ -64,7 +64,7 @@ class Figures:
 
     def add(self, siege: Siege) -> None:
         """Count a round that is over."""
-        counters, signing = siege.link._reception.counters, siege.link._signing.counters
+        counters, signing = siege.link._receiver.counters, siege.link._signing.counters
         self.rounds += 1
         self.totals.update(
             inputs=siege.inputs, frames=counters.frames, crc_errors=counters.crc_errors,

@@ -136,7 +136,7 @@ def test_a_flood_of_lights_is_bounded(bridge: BridgeSiege) -> None:
 def test_a_flood_of_components_is_bounded(bridge: BridgeSiege) -> None:
     flood(bridge, [heartbeat_frame(source, mav_type=2) for source in many_sources(3000)])
     assert len(bridge.link._traffic.sources) == MAX_SOURCES
-    assert len(bridge.link._routes) == MAX_ROUTES
+    assert len(bridge.link._router) == MAX_ROUTES
     assert list(bridge.controller.lights) == [GENUINE]
     bridge.check_service()
 
@@ -144,8 +144,8 @@ def test_a_flood_of_components_is_bounded(bridge: BridgeSiege) -> None:
 def test_a_flood_of_peers_is_bounded(bridge: BridgeSiege) -> None:
     flood(bridge, [heartbeat_frame(Address(2, 1))] * 3000, peers=3000)
     assert len(bridge.link.udp._peers) == MAX_PEERS
-    assert len(bridge.link._reception) == MAX_DECODERS
-    assert len(bridge.link._routes._ways[Address(2, 1)]) == MAX_WAYS
+    assert len(bridge.link._receiver) == MAX_DECODERS
+    assert len(bridge.link._router._ways[Address(2, 1)]) == MAX_WAYS
     bridge.check_service()
 
 
@@ -162,7 +162,7 @@ def test_a_flood_of_unknown_messages_leaves_nothing_behind(bridge: BridgeSiege) 
     flood(bridge, [raw_v2(message_id, b'x', crc_extra=0, source=Address(9, 9))
                    for message_id in itertools.islice(unknown, 5000)])
     assert len(bridge.link._traffic.sources) == before
-    assert bridge.link._reception.counters.unknown_ids >= 5000
+    assert bridge.link._receiver.counters.unknown_ids >= 5000
     bridge.check_service()
 
 

@@ -27,11 +27,12 @@ from illuminator_ros.mavlink.signing_files import (
     KeyFileError,
     load_key,
     MAX_KEY_FILE,
+    TimestampKeeper,
     TimestampStore,
 )
 import pytest
 from support.frames import frame_of
-from support.signers import checker, LAST_STAMP, NOW, stamp_at
+from support.signers import checker, KEY, LAST_STAMP, NOW, signed, stamp_at
 
 RAW = bytes(range(100, 132))
 PASSPHRASE = 'correct horse battery staple'
@@ -182,11 +183,71 @@ def test_time_stamps_go_on_after_a_restart_without_a_clock(store: TimestampStore
     assert next_run(store) == signing.timestamp + 1
 
 
-def test_crash_a_minute_after_the_last_store_repeats_no_time_stamp(store: TimestampStore) -> None:
+def test_crash_before_the_next_store_repeats_no_time_stamp(store: TimestampStore) -> None:
     signing = run(store, NOW)
-    store.store(signing.timestamp)
-    signing.sign(frame_of(signed=True), NOW + 59.9)
+    store.store(signing.timestamp, NOW)
+    signing.sign(frame_of(signed=True), NOW + 44.9)
     assert next_run(store) > signing.timestamp
+
+
+def test_many_crashes_in_a_row_do_not_add_up(store: TimestampStore) -> None:
+    for second in range(20):
+        store.store(run(store, NOW + second).timestamp, NOW + second)
+    assert next_run(store, NOW + 20) - stamp_at(NOW + 20) < NEW_STREAM_TICKS
+
+
+def test_clock_that_was_ahead_for_a_moment_locks_no_light_out(store: TimestampStore) -> None:
+    store.store(run(store, NOW + 7200).timestamp, NOW + 7200)
+    signing = checker(timestamp=store.load())
+    assert signing.accepts(signed(stamp_at(NOW)), NOW)
+
+
+def test_failed_write_is_logged_once_and_tried_again(
+        store: TimestampStore, caplog: pytest.LogCaptureFixture) -> None:
+    store.path.parent.parent.mkdir(parents=True, exist_ok=True)
+    store.path.parent.write_text('a file where the directory must be')
+    signing = checker(timestamp=5)
+    keeper = TimestampKeeper(signing, store)
+    keeper.keep(NOW)
+    keeper.keep(NOW)
+    assert 'trying again' in caplog.text
+    assert len(caplog.records) == 1
+    store.path.parent.unlink()
+    keeper.keep(NOW)
+    assert store.load() > 5
+
+
+def test_pipe_as_state_file_is_read_as_no_time_stamp(store: TimestampStore) -> None:
+    store.path.parent.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(store.path)
+    assert store.load() == 0
+
+
+def test_same_key_file_has_one_state_file_however_it_is_named(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert len({TimestampStore(name, 'x').path for name in (
+        'key', './key', '~/key', str(tmp_path / 'key'))}) == 1
+
+
+def test_missing_home_directory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home() -> Path:
+        raise RuntimeError('Could not determine home directory.')
+
+    monkeypatch.delenv('ROS_HOME', raising=False)
+    monkeypatch.setattr(Path, 'home', no_home)
+    with pytest.raises(KeyFileError, match='set HOME or ROS_HOME'):
+        TimestampStore(str(tmp_path / 'key'), 'x')
+
+
+@pytest.mark.parametrize('blank', [b' ', b'\n', b' \r\n', b'\t'])
+def test_digits_of_a_key_are_digits_with_a_blank_behind_them_too(
+        tmp_path: Path, blank: bytes) -> None:
+    path = tmp_path / 'key'
+    path.write_bytes(KEY.hex().encode() + blank)
+    path.chmod(0o600)
+    assert load_key(str(path)) == KEY
 
 
 def test_clock_that_has_gone_on_is_followed(store: TimestampStore) -> None:
@@ -292,5 +353,5 @@ def test_ticks_of_the_margin_are_those_of_signing() -> None:
 def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     pipe = tmp_path / 'key'
     os.mkfifo(pipe, 0o600)
-    with pytest.raises(KeyFileError, match='is no regular file'):
+    with pytest.raises(KeyFileError, match='not a regular file'):
         load_key(str(pipe))

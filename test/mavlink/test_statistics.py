@@ -22,12 +22,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.statistics import (
-    LATELY,
-    Lately,
     MAX_SOURCES,
+    RECENT,
     SequenceCounter,
     Traffic,
     WINDOW,
+    WindowedCounter,
 )
 import pytest
 
@@ -138,80 +138,87 @@ def test_any_numbers_give_counts_that_make_sense(sequences: list[int]) -> None:
     assert counter.duplicate + counter.reordered <= max(len(sequences) - 1, 0)
 
 
-# Lately
+def recent_loss(counter: SequenceCounter, now: float) -> float:
+    """Sample the recent loss, %."""
+    counter.sample(now)
+    return counter.recent_loss
+
 
 def test_share_lost_is_that_of_what_was_sent_lately() -> None:
     counter = SequenceCounter()
-    assert counter.recent_loss(0.0) == 0.0
+    assert recent_loss(counter, 0.0) == 0.0
     for number in range(0, 80, 2):
         counter.add(number)
-    assert counter.recent_loss(1.0) == pytest.approx(100 * 39 / 79)
+    assert recent_loss(counter, 1.0) == pytest.approx(100 * 39 / 79)
 
 
 def test_duplicates_hide_no_loss() -> None:
     counter = SequenceCounter()
-    counter.recent_loss(0.0)
+    recent_loss(counter, 0.0)
     for number in [0, 0, 0, 0, 2, 2, 2, 2]:
         counter.add(number)
-    assert counter.recent_loss(1.0) == pytest.approx(100 / 3)
+    assert recent_loss(counter, 1.0) == pytest.approx(100 / 3)
 
 
 def test_frame_that_comes_late_after_all_makes_no_negative_loss() -> None:
     counter = after([0, 2])
-    counter.recent_loss(0.0)
+    recent_loss(counter, 0.0)
     counter.add(1)
-    assert counter.recent_loss(1.0) == 0.0
+    assert recent_loss(counter, 1.0) == 0.0
 
 
 def test_loss_is_shown_for_a_while() -> None:
     counter = SequenceCounter()
     losses = []
-    for second in range(int(LATELY) + 1):
+    for second in range(int(RECENT) + 1):
         counter.add(second if second < 2 else second + 10)
-        losses.append(counter.recent_loss(float(second)))
+        losses.append(recent_loss(counter, float(second)))
     assert losses[2:] == sorted(losses[2:], reverse=True)
     assert losses[-1] == pytest.approx(100 * 10 / 20)
 
 
 def test_old_losses_are_forgotten() -> None:
     counter = SequenceCounter()
-    counter.recent_loss(0.0)
+    recent_loss(counter, 0.0)
     counter.add(0)
     counter.add(100)
-    assert counter.recent_loss(1.0) > 90.0
+    assert recent_loss(counter, 1.0) > 90.0
     number = 100
-    for second in range(1, int(3 * LATELY)):
+    for second in range(1, int(3 * RECENT)):
         number += 1
         counter.add(number & 0xFF)
-        loss = counter.recent_loss(float(second))
+        loss = recent_loss(counter, float(second))
     assert loss == 0.0
 
 
 @pytest.mark.parametrize('interval', [0.5, 1.0, 7.0])
 def test_rate_is_that_of_the_last_seconds(interval: float) -> None:
-    lately, now, count, rates = Lately(), 0.0, 0, []
+    window, now, count, rates = WindowedCounter(), 0.0, 0, []
     while now < 100.0:
         # 1000 a second at first, then 10.
         count += int((1000 if now < 50.0 else 10) * interval)
         now += interval
-        rates.append((now, lately.rate(count, now)))
+        window = window.sample(count, now)
+        rates.append((now, window.rate))
     assert all(rate == pytest.approx(1000) for now, rate in rates[1:] if now < 50.0)
-    assert all(rate == pytest.approx(10) for now, rate in rates if now > 50.0 + 3 * LATELY)
+    assert all(rate == pytest.approx(10) for now, rate in rates if now > 50.0 + 3 * RECENT)
 
 
 def test_rate_is_zero_before_any_time_has_passed() -> None:
-    lately = Lately()
-    assert [lately.rate(100, 5.0), lately.rate(200, 5.0)] == [0.0, 0.0]
+    first = WindowedCounter().sample(100, 5.0)
+    assert [first.rate, first.sample(200, 5.0).rate] == [0.0, 0.0]
 
 
 # A whole link
 
 def test_rates_of_a_link_are_bytes_per_second() -> None:
     traffic = Traffic()
-    traffic.received_rate(0.0)
-    traffic.sent_rate(0.0)
+    traffic.snapshot(0.0)
     traffic.bytes_received, traffic.bytes_sent = 5000, 200
-    assert (traffic.received_rate(2.0), traffic.sent_rate(2.0)) == (2500.0, 100.0)
+    snapshot = traffic.snapshot(2.0)
+    assert (snapshot.received_rate, snapshot.sent_rate) == (2500.0, 100.0)
+    traffic.count(LIGHT, 0)
+    assert snapshot.sources == {}
 
 
 def test_each_source_has_its_own_sequence() -> None:

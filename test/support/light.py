@@ -189,7 +189,7 @@ class ServedLight:
         """Have the next frame look as if ``count`` before it had been lost."""
         def act(now: float) -> None:
             assert self._link is not None
-            sequences = self._link._departure.sequences
+            sequences = self._link._writer.sequences
             sequences[self.fake.source] = (sequences.get(self.fake.source, 0) + count) & 0xFF
         self.do(act)
 

@@ -28,7 +28,7 @@ from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.link_state import LinkEvent
+from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url, Url
 from illuminator_ros.payload.request import Result
@@ -122,13 +122,18 @@ class LiveLink:
         self.link.call(lambda now: answers.append(function(now)))
         return answers.wait_for(lambda answer: True, within=within)
 
+    def state(self) -> LinkSnapshot:
+        """Return the link at this moment."""
+        snapshot: LinkSnapshot = self.ask(self.link.snapshot)
+        return snapshot
+
     def stop(self) -> None:
         """End it, and wait for its threads."""
         self.link.stop(PATIENCE)
 
     def has_ended(self) -> bool:
         """Return whether the link's thread has ended."""
-        return not self.link._thread.is_alive()
+        return not self.link.is_running()
 
 
 class Lights(LiveLink):

@@ -88,14 +88,14 @@ class Siege:
         waiting = link.endpoint.outgoing
         for what, size, bound in (
                 ('peers', len(link.udp._peers), MAX_PEERS),
-                ('decoders', len(link._reception), MAX_DECODERS),
+                ('decoders', len(link._receiver), MAX_DECODERS),
                 ('sources', len(link._traffic.sources), MAX_SOURCES),
-                ('routes', len(link._routes), MAX_ROUTES),
-                ('crowded routes', len(link._routes._crowded), MAX_ROUTES),
-                ('ways', max(map(len, link._routes._ways.values()), default=0), MAX_WAYS),
+                ('routes', len(link._router), MAX_ROUTES),
+                ('crowded routes', len(link._router._crowded), MAX_ROUTES),
+                ('ways', max(map(len, link._router._ways.values()), default=0), MAX_WAYS),
                 ('streams', len(link._signing._streams), MAX_STREAMS),
                 ('outgoing', len(waiting), 0),
-                ('sequences', len(link._departure.sequences), 8)):
+                ('sequences', len(link._writer.sequences), 8)):
             assert size <= bound, f'{size} {what}, more than {bound}'
 
     def attack(self) -> None:

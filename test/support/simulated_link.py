@@ -23,6 +23,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.link_state import LinkSnapshot
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import Signing
 from illuminator_ros.mavlink.transport.udp import UdpChannel
@@ -97,20 +98,21 @@ class SimulatedLink(Link):
     def __init__(
         self, endpoint: Endpoint, take: Callable[[bytes, Any], None], *,
         signing: Signing | None = None, now: float = 1000.0,
+        mavlink_version: int = 2,
     ) -> None:
         self.now = self.until = now
         super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
-                         wall_clock=lambda: 1.7e9 + self.now, signing=signing)
-        self._selector.close()
-        self._selector = _Selector(self)
-        self._departure.sequences = _FromZero()
+                         wall_clock=lambda: 1.7e9 + self.now, signing=signing,
+                         mavlink_version=mavlink_version, selector=_Selector(self))
+        self._connecting = True
+        self._writer.sequences = _FromZero()
         self.socket = _Socket(take)
         self.udp = UdpChannel(URL)
         self.udp._socket.close()
         self.udp._socket = self.socket  # type: ignore[assignment]
         self._opened(self.udp, now)
 
-    def _show_fault(self) -> None:
+    def _log_fault(self) -> None:
         raise  # noqa: PLE0704 - it is called while an exception is handled
 
     def receive(self, *datagrams: Datagram) -> None:
@@ -118,13 +120,13 @@ class SimulatedLink(Link):
         self.socket.inbox.extend(datagrams)
         self.until = self.now
         while self.socket.inbox:
-            self._turn()
+            self._run_once()
 
     def ask(self, function: Callable[[float], Any]) -> None:
         """Have a function called as other threads do."""
         self.call(function)
         self.until = self.now
-        self._turn()
+        self._run_once()
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -132,6 +134,10 @@ class SimulatedLink(Link):
         idle = 0
         while self.now < self.until:
             before = self.now
-            self._turn()
+            self._run_once()
             idle = idle + 1 if self.now == before and not self.socket.inbox else 0
             assert idle < MAX_IDLE_TURNS, f'the thread would spin at {self.now}'
+
+    def state(self) -> LinkSnapshot:
+        """Return the link at this moment."""
+        return self.snapshot(self.now)

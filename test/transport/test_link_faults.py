@@ -24,13 +24,12 @@ from typing import Any
 
 from illuminator_ros.mavlink import connector as opener
 from illuminator_ros.mavlink import link as link_module
-from illuminator_ros.mavlink import worker
-from illuminator_ros.mavlink.link_state import LinkEvent
+from illuminator_ros.mavlink.link_state import LinkEvent, MAX_EVENTS
 from illuminator_ros.mavlink.messages import heartbeat
 import pytest
 from support.frames import LIGHT
 from support.heartbeats import heartbeat_frame
-from support.live_link import BRIDGE, LiveLink, Talker
+from support.live_link import BRIDGE, LiveLink, OPENER, Talker
 from support.open_channel import listening_socket, OpenChannel
 from support.waiting import Log
 
@@ -68,7 +67,7 @@ class Faulty(Talker):
 @pytest.fixture(autouse=True)
 def _all_logged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have every fault logged, not only one in a while."""
-    monkeypatch.setattr(worker, 'FAULT_LOG_INTERVAL', 0.0)
+    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 0.0)
 
 
 def faults(caplog: pytest.LogCaptureFixture) -> list[str]:
@@ -172,7 +171,7 @@ def test_a_message_that_cannot_be_sent_takes_no_other_with_it(
     link.ask(lambda now: link.endpoint.outgoing.extend([(BRIDGE, wrong), (BRIDGE, right)]))
     data = b''
     while b'\x78\x56\x34\x12' not in data:
-        data += other.receive()[0][1]
+        data += b''.join(piece for _, piece in other.receive())
     assert len(caplog.records) == 1
 
 
@@ -190,7 +189,7 @@ def test_a_lasting_fault_does_not_keep_a_processor_busy(
     run: Run, endpoint: Faulty, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # So that a thread which does pause stands still, whatever time the machine takes.
-    monkeypatch.setattr(worker, 'FAULT_PAUSE', 3600.0)
+    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 3600.0)
     monkeypatch.setattr(link_module, 'IDLE', 3600.0)
     run(LiveLink('memory://faults', endpoint))
     endpoint.failures.wait_for(lambda one: True)
@@ -202,8 +201,8 @@ def test_a_lasting_fault_does_not_keep_a_processor_busy(
 def test_a_lasting_fault_does_not_fill_the_log(
     run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(worker, 'FAULT_LOG_INTERVAL', 60.0)
-    monkeypatch.setattr(worker, 'FAULT_PAUSE', 0.001)
+    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 60.0)
+    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 0.001)
     endpoint = Restless('poll', times=NEVER_ENDING)
     run(LiveLink('memory://faults', endpoint))
     endpoint.failures.wait_for(lambda one: True, count=50)
@@ -243,3 +242,50 @@ def test_a_fault_while_opening_is_logged_and_tried_again(
     monkeypatch.setattr(opener, 'open_channel', open_second_time)
     run(LiveLink('memory://faults')).wait_open()
     assert faults(caplog) == ['opening']
+
+
+def test_thread_that_cannot_be_started_is_tried_again(
+        run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    # As with a limit on the number of processes.
+    genuine, failures = threading.Thread.start, Log[str]()
+
+    def start(thread: threading.Thread) -> None:
+        if thread.name == OPENER and len(failures) < 2:
+            failures.append(thread.name)
+            raise RuntimeError("can't start new thread")
+        genuine(thread)
+
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        with server.accept()[0] as connection:
+            connection.sendall(heartbeat_frame())
+            link.endpoint.heard.wait_for(lambda heard: True)
+            monkeypatch.setattr(threading.Thread, 'start', start)
+        link.wait_lost()
+        failures.wait_for(lambda name: True, count=2)
+        server.accept()[0].close()
+
+
+def test_server_that_answers_and_closes_is_reported_at_a_limited_rate(run: Run) -> None:
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        for _ in range(MAX_EVENTS):
+            with server.accept()[0] as connection:
+                connection.sendall(heartbeat_frame())
+        server.accept()[0].close()
+        assert len(link.history()) <= MAX_EVENTS + 1
+
+
+def test_frames_are_logged_in_a_line_each_at_debug_level_only(
+        run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
+    for level in (logging.INFO, logging.DEBUG):
+        caplog.set_level(level, 'illuminator_ros')
+        link = run(LiveLink('memory://faults'))
+        link.wait_open()
+        other.channel.send([heartbeat_frame()], (None,))
+        link.endpoint.wait_for(LIGHT)
+        link.stop()
+        lines = [record.getMessage() for record in caplog.records]
+        assert any(line.startswith('received from 1/243: Heartbeat(') for line in lines) == (
+            level == logging.DEBUG)
+    assert any(line.startswith('sent from 1/194: Heartbeat(') for line in lines)

@@ -81,7 +81,7 @@ def test_a_line_that_takes_nothing_makes_no_work(
     link.ask(fill)
     link.ask(lambda now: None)
     assert link.endpoint.rests()
-    assert link.link.state().traffic.frames_dropped > 0
+    assert link.state().traffic.frames_dropped > 0
     device.pull_out()
 
 

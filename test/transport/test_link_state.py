@@ -39,7 +39,7 @@ def test_a_link_that_cannot_be_opened_says_why(run: Run) -> None:
         port = taken.getsockname()[1]
         link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
         link.wait_lost()
-        state = link.link.state()
+        state = link.state()
     assert (state.is_open, state.name, state.openings) == (
         False, f'udpin://127.0.0.1:{port}', 0)
     assert state.reason == f'cannot listen on 127.0.0.1:{port}: Address already in use'
@@ -49,7 +49,7 @@ def test_an_open_link_says_what_it_is(run: Run) -> None:
     port = free_port()
     link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
     link.wait_open()
-    state = link.link.state()
+    state = link.state()
     assert (state.is_open, state.name, state.reason, state.openings) == (
         True, f'udp 127.0.0.1:{port}', '', 1)
 
@@ -62,21 +62,21 @@ def test_it_says_since_when_it_is_open_or_not(run: Run) -> None:
     server.close()
     link = run(LiveLink(f'tcp://127.0.0.1:{port}', clock=clock))
     link.wait_lost()
-    assert link.link.state().since < begun + STEP
+    assert link.state().since < begun + STEP
 
     clock.ahead += STEP
     with listening_socket(port=port) as server:
         connection, _ = server.accept()
         connection.sendall(heartbeat_frame())
         link.wait_open()
-        assert begun + STEP <= link.link.state().since < begun + 2 * STEP
+        assert begun + STEP <= link.state().since < begun + 2 * STEP
 
         clock.ahead += STEP
         # What opens again at once would begin anew.
         server.close()
         connection.close()
         link.wait_lost(2)
-        assert link.link.state().since >= begun + 2 * STEP
+        assert link.state().since >= begun + 2 * STEP
 
 
 def test_frames_and_bytes_are_counted_both_ways(
@@ -87,7 +87,7 @@ def test_frames_and_bytes_are_counted_both_ways(
     sent = other.receive()[0][1]
     other.broadcast(heartbeat_frame() + b'xyz')
     link.endpoint.wait_for(LIGHT)
-    traffic = link.link.state().traffic
+    traffic = link.state().traffic
     assert (traffic.frames_received, traffic.bytes_received) == (1, len(heartbeat_frame()) + 3)
     assert traffic.frames_sent >= 1
     assert traffic.bytes_sent == traffic.frames_sent * len(sent)
@@ -111,7 +111,7 @@ def test_what_does_not_go_out_is_counted(
     link.wait_open()
     fill(link)
     assert link.ask(lambda now: link.link._channel.dropped == (
-        link.link.state().traffic.frames_dropped))
+        link.link.snapshot(now).traffic.frames_dropped))
 
 
 def test_a_lost_link_leads_nowhere_and_awaits_nothing(run: Run) -> None:
@@ -121,10 +121,10 @@ def test_a_lost_link_leads_nowhere_and_awaits_nothing(run: Run) -> None:
     with connection:
         connection.sendall(heartbeat_frame() + heartbeat_frame()[:9])
         link.endpoint.wait_for(LIGHT)
-        assert link.link.state().peers == 1
+        assert link.state().peers == 1
     link.wait_lost()
-    assert link.link.state().peers == 0
-    assert link.ask(lambda now: link.link._reception.next_deadline()) == float('inf')
+    assert link.state().peers == 0
+    assert link.ask(lambda now: link.link._receiver.next_deadline()) == float('inf')
 
 
 def test_drops_are_counted_over_all_openings(run: Run) -> None:
@@ -136,7 +136,7 @@ def test_drops_are_counted_over_all_openings(run: Run) -> None:
                 connection.sendall(heartbeat_frame())
                 link.endpoint.heard.wait_for(lambda heard: True, count=len(counts) + 1)
                 fill(link)
-                counts.append(link.link.state().traffic.frames_dropped)
+                counts.append(link.state().traffic.frames_dropped)
             link.wait_lost(len(counts))
         assert 0 < counts[0] < counts[1]
 
@@ -149,7 +149,7 @@ def test_what_was_sent_while_the_link_was_lost_does_not_count_as_lost(run: Run) 
                 connection.sendall(heartbeat_frame(sequence=sequence))
                 link.endpoint.heard.wait_for(lambda heard: True, count=count)
             link.wait_lost(count)
-    counter = link.link.state().traffic.sources[LIGHT]
+    counter = link.state().traffic.sources[LIGHT]
     assert (counter.received, counter.lost) == (2, 0)
 
 

@@ -116,7 +116,7 @@ def test_garbage_makes_nobody_a_peer(
         (frame,) = Decoder().feed(light.recv(300))
         assert frame.source == BRIDGE
         assert has_nothing(liar)
-        assert bridge.link.state().peers == 1
+        assert bridge.state().peers == 1
 
 
 def test_a_new_peer_is_greeted_at_once(bridge: Any, port: int) -> None:

@@ -147,9 +147,7 @@ class Lights(ServedPayload):
 
     def _forgive_loss(self, address: Address) -> None:
         """Do not count the restarted sequence numbers of a light as loss."""
-        counter = self._host.link.state().traffic.sources.get(address)
-        if counter:
-            counter.forgive()
+        self._host.link.reset_loss(address)
 
     # Requests to all lights
 

@@ -15,9 +15,12 @@
 """Our own frames that come back are told from those of somebody else with our address."""
 
 from illuminator_ros.mavlink.frame import Frame
-from illuminator_ros.mavlink.loopback_filter import LoopbackFilter, MAX_FRAMES, MEMORY
+from illuminator_ros.mavlink.frame_writer import FrameWriter, LoopbackFilter, MAX_FRAMES, MEMORY
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
+from support.frames import LIGHT, only
+from support.messages import STATUS
 
 OURS = Address(1, 194)
 SENT = {'source': OURS, 'sequence': 7, 'message_id': 0, 'payload': b'\x01\x02\0\0'}
@@ -62,3 +65,10 @@ def test_memory_is_bounded(echoes):
     for number in range(MAX_FRAMES):
         echoes.sent(OURS, number, 76, b'\x01', 100.0)
     assert not echoes.has(frame(), 100.1)
+
+
+def test_signed_frame_that_comes_back_late_is_recognised() -> None:
+    writer = FrameWriter(Signing(SigningMode.REQUIRE, bytes(range(32))))
+    frame = only(writer.frame(LIGHT, STATUS, 0.0, 1.7e9))
+
+    assert writer.is_loopback(frame, 3600.0)

@@ -1,0 +1,109 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""MAVLink 1 links, checked by a parser of their own."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from fastcrc.crc16 import mcrf4xx
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    heartbeat,
+    IlluminatorStatus,
+    Message,
+)
+from illuminator_ros.mavlink.signing import Signing, SigningMode
+from illuminator_ros.mavlink.url import parse_url
+import pytest
+from support.heartbeats import heartbeat_frame
+from support.simulated_link import SimulatedLink
+
+PEER = ('127.0.0.1', 14550)
+# Payload length and CRC_EXTRA by message id, from the definition of MAVLink 1's common messages.
+STRICT = {0: (9, 50), 75: (35, 158), 76: (33, 152), 77: (3, 143)}
+OURS = Address(1, 194)
+
+
+def parse_strictly(data: bytes) -> list[tuple[int, bytes]]:
+    """Return id and payload of MAVLink 1 frames; an error for anything else."""
+    found = []
+    while data:
+        stx, length, _, _, _, message_id = data[:6]
+        assert (stx, length) == (0xFE, STRICT[message_id][0])
+        body, checksum = data[1:6 + length], data[6 + length:8 + length]
+        assert mcrf4xx(body + bytes((STRICT[message_id][1],))) == int.from_bytes(
+            checksum, 'little')
+        found.append((message_id, data[6:6 + length]))
+        data = data[8 + length:]
+    return found
+
+
+class Endpoint1(Endpoint):
+    """Sends what a test gives it."""
+
+    messages: Any = (Heartbeat, CommandAck)
+
+    def __init__(self) -> None:
+        self.outgoing: deque[tuple[Address, Message]] = deque()
+
+    def link_opened(self, now: float) -> None:
+        self.outgoing.append((OURS, heartbeat(18)))
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        self.outgoing.append((OURS, CommandAck(405, 0, 50, -1, *source)))
+
+    def poll(self, now: float) -> None:
+        pass
+
+    def next_deadline(self) -> float:
+        return float('inf')
+
+
+def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_frames() -> None:
+    sent: list[bytes] = []
+    endpoint = Endpoint1()
+    link = SimulatedLink(endpoint, lambda data, peer: sent.append(data), mavlink_version=1)
+
+    # Whatever it receives: these are MAVLink 2 frames.
+    link.receive((heartbeat_frame(Address(1, 1)), PEER))
+    link.ask(lambda now: endpoint.outgoing.extend([
+        (OURS, CommandLong(1, 2, 512, 0, 0, 0, 0, 0, 0, 0, 0)),
+        (OURS, CommandInt(1, 2, 0, 195, 0, 0, 0, 0, 0, 0, 0, 0, 0))]))
+
+    assert parse_strictly(b''.join(sent)) == [
+        (0, bytes((0, 0, 0, 0, 18, 8, 0, 4, 3))), (77, bytes((149, 1, 0))),
+        (76, bytes(28) + bytes((0, 2, 1, 2, 0))), (75, bytes(28) + bytes((195, 0, 1, 2, 0, 0, 0)))]
+
+
+@pytest.mark.parametrize(('messages', 'options', 'reason'), [
+    ((Heartbeat, IlluminatorStatus), {}, 'ILLUMINATOR_STATUS cannot be sent with MAVLink 1'),
+    ((), {'signing': Signing(SigningMode.SIGN, bytes(32))}, 'cannot be signed'),
+    ((), {'mavlink_version': 3}, 'version 3 is neither')])
+def test_link_that_mavlink_1_cannot_serve_is_refused_with_the_reason(
+        messages: Any, options: dict[str, Any], reason: str) -> None:
+    endpoint = Endpoint1()
+    endpoint.messages = messages
+
+    with pytest.raises(ValueError, match=reason):
+        Link(parse_url('memory://one'), endpoint, label='one',
+             **{'mavlink_version': 1, **options})
