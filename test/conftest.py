@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What all tests share."""
+"""Settings of all tests."""
 
 from hypothesis import HealthCheck, settings
 

@@ -162,7 +162,7 @@ def test_shared_protocol_modules_name_no_payload() -> None:
                            if PAYLOAD_WORD.search(name) and name != PACKAGE])} == {}
 
 
-# Of the monitor, only these parts may know the terminal, and only those the ROS graph.
+# The parts of the monitor that may know the terminal, and those that may know the ROS graph.
 @pytest.mark.parametrize(('part', 'foreign'), [
     *((part, ROS | IO | TIME | THREADS | {'rich'})
       for part in ('model', 'actions', 'keys', 'operator', 'texts')),

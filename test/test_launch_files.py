@@ -36,7 +36,7 @@ FOREIGN = {'joy': {'joy_node'}, 'joy_teleop': {'joy_teleop'}}
 
 
 def texts(launch: ET.Element) -> list[str]:
-    """Return all that may hold substitutions."""
+    """Return all texts that may hold substitutions."""
     return [value for element in launch.iter() for value in element.attrib.values()]
 
 

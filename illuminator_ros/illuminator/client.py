@@ -65,7 +65,7 @@ class IlluminatorClient:
         self.events: Listeners[AnyLightEvent] = Listeners()
         self._discovery = Discovery(self._make, self._drop, wanted)
         self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
-        # Lights whose deadline may differ from the one that was entered.
+        # Lights whose deadline may have changed.
         self._dirty: set[Address] = set()
 
     @property
@@ -113,7 +113,7 @@ class IlluminatorClient:
                 self.events.emit(event)
 
     def _drop(self, light: Light) -> None:
-        """End all that concerns a light that the discovery has forgotten."""
+        """End the commands of a light that the discovery has forgotten."""
         self._dirty.discard(light.address)
         self._deadlines.remove(light.address)
         self.commands.end_all(light.heard_at, CommandStatus.CANCELLED, light.address)

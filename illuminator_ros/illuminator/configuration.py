@@ -61,7 +61,7 @@ REPORT_INTERVAL = 1.0
 
 
 class Origin(Enum):
-    """The origin of values that are to be sent."""
+    """The origin of values that must be sent."""
 
     OVERRIDE = 'override'
     RESTART = 'restart'
@@ -188,7 +188,7 @@ class ConfigurationManager:
         """
         Have values sent as soon as the light has reported its configuration.
 
-        :param values: by name, checked but for the limits that the light reports.
+        :param values: by name, checked, except against the limits that the light reports.
         """
         self._want({**(self._pending.values if self._pending else {}), **values},
                    self._pending.origin if self._pending else Origin.OVERRIDE, now)
@@ -198,7 +198,7 @@ class ConfigurationManager:
         self._pending = Pending(values, origin, now + wait)
 
     def cancel(self, now: float) -> None:
-        """End all changes, and drop the values that are to be sent."""
+        """End all changes, and drop the values that were not sent."""
         self._pending = None
         self._setpoint = None
         self._queue.cancel('cancelled', now)
@@ -400,7 +400,7 @@ class ConfigurationManager:
     # Time
 
     def poll(self, now: float, *, connected: bool) -> None:
-        """Send what is to be sent, one command at a time."""
+        """Send pending values, one command at a time."""
         if self._setpoint is not None and (replaceable := self._replaceable):
             replaceable.supersede(now)
         self._queue.poll(now)

@@ -35,7 +35,7 @@ class Cause(Enum):
 
 
 class Origin(Enum):
-    """Who switched a light."""
+    """The sender that switched a light."""
 
     REQUEST = 'request'
     OTHER_SENDER = 'another sender'

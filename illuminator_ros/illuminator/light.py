@@ -78,8 +78,8 @@ class Light:
     :ivar status: the newest status, None before the first.
     :ivar lost_at: when it was lost, s; infinity while it is heard.
     :ivar restarts: how often it has restarted since it was found.
-    :ivar instance: which light of the component it is; 0 is all of them, which is all that the
-        commands can say until mavlink pull request 2490 is settled.
+    :ivar instance: which light of the component it is; 0 means all of them: commands
+        cannot select one until mavlink pull request 2490 is settled.
     :ivar was_commanded: whether a user has ever sent it a command.
     :ivar has_answered: whether it has ever answered a command.
     """
@@ -342,7 +342,7 @@ class Light:
         """
         Have values sent as soon as the light has reported its configuration.
 
-        :param values: by name, checked but for the limits that the light reports.
+        :param values: by name, checked, except against the limits that the light reports.
         """
         self._configuration.set_desired(values, now)
         self._changed(self, now)

@@ -84,7 +84,7 @@ _MODES = {int(mode): mode for mode in Mode}
 
 
 def float32(value: float) -> float:
-    """Return a number as it comes back from a float field; infinity where it does not fit."""
+    """Return a number as a float field holds it; infinity if it does not fit."""
     try:
         return float(struct.unpack('<f', struct.pack('<f', value))[0])
     except OverflowError:

@@ -126,7 +126,7 @@ class SendingTimes:
         # The least delayed status of late, and when it came: by then it had been sent.
         self._uptime_ms = 0
         self._came_at = -math.inf
-        # The uptimes differ by multiples of this: some lights count in seconds. 0 is no clock.
+        # The uptimes differ by multiples of this: some lights count in seconds. 0 means no clock.
         self._step_ms = 0
 
     @property
@@ -152,8 +152,8 @@ class SendingTimes:
 ENOUGH_EVIDENCE = 4
 # Evidence does not grow beyond this, so that the verdict ends soon after the contradiction does.
 MAX_EVIDENCE = 6
-# Evidence that a status takes away if it agrees with the one before. Of two lights in turn, one
-# status in ten may get lost; one light may be flashed so that each third status differs.
+# Evidence that a status removes if it agrees with its predecessor. One status in ten of two lights
+# may get lost; flashing one light may make each third status differ.
 REPEAT_PENALTY = 2
 # Statuses that are remembered, and states of them, one for each light.
 MAX_RECENT = 8
@@ -184,8 +184,8 @@ class AddressConflict:
 
     ILLUMINATOR_STATUS does not say which light it is of: ArduSub sends one for each of its
     lights from the autopilot's address, and two lights may have been given the same ids. Lights
-    are told apart by the states that they show in turn, and by when they were started. Two that
-    show the same and were started together are not told apart.
+    are distinguished by their alternating states and by their start times. Lights with the same
+    state and start time cannot be distinguished.
 
     :ivar detected: whether several lights send.
     :ivar can_follow: whether the newest status can be followed: it does not go back to a state
@@ -223,7 +223,7 @@ class AddressConflict:
             repeated = self._take_state(status, now)
             self.can_follow = repeated or not self._evidence
         elif not self.detected:
-            # Changes that we make ourselves are no evidence.
+            # Changes by our own commands are not evidence.
             self._states.clear()
             self._evidence = 0
             self.can_follow = True

@@ -348,7 +348,7 @@ class CommandSender:
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: set[Address] = field(default_factory=set)
-    # In the order of sending; those that wait are behind the one that was sent.
+    # In the order of sending: the sent request first, then the waiting ones.
     _requests: dict[Address, list[_Request]] = field(default_factory=dict)
     _earlier: dict[tuple[Address, int, float], EarlierCommand] = field(default_factory=dict)
     _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
@@ -377,7 +377,7 @@ class CommandSender:
         :param done: called once, with the outcome and the time.
         :param limit: the time by which it ends whatever happens, progress or not.
         :param overtake: end all commands of its kind that wait or are not acknowledged with
-            CANCELLED, and send this one at once, beside one that is in progress.
+            CANCELLED, and send this one at once, beside a command in progress.
         """
         request = _Request(command, done, limit, as_int=command.position is not None)
         if now >= limit:
@@ -417,7 +417,7 @@ class CommandSender:
 
         It counts where source and command match a command that was sent, and where it is
         addressed to us or to 0, as the extension fields may be missing. It answers the oldest of
-        several commands, but progress is reported for the one that is in progress.
+        several commands, but progress belongs to the command in progress.
         """
         ours = self.address
         if (ack.target_system not in (0, ours.system)
@@ -430,7 +430,7 @@ class CommandSender:
         if not sent:
             self.counters.unexpected_acks += 1
             return
-        # A command in progress is not rejected: the rejection is that of a command beside it.
+        # A command in progress is not rejected: the rejection belongs to a command beside it.
         request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
         if request is not None:
             self._answered(request, ack, now)
@@ -492,7 +492,7 @@ class CommandSender:
         """End all commands that were started, to one target or to all."""
         requests = [request for one in self._requests.values() for request in one
                     if target is None or request.command.target == target]
-        # Last the one that was sent, so that no other is sent in its place.
+        # End the sent request last, so that no waiting one is sent in its place.
         for request in reversed(requests):
             self._end(request, status, now)
 

@@ -67,7 +67,7 @@ class Frame:
 
 @dataclass(slots=True)
 class DecoderCounters:
-    """What a :class:`Decoder` has met: bytes and frames since it was made."""
+    """Bytes and frames that a :class:`Decoder` has read since it was made."""
 
     frames: int = 0
     crc_errors: int = 0

@@ -67,9 +67,9 @@ class Layout(NamedTuple):
 class _Codec(NamedTuple):
     pack: Callable[..., bytes]
     unpack: Callable[[bytes], tuple[Any, ...]]
-    # Of the fields of a message, in the order of the wire.
+    # Returns the values of a message in wire order.
     values: Callable[[Message], tuple[Any, ...]]
-    # Of the values on the wire, in the order of the fields.
+    # Returns values in wire order in the order of the fields.
     arguments: Callable[[tuple[Any, ...]], tuple[Any, ...]]
     size: int
 

@@ -25,8 +25,8 @@ from .transport import Peer
 
 # Peers whose incomplete frames are kept apart.
 MAX_DECODERS = 64
-# s; the longest frame takes 0.3 s at 9600 baud. What has not come by then is no frame but noise
-# that looks like the beginning of one, and good frames are held back behind it.
+# s; the longest frame takes 0.3 s at 9600 baud. An older beginning of
+# a frame is noise, which delays the valid frames after it.
 STALL = 0.5
 
 class _Wait(NamedTuple):
@@ -38,7 +38,7 @@ class _Wait(NamedTuple):
 
 
 class _Stream:
-    """What comes from one peer."""
+    """The bytes and frames of one peer."""
 
     def __init__(self, counters: DecoderCounters) -> None:
         self.decoder = Decoder(counters=counters)
@@ -97,7 +97,7 @@ class Receiver:
         """
         Return the frames behind what looked like the beginning of one for too long.
 
-        What has come since may be the beginning of a good one, and is waited for.
+        Later bytes may be the beginning of a valid frame, and are kept.
         """
         if now < self.next_deadline():
             return []

@@ -61,7 +61,7 @@ class Discovery(Generic[D]):
     :param make: makes the device at an address.
     :param drop: called with a candidate that another one takes the place of.
     :param wanted: tells whether a device at an address is of interest; others are ignored.
-    :ivar devices: those that were announced, by address, in the order of their announcement.
+    :ivar devices: the announced devices, by address, in the order of their announcement.
     :ivar ignored: the first devices that are not wanted, by address.
     :ivar limit_reached: whether more than :data:`MAX_DEVICES` have been heard.
     """
@@ -92,8 +92,8 @@ class Discovery(Generic[D]):
         """
         Return the device at an address; a new one becomes a candidate.
 
-        :param proved: whether the message proves that it is a device, which gets it a place at
-            any time. Otherwise it gets that of a candidate that has had its time.
+        :param proved: whether the message proves that it is a device, which entitles it to a
+            place. Otherwise it may replace a candidate only after :data:`CANDIDATE_TIME`.
         :return: None if the device is not wanted, or if there are too many.
         """
         device = self.devices.get(address) or self._candidates.get(address)

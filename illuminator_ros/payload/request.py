@@ -125,7 +125,7 @@ class Report(Generic[S]):
     :param has_clock: whether that was told from a time in the status.
     :param shared_address: whether several devices send from the address.
     :param sender: which of them has sent it, as far as they can be told apart.
-    :param senders: all that have reported lately.
+    :param senders: all senders of recent statuses.
     :param span: s for which all statuses must agree so that each device has sent one.
     """
 
@@ -316,7 +316,7 @@ class Request(Generic[S]):
 
     def _must_repeat(self, outcome: CommandResult, now: float) -> bool:
         """
-        Return whether the acknowledgement may be that of an earlier command that got none.
+        Return whether the acknowledgement may belong to an earlier, unacknowledged command.
 
         That one may be carried out only now and undo this one, which itself may be lost. So it
         is sent until there were more acknowledgements than tries of the earlier command.

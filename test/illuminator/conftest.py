@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the tests of the illuminator protocol share."""
+"""Fixtures of the tests of the illuminator protocol."""
 
 import pytest
 from support.back_to_back import Pair

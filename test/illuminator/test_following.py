@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is agreed follows a light that somebody else changes, and sends it nothing."""
+"""The confirmed configuration follows changes by other senders, without commands."""
 
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.model import float32, Mode

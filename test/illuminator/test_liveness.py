@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A light that falls silent, comes back, or comes back another."""
+"""A light that falls silent and returns, or is replaced by another one."""
 
 from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
 from illuminator_ros.mavlink.messages import MavCmd, STATUS_ID

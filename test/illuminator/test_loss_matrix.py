@@ -43,7 +43,7 @@ LONGEST_SET = 1.75
 LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperties(rise=0.0))
           for one in (243, 244, 245, 246)]
 
-# What the line does: by name, towards the lights and back.
+# Faults of the line by name, towards the lights and back.
 LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **{kind: ((kind,), (kind,)) for kind in KINDS},
     'all of these': (KINDS, KINDS),
@@ -70,7 +70,7 @@ class User:
 
     @property
     def idle(self) -> bool:
-        """Whether all that it has asked for is answered."""
+        """Whether all its requests are answered."""
         return all(request.answer.results for request in self._waiting)
 
     def act(self) -> None:
@@ -109,7 +109,7 @@ class Joystick(User):
             self._left = self.draw.randint(2, 12)
             self._interval = self.draw.choice((0.005, 0.02, 0.1))
         self._left -= 1
-        # Never the one before, and rarely one that is agreed already: that is not sent.
+        # Never the previous value, and rarely the agreed one, which is not sent.
         self._value = (self._value + self.draw.randint(1, 100)) % 101
         self._asked_at, self._changes = self.pair.now, len(self._recorder.changes)
         agreed = self.light.snapshot(0.0).configuration

@@ -27,7 +27,7 @@ CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
 
 
 def overriding(fake, settings=None, **values):
-    """Return a pair whose light is to be configured as soon as it is found."""
+    """Return a pair whose light must be configured as soon as it is found."""
     return Pair(fake, settings=settings,
                 on_light=lambda light: light.set_desired(values, START))
 
@@ -227,7 +227,7 @@ class TestAfterARestart:
                                   strobe_duty_cycle=10).success
             pair.light.set_brightness(70.0, pair.now)
             pair.run_until(lambda: pair.snapshot.configuration.brightness == 70.0)
-        # Before the next status somebody else turns it down: that is to be followed.
+        # Before the next status another sender dims it, which must be followed.
         fake.fields['brightness'] = 20.0
         pair.run(5.0)
         assert pair.snapshot.configuration.brightness == 20.0

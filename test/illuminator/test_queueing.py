@@ -121,7 +121,7 @@ def test_many_lights_are_served_at_the_same_time():
 
 
 class TestCallbacksThatAskForMore:
-    """What is called at the end of a request may begin the next."""
+    """A callback at the end of a request may start the next request."""
 
     def toggle(self, pair, times, log):
         def done(result: Result, now: float) -> None:

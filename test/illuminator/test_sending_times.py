@@ -24,7 +24,7 @@ from support.fake_light import FakeLight
 
 
 def heard(*statuses):
-    """Return the last of what is told of statuses: pairs of uptime (ms) and arrival (s)."""
+    """Return the result for the last of some statuses: pairs of uptime (ms) and arrival (s)."""
     times = SendingTimes()
     return [times.sent_by(uptime, at) for uptime, at in statuses][-1]
 
@@ -72,8 +72,8 @@ def test_no_status_is_ever_said_to_be_older_than_it_is(step_ms, rate, boot):
 
 
 def test_a_status_from_before_the_command_confirms_nothing_though_it_is_news(fake, faked):
-    # Somebody switches the light on and off again between two statuses that are heard. The one
-    # from in between comes late, when a late acknowledgement has made us wait for just that.
+    # Another sender switches the light on and off between two received statuses. The status from
+    # in between arrives late, while we wait for it because of a late acknowledgement.
     fake.stream = 0.0
     faked.light.request_status(faked.now)
     faked.run(0.31)

@@ -172,7 +172,7 @@ def test_without_a_light_within_reach_it_is_told(fake, faked):
 
 
 def test_a_setpoint_does_not_wait_for_a_light_that_was_lost_meanwhile(fake, faked):
-    # An old setpoint that takes effect when the light comes back would surprise.
+    # An old setpoint must not take effect when the light returns.
     fake.results[MavCmd.DO_ILLUMINATOR_CONFIGURE] = None
     publish(faked, 30.0, 40.0)
     faked.close()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What becomes of requests and parameters where several lights answer from one address."""
+"""Requests and parameters while several lights answer from one address."""
 
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light, Settings

@@ -39,7 +39,7 @@ def meanings(*statuses: tuple[int, float]) -> list[Uptime]:
     (HOUR_MS, 2 * HOUR_MS, 3600.0, RUNNING),
     (HOUR_MS, 2 * HOUR_MS + 100_000, 3600.0, RUNNING),
     (HOUR_MS, 2 * HOUR_MS - 100_000, 3600.0, RUNNING),
-    # The next in time after one that was 4 s late.
+    # The next status, in time, after a status that was 4 s late.
     (10_000, 14_100, 0.1, RUNNING),
     # The same one twice.
     (10_000, 10_000, 0.0, RUNNING),

@@ -31,7 +31,7 @@ SECONDS = 90.0
 # s after which all must be answered and known, once the line is good again: a restored
 # configuration is tried again after 2 s, and so on.
 RECOVERY = 12.0
-# s; the tries of a command, its confirmation, and those that were before it in the queue.
+# s; the tries of a command, its confirmation, and the requests before it in the queue.
 LONGEST = 32.0
 LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperties(rise=0.0))
           for one in (243, 244)]

@@ -126,7 +126,7 @@ def test_target_that_refuses_both_forms_the_same_way_is_given_up() -> None:
     assert rig.ended().status is NO_ANSWER
 
 
-# What is sent
+# Sent messages
 
 def test_params_that_are_not_given_are_zero() -> None:
     rig = Rig()

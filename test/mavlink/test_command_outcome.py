@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the sender refuses, and what it tells of a command and of all of them."""
+"""Refusals of the command sender, results of a command, and counters."""
 
 from __future__ import annotations
 

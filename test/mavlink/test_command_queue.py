@@ -35,7 +35,7 @@ OTHER = Address(1, 244)
 # One of a kind at a time
 
 def test_second_command_of_a_kind_waits_for_the_first() -> None:
-    # An acknowledgement names nothing but the command.
+    # An acknowledgement names only the command.
     rig = Rig()
     first, second = rig.start(params=(1.0,)), rig.start(params=(0.0,))
     rig.run(1.2)

@@ -120,7 +120,7 @@ def test_payload_of_more_than_255_bytes_cannot_be_sent() -> None:
         encode_frame(STATUS_ID, b'\1' * 256, sequence=0, source=LIGHT, crc_extra=66)
 
 
-# What is refused
+# Refused frames
 
 @pytest.mark.parametrize('at', [1, 4, 5, 6, 7, 12, -1, -2])
 @pytest.mark.parametrize('version', [1, 2])

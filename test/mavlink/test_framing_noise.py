@@ -100,7 +100,7 @@ def test_every_good_frame_between_noise_is_found(
         frame for _, frame in stream]
 
 
-# What the checksum does not cover, a signature, can only be cut short by a frame of MAVLink 2.
+# A signature, which the checksum does not cover, can only be cut short by a MAVLink 2 frame.
 victim_and_others = st.one_of(
     st.tuples(st.sampled_from(SIGNED), st.lists(st.sampled_from(V2), max_size=5)),
     st.tuples(st.sampled_from(UNSIGNED), st.lists(frames, max_size=5)))
@@ -156,7 +156,7 @@ def test_all_of_2000_frames_are_found_with_up_to_40_random_bytes_between_them(se
     assert [bytes_of(frame) for frame in in_pieces(data, [97])] == sent
 
 
-# What is held back
+# Delayed frames
 
 def test_longest_frame_there_is_has_280_bytes() -> None:
     longest = raw_v2(0, b'\1' * 255, incompat=FLAG_SIGNED) + bytes(13)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Our own frames that come back are told from those of somebody else with our address."""
+"""Our own frames that return are distinguished from frames of another sender with our address."""
 
 from illuminator_ros.mavlink.frame import Frame
 from illuminator_ros.mavlink.frame_writer import FrameWriter, LoopbackFilter, MAX_FRAMES, MEMORY

@@ -86,7 +86,7 @@ def test_time_stamps_count_10_microseconds_since_2015(unix_time: float, stamp: i
     assert ticks(unix_time) == stamp
 
 
-# What is believed in which mode
+# Accepted frames of each mode
 
 @pytest.mark.parametrize(('mode', 'good', 'without', 'wrong', 'again'), [
     (OFF, True, True, True, True),

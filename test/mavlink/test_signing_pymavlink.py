@@ -116,7 +116,7 @@ def test_7_change_of_the_protocol_version_loses_no_state() -> None:
         False, True, False, False, True]
 
 
-# What pymavlink has no bound for, under everything that can happen
+# The store that pymavlink does not bound, with random input
 
 SOURCES = [Address(1, number) for number in range(6)]
 

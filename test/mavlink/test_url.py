@@ -122,7 +122,7 @@ PYMAVLINK: dict[str, Url] = {
     '/dev/ttyUSB0,57600': SerialUrl('/dev/ttyUSB0', 57600),
 }
 
-# What none of the three can.
+# URLs that none of the three has.
 OURS: dict[str, Url] = {
     'udpin://[::1]:14550': listen('::1', 14550),
     'udpin:[::]:14550': listen('::', 14550),

@@ -50,7 +50,7 @@ def group(domain: int) -> Iterator[tuple[Program, Group]]:
         yield bridge, lights
 
 
-# What the first node offers for the whole process.
+# Topics and services of the first node for the whole process.
 OF_PROCESS = {'/diagnostics', '/get_logger_levels', '/set_logger_levels',
               '/get_type_description'}
 

@@ -162,7 +162,7 @@ def test_parameters_of_one_bridge_can_be_given_to_the_next(
             names = parameters.names()
             values = [list(value) if isinstance(value, list | tuple) else value
                       for value in parameters.get(*names)]
-        # JSON is YAML, but for the arrays that rcl makes of lists.
+        # JSON is YAML, except for the arrays that rcl makes of lists.
         file = write(tmp_path / 'dump.yaml', (FULL, dict(zip(names, values, strict=True))))
         light.report(brightness=10.0)
 

@@ -160,7 +160,7 @@ class Soak:
             self.parameters.start_set(strobe_duty_cycle=self.random.uniform(0, 100)))))
 
     def collect(self) -> None:
-        """Take the answers that have come, and note those that are overdue."""
+        """Take the received answers, and note overdue ones."""
         waiting = []
         for begun, kind, call in self._calls:
             if call.answered:

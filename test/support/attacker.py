@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Input that nobody should send: right frames with wrong content, wrong frames, and noise."""
+"""Hostile input: valid frames with wrong content, invalid frames, and noise."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ class Attacker:
         frame = raw_v2(message_id, payload, incompat=1, sequence=sequence, source=source)
         fresh = ticks(1.7e9 + now) + self._random.randrange(1000)
         stamp = self._random.choice((fresh, fresh, fresh, 0, MAX_TICKS, fresh - 10**8))
-        # Nobody but the owner of the key can make a time stamp of the far future count.
+        # Only the owner of the key can make a time stamp of the far future count.
         genuine = self._random.random() < 0.5 and stamp <= fresh
         frame += bytes((self._random.randrange(256),)) + stamp.to_bytes(6, 'little')
         return frame + (signature(self._key, frame) if genuine else self._random.randbytes(6))

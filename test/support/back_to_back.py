@@ -125,7 +125,7 @@ class Pair:
         else:
             self.recorders[event.address](event)
 
-    # Who is there
+    # Participants
 
     @property
     def light(self) -> Light:
@@ -263,7 +263,7 @@ class Pair:
         """Configure the light and return what became of it."""
         return self.wait_for(self.ask_configure(**changes))
 
-    # What went over the line
+    # Sent messages
 
     def commands(self, *kinds: MavCmd, since: float = 0.0) -> list[Any]:
         """Return the commands that the controller has sent, tries included, all or some kinds."""

@@ -86,7 +86,7 @@ class Rig:
         self.runs: list[Run] = []
         self._acks: list[tuple[float, int, Address, Any]] = []
 
-    # What the sender's owner does
+    # Actions of the sender's owner
 
     def start(self, command: int = 405, target: Address = LIGHT, *,
               params: tuple[float, ...] | None = None, limit: float = math.inf,
@@ -125,7 +125,7 @@ class Rig:
         self.sender.poll(self.now)
         self.flush()
 
-    # What its target does
+    # Actions of the target
 
     def ack(self, result: int, command: int = 405, *, source: Address = LIGHT, progress: int = 0,
             target: Address = OURS, result_param2: int = 0) -> None:
@@ -155,7 +155,7 @@ class Rig:
     def _next_ack(self) -> float:
         return self._acks[0][0] if self._acks else math.inf
 
-    # What came of it
+    # Results
 
     @property
     def times(self) -> list[float]:

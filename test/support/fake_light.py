@@ -94,7 +94,7 @@ class FakeLight(Endpoint):
         self.heartbeat.due = now
 
     def restart(self, now: float, **fields: Any) -> None:
-        """Lose power and come back with the default settings, or others."""
+        """Restart with the default settings, or others."""
         self.boot = now if self.boot is not None else None
         self.fields = {**DEFAULT_STATUS, **fields}
         self._status_due = self.heartbeat.due = now

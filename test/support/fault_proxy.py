@@ -25,7 +25,7 @@ from typing import Any
 
 from support.faulty_wire import Faults, FaultyWire
 
-# Lights that are told apart by where they send from; the oldest goes.
+# Lights are distinguished by their source address; the oldest is dropped.
 MAX_LANES = 8
 NO_FAULTS = Faults(latency=0.0)
 
@@ -71,7 +71,7 @@ class FaultProxy:
                 lane.to_bridge.faults = lane.to_light.faults = faults
 
     def restart(self) -> None:
-        """Forget all that was heard, as a router that restarts: lights get other ports."""
+        """Forget all lights, as a restarted router does: they get other ports."""
         with self._lock:
             for lane in self._lanes.values():
                 lane.socket.close()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a node offers, as the ROS graph tells it."""
+"""The interface of a node in the ROS graph."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Lookup = Callable[[str, str], list[tuple[str, list[str]]]]
 
 @dataclass(frozen=True)
 class Interface:
-    """Names and types of all that a node has."""
+    """Names and types of the topics and services of a node."""
 
     publishers: dict[str, str]
     subscriptions: dict[str, str]
@@ -36,7 +36,7 @@ class Interface:
     clients: dict[str, str]
 
 
-# What a bridge makes last: publishers and subscriptions are told of apart, each in their order.
+# The last topics of a bridge: publishers and subscriptions are announced separately, in order.
 LAST = ('/diagnostics', '/illuminator/cmd/enable_all')
 
 

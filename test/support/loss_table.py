@@ -27,7 +27,7 @@ KINDS = ('confirmed', 'no acknowledgement', 'not shown', 'no status', 'not sent'
 @dataclass
 class LossTable:
     """
-    What became of the commands over each line.
+    The outcomes of commands over each line.
 
     :ivar cells: by fault and share, how many commands ended in which way.
     """
@@ -36,7 +36,7 @@ class LossTable:
     untrue: int = 0
 
     def lines(self) -> list[str]:
-        """Return the table: commands that succeeded, %, with all that failed below."""
+        """Return the table: commands that succeeded, %, with the failures below."""
         shares = sorted({share for _, share in self.cells})
         names = list(dict.fromkeys(name for name, _ in self.cells))
         total: Counter[str] = sum(self.cells.values(), Counter())

@@ -162,7 +162,7 @@ class Terminal:
     def hang_up(self) -> None:
         """Be gone, as a window that is closed."""
         self._gone = True
-        # What answers the key ends the reader, which keeps the terminal from being gone.
+        # The answer to the key ends the reader, which holds the terminal open.
         self.type('?')
         self._reader.join(PATIENCE)
         os.close(self._slave)
@@ -177,7 +177,7 @@ class Terminal:
         """Whether the terminal behaves as it did before, and shows what it showed."""
         now = termios.tcgetattr(self._slave)
         raw = self.raw
-        # What is not found may be on its way still.
+        # A missing sequence may still arrive.
         return now == self.before and raw.rfind('\x1b[?1049l') > raw.rindex(
             '\x1b[?1049h') and raw.rfind('\x1b[?25h') > raw.rindex('\x1b[?25l')
 

@@ -89,7 +89,7 @@ def listening_socket(host: str = '127.0.0.1', port: int = 0) -> socket.socket:
     one = socket.socket(family, socket.SOCK_STREAM)
     one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     one.settimeout(PATIENCE)
-    # Whoever closes it and listens again wants the same port, which nobody is to have meanwhile.
+    # A test that closes it and listens again needs the same port, reserved meanwhile.
     one.bind((host, port or free_port(socket.SOCK_STREAM, host)))
     one.listen()
     return one

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Somebody honest at the far end of a link."""
+"""An honest participant at the far end of a link."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ports and ROS domains that nobody else on this machine takes, now or later in the test."""
+"""Ports and ROS domains that no other process on this machine takes during the test."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ import socket
 FIRST, END = 61_000, 65_536
 # Ports for one process of tests; a port comes again after so many others.
 BLOCK = 64
-# Domains up to 101 have ports below those that are given to anybody.
+# Domains up to 101 have ports below the ephemeral ones.
 DOMAINS = range(1, 102)
 
 
@@ -66,7 +66,7 @@ _BLOCK = _Block()
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = '127.0.0.1') -> int:
-    """Return a port that nobody uses, and no other process of tests will be given."""
+    """Return a free port that no other test process gets."""
     host = host.strip('[]')
     family = socket.AF_INET6 if ':' in host else socket.AF_INET
     for port in itertools.islice(_BLOCK.ports, BLOCK):
@@ -78,7 +78,7 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM, host: str = '127.0.0.
 
 @contextlib.contextmanager
 def claimed_domain() -> Iterator[int]:
-    """Yield a ROS domain that nobody else on this machine uses meanwhile."""
+    """Yield a ROS domain that no other process on this machine uses."""
     for domain in _shuffled(DOMAINS):
         try:
             claim = _claim(f'domain_{domain}')
@@ -92,7 +92,7 @@ def claimed_domain() -> Iterator[int]:
 
 
 def _has_participants(domain: int) -> bool:
-    """Return whether somebody listens where participants do (DDSI-RTPS, 9.6.1.1)."""
+    """Return whether a program listens on the ports of participants (DDSI-RTPS, 9.6.1.1)."""
     for participant in range(10):
         with socket.socket(type=socket.SOCK_DGRAM) as probe:
             try:

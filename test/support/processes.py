@@ -60,7 +60,7 @@ class Program:
 
     @property
     def lines(self) -> list[str]:
-        """All whole lines that were printed until now, not only those that were read by now."""
+        """All complete lines printed until now, including lines not yet read."""
         with self._grown:
             while self._take():
                 # The thread that reads gets none of it.

@@ -63,7 +63,7 @@ class PtyDevice:
             self._far = -1
 
     def write(self, data: bytes) -> None:
-        """Send bytes to whoever has opened the device."""
+        """Send bytes to the program that has opened the device."""
         while data:
             select.select([], [self._far], [], PATIENCE)
             data = data[os.write(self._far, data):]
@@ -120,7 +120,7 @@ class _Light:
         try:
             data = os.read(self._line, 4096)
         except OSError:
-            # Nobody has the device open; a closed pseudo-terminal is always readable.
+            # No program has the device open; a closed pseudo-terminal is always readable.
             select.select([self._stopping], [], [], 0.01)
             return
         for frame in self._decoder.feed(data):

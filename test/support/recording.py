@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What comes from ROS in another thread, kept and waited for."""
+"""Recorders of messages that arrive from ROS in another thread."""
 
 from __future__ import annotations
 

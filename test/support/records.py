@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What those are told who use a light: its observer, and whoever asks for something."""
+"""Records of the events and answers of a light."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Recorder:
 
 @dataclass
 class Answer:
-    """What a request gets: all its results, of which there should be one."""
+    """The results of a request, of which there should be one."""
 
     asked_at: float
     results: list[Result] = field(default_factory=list)

@@ -41,7 +41,7 @@ class Relay:
         self._end: socket.socket | None = None
 
     def start(self) -> None:
-        """Begin to pass on, having heard nobody."""
+        """Start to forward, with no known sender."""
         near = bound_socket(port=self.near_port)
         far = bound_socket(port=self.far_port)
         self._end, ended = socket.socketpair()

@@ -50,7 +50,7 @@ STREAM = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE,
 
 @contextlib.contextmanager
 def own_domain() -> Iterator[int]:
-    """Yield a ROS domain that nobody else on this machine uses meanwhile."""
+    """Yield a ROS domain that no other process on this machine uses."""
     with claimed_domain() as domain:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         # The first name is that of Fast DDS 2, which Jazzy has, the second that of Fast DDS 3.
@@ -73,7 +73,7 @@ class Ros(SpunNode):
         eventually(lambda: self.node.count_publishers(topic))
 
     def subscribe(self, type_: Any, topic: str, qos: QoSProfile = STATE) -> Recorder:
-        """Record a topic: all that is published from now on, or from the last value on."""
+        """Record a topic: every message from now on, or from the last value on."""
         recorder = Recorder()
         self.node.create_subscription(type_, topic, recorder.take, qos)
         self.find_publisher(topic)
@@ -108,8 +108,8 @@ class Ros(SpunNode):
         """
         Make sure that a node knows what we have just created.
 
-        That we know its side says nothing of that. News of what we create get to it in order, so
-        it knows all that was there before a client whose question it answers.
+        Discovery on our side does not prove that. Our entities are announced in order, so a node
+        that answers a client knows every entity created before it.
         """
         client = self.node.create_client(GetParameters, f'{node}/get_parameters')
         eventually(client.service_is_ready)
@@ -153,7 +153,7 @@ class Ros(SpunNode):
         return self.call(Trigger, f'{node}/refresh', Trigger.Request())
 
     def catch_up(self, node: str = '/illuminator') -> None:
-        """Wait until a node has taken all that its light has sent until now."""
+        """Wait until a node has processed every message that its light has sent until now."""
         answer = self.refresh(node)
         assert 'ILLUMINATOR_STATUS: received' in answer.message, answer.message
 

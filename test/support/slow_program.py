@@ -30,8 +30,8 @@ PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.bridge',
 
 def main(module: str) -> int:
     """Run a module with the rest of the command line, and return its exit status."""
-    # As the module does before it imports anything: of the threads that start meanwhile, none
-    # is to take a signal.
+    # As the module does before its imports: no thread that starts meanwhile may take a
+    # signal.
     signal.pthread_sigmask(signal.SIG_BLOCK, (
         signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
     from support.slow import CLOCK, SlowLink
@@ -41,7 +41,7 @@ def main(module: str) -> int:
         place.Link = SlowLink
     if hasattr(place, 'Monitor'):
         place.Monitor = partial(place.Monitor, clock=CLOCK)
-    # What it takes to end in order on a busy machine it is to have.
+    # An orderly end on a busy machine may take longer.
     import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):
         place.OFF_LIMIT = PATIENCE / 2

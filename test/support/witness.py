@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What simulated lights really did, and whether what the controller says of it is true."""
+"""The real states of simulated lights, and whether the reports of the client are true."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ Fields = Mapping[str, Any]
 
 @dataclass
 class State:
-    """What a light was from one time to another, s."""
+    """The state of a light during an interval, s."""
 
     since: float
     until: float
@@ -137,7 +137,7 @@ class Judge:
             if not (isinstance(sent, CommandLong) and sent.command == request.kind
                     and (sent.target_system, sent.target_component) == request.light.address):
                 continue
-            # What is sent at the very end is the next command.
+            # A command sent at the very end is the next one.
             if at > answer.ended_at or tries and at == answer.ended_at:
                 break
             tries = [*tries, (at, sent)] if sent.confirmation else [(at, sent)]
@@ -146,7 +146,7 @@ class Judge:
         return tries
 
     def _states(self, request: Request) -> tuple[Fields, list[State]]:
-        """Return all that was sent, and the states of the light since."""
+        """Return the sent values, and the states of the light since."""
         (since, sent), *_ = self._tries(request)
         wish = request.wish
         if request.kind == CONFIGURE:
@@ -225,7 +225,7 @@ class Judge:
         return 'heard' if heard else ''
 
 
-# What an answer has in it: the kind of outcome, whether that is a success, whether it is true.
+# Of an answer: the kind of outcome, whether it is a success, whether it is true.
 TAKEN = 'taken as agreed'
 _CHECKS: dict[str, tuple[str, bool, Callable[[Judge, Request], str]]] = {
     'confirmed by ILLUMINATOR_STATUS': ('confirmed', True, Judge._confirmed),

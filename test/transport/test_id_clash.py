@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Who else uses our address, over real UDP: nobody, where it is only our own frames come back."""
+"""Address conflicts over real UDP; our own returning frames are none."""
 
 from collections.abc import Callable, Iterator
 import select
@@ -46,7 +46,7 @@ class Loop:
             self.seen.append((data, sender))
 
     def send(self, data: bytes) -> None:
-        """Send something to whoever has been heard first."""
+        """Send bytes to the first sender heard."""
         self._socket.sendto(data, self.seen[0][1])
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ def loop() -> Iterator[Loop]:
 
 
 def clashes(bridge: Bridge) -> bool:
-    """Return whether a bridge believes that somebody else uses its address."""
+    """Return whether a bridge reports another sender with its address."""
     return bool(bridge.ask(bridge.endpoint.address_conflict))
 
 

@@ -144,7 +144,7 @@ def test_a_link_ends_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) 
     with ended_while_opening() as end:
         end('udpout://127.0.0.1:9')
         assert asked.wait(PATIENCE)
-    # What is opened after all is closed again: the fixture looks for it.
+    # A late channel is closed again, which the fixture checks.
     answer.set()
 
 

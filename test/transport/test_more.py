@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is read at a time, and whether that was all."""
+"""The amount of one read, and whether more is available."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What cannot be opened, and what is said about it."""
+"""Errors of opening, and their messages."""
 
 from __future__ import annotations
 

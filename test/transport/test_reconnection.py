@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lights and links that go and come back: each once, and by themselves."""
+"""Lights and links that disappear and return: one event each, without help."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SILENCE = 30.0
 
 
 class Other(Protocol):
-    """The other side of a bridge's link, which can go and come back."""
+    """The other side of a bridge's link, which can disappear and return."""
 
     url: str
 
@@ -151,16 +151,16 @@ def other(
 
 @pytest.fixture
 def bridge(run: Callable[..., Any], other: Other, clock: Jump) -> Any:
-    """Return the drone's side, to whom nobody has spoken yet."""
+    """Return the drone's side, which has heard no peer yet."""
     return run(Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
 
 
 def lose(bridge: Any, other: Other, clock: Jump, count: int = 1) -> None:
     """Make the other side go, and wait until that is noticed."""
     other.go()
-    # What it has still sent is taken first.
+    # Messages sent before are taken first.
     bridge.ask(lambda now: None)
-    # On UDP nothing but silence tells.
+    # On UDP only silence shows it.
     clock.ahead += SILENCE
     bridge.link.call(lambda now: None)
     bridge.lights.wait_for(lambda entry: entry[0] == 'lost', count=count)

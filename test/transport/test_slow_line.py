@@ -99,7 +99,7 @@ def test_an_empty_queue_has_nothing_to_write() -> None:
 def slow_line(
     request: pytest.FixtureRequest, channel: Callable[[str], OpenChannel], tmp_path: Path,
 ) -> Iterator[tuple[OpenChannel, Callable[[], bytes]]]:
-    """Return a channel that nobody reads from, and a function that then does."""
+    """Return a channel without a reader, and a function that reads."""
     if request.param == 'serial':
         pytest.importorskip('serial', reason='pyserial is not installed')
         device = PtyDevice(tmp_path)

@@ -104,7 +104,7 @@ def test_nobody_listening_is_said_with_the_address() -> None:
 
 @contextlib.contextmanager
 def silent_server() -> Iterator[int]:
-    """Return the port of somebody who answers no more: the kernel drops what comes."""
+    """Return the port of a server that does not answer any more: the kernel drops its input."""
     with bound_socket(kind=socket.SOCK_STREAM) as server, contextlib.ExitStack() as clients:
         server.listen(0)
         for _ in range(4):
@@ -150,7 +150,7 @@ def test_the_second_address_of_a_name_is_tried_too(
 
 
 def test_a_connection_with_itself_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    # The kernel makes one where the free port that it takes is the one that is connected to.
+    # The kernel makes such a connection if the free port that it picks is the target.
     class Selfish(socket.socket):
 
         def connect(self, address: Any) -> None:

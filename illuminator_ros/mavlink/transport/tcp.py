@@ -157,7 +157,7 @@ class TcpServer(Channel):
     """
     A listening socket and its clients, each a peer. The link survives the loss of a client.
 
-    Beyond :data:`MAX_CLIENTS`, a new client replaces the one that was silent for longest; it is
+    Beyond :data:`MAX_CLIENTS`, a new client replaces the client with the longest silence; it is
     rejected if each has sent a valid frame within :data:`EXPIRY`.
     """
 
