@@ -24,13 +24,13 @@ import struct
 import threading
 import time
 
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
     CommandLong,
     heartbeat,
-    IlluminatorStatus,
     MavCmd,
     MavResult,
     MavType,

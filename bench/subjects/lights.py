@@ -29,14 +29,9 @@ import time
 
 from illuminator_ros.illuminator.events import AnyLightEvent, StatusReceived
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.messages import (
-    Address,
-    heartbeat,
-    IlluminatorStatus,
-    MavType,
-    Message,
-)
+from illuminator_ros.mavlink.messages import Address, heartbeat, MavType, Message
 from illuminator_ros.mavlink.url import parse_url
 from support.client import Client
 from support.frames import frame_of

@@ -21,17 +21,11 @@ import itertools
 
 from .events import AnyLightEvent, ClientSnapshot, LightForgotten, LightFound
 from .light import Light, Settings
+from .messages import IlluminatorStatus
 from .model import Status
 from ..mavlink.command import CommandSender, CommandStatus
 from ..mavlink.deadline_queue import DeadlineQueue
-from ..mavlink.messages import (
-    Address,
-    ComponentInformationBasic,
-    Heartbeat,
-    IlluminatorStatus,
-    MavType,
-    Message,
-)
+from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, MavType, Message
 from ..payload.discovery import Discovery
 from ..payload.events import Listeners
 from ..payload.identity import Identity

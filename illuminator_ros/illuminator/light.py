@@ -35,10 +35,11 @@ from .events import (
     SetpointFailed,
     StatusReceived,
 )
+from .messages import STATUS_ID
 from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, Status
 from .status import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
-from ..mavlink.messages import Address, MavCmd, STATUS_ID
+from ..mavlink.messages import Address, MavCmd
 from ..payload.events import RateLimit
 from ..payload.identity import Identity, IdentityQuery
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target

@@ -26,15 +26,11 @@ import math
 from typing import Any
 
 from .faults import FAULTS
+from .messages import STATUS_ID
 from .model import checked, Configuration, flag_names, InvalidValue, Mode
 from .simulated_lamp import SimulatedLamp
 from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
-from ..mavlink.messages import (
-    INFORMATION_ID,
-    MavCmd,
-    MavResult,
-    STATUS_ID,
-)
+from ..mavlink.messages import INFORMATION_ID, MavCmd, MavResult
 from ..payload.faults import Behaviour
 from ..payload.settings import number
 from ..payload.simulated import (

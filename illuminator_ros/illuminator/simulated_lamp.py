@@ -20,16 +20,11 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
+from .messages import IlluminatorStatus, STATUS_ID
 from .model import Configuration, ErrorFlag, Limits, Mode
 from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
 from .thermal import ThermalModel
-from ..mavlink.messages import (
-    ComponentInformationBasic,
-    define,
-    IlluminatorStatus,
-    STATUS_ID,
-    UInt8,
-)
+from ..mavlink.messages import ComponentInformationBasic, define, UInt8
 
 
 @define(STATUS_ID, 'ILLUMINATOR_STATUS', extensions=3)

@@ -283,26 +283,7 @@ class ComponentInformationBasic(Message):
     serial_number: Char32
 
 
-@define(440, 'ILLUMINATOR_STATUS')
-@dataclass(slots=True)
-class IlluminatorStatus(Message):
-    """https://mavlink.io/en/messages/common.html#ILLUMINATOR_STATUS."""
-
-    uptime_ms: UInt32
-    enable: UInt8
-    mode_bitmask: UInt8
-    error_status: UInt32
-    mode: UInt8
-    brightness: Float
-    strobe_period: Float
-    strobe_duty_cycle: Float
-    temp_c: Float
-    min_strobe_period: Float
-    max_strobe_period: Float
-
-
 INFORMATION_ID = ComponentInformationBasic.id
-STATUS_ID = IlluminatorStatus.id
 
 
 def heartbeat(mav_type: int, *, state: int = MAV_STATE_ACTIVE) -> Heartbeat:

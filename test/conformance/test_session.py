@@ -19,12 +19,13 @@ import tracemalloc
 
 from illuminator_ros.illuminator.checks.catalogue import CHECKS
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
-from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat, IlluminatorStatus
+from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
 from illuminator_ros.payload.checks.history import LIMIT
 import pytest
 from support.conformance_run import Run, TESTER

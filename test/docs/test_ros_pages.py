@@ -23,16 +23,12 @@ from bench.subjects import SUBJECTS
 from illuminator_ros.cli.bridge import usage
 from illuminator_ros.cli.monitor import graph, key_bindings, model, requests
 from illuminator_ros.cli.monitor.run import parser
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.ros import beam
 from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
-from illuminator_ros.mavlink.messages import (
-    CommandAck,
-    ComponentInformationBasic,
-    IlluminatorStatus,
-    MavCmd,
-)
+from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic, MavCmd
 from illuminator_ros.ros.parameters import LINK_PARAMETERS as SHARED_PARAMETERS
 from illuminator_ros.ros.parameters import ParameterSpec
 import pytest

@@ -16,7 +16,8 @@
 
 import random
 
-from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult, STATUS_ID
+from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight

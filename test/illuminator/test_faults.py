@@ -15,15 +15,9 @@
 """The faults of simulated lights: their effects, their values, and their ends."""
 
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorBehaviour
-from illuminator_ros.mavlink.messages import (
-    CommandAck,
-    Heartbeat,
-    IlluminatorStatus,
-    MavCmd,
-    MavResult,
-    STATUS_ID,
-)
+from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
 from illuminator_ros.payload.faults import FaultError
 import pytest
 from support.light_bench import LightBench

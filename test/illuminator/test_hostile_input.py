@@ -24,6 +24,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import checked
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -32,7 +33,6 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     ComponentInformationBasic,
     Heartbeat,
-    IlluminatorStatus,
     LAYOUTS,
 )
 from illuminator_ros.mavlink.receiver import MAX_DECODERS

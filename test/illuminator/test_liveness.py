@@ -15,7 +15,8 @@
 """A light that falls silent and returns, or is replaced by another one."""
 
 from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
-from illuminator_ros.mavlink.messages import MavCmd, STATUS_ID
+from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.mavlink.messages import MavCmd
 import pytest
 from support.back_to_back import BRIDGE, Pair, START
 from support.client import Client

@@ -14,6 +14,7 @@
 
 """The profiles of simulated lights: differences from the protocol, as seen in the field."""
 
+from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.illuminator.simulated_settings import properties
@@ -23,11 +24,9 @@ from illuminator_ros.mavlink.messages import (
     decode_payload,
     encode_payload,
     Heartbeat,
-    IlluminatorStatus,
     INFORMATION_ID,
     MavCmd,
     MavResult,
-    STATUS_ID,
 )
 import pytest
 from support.light_bench import LightBench

@@ -15,7 +15,8 @@
 """Asking a light again for its status and its identity."""
 
 from illuminator_ros.illuminator.light import REFRESH_LIMIT
-from illuminator_ros.mavlink.messages import INFORMATION_ID, MavCmd, MavResult, STATUS_ID
+from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.mavlink.messages import INFORMATION_ID, MavCmd, MavResult
 import pytest
 from support.back_to_back import Pair
 from support.records import Answer

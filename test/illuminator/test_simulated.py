@@ -14,6 +14,7 @@
 
 """The simulated light follows the illuminator, heartbeat, command and interval protocols."""
 
+from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
@@ -25,12 +26,10 @@ from illuminator_ros.mavlink.messages import (
     ComponentInformationBasic,
     encode_payload,
     Heartbeat,
-    IlluminatorStatus,
     INFORMATION_ID,
     MavCmd,
     MavResult,
     MavType,
-    STATUS_ID,
 )
 from illuminator_ros.payload.identity import Identity
 import pytest

@@ -14,8 +14,9 @@
 
 """ILLUMINATOR_STATUS, read from lights of every quality."""
 
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration, Limits, Mode, NOTHING, Status
-from illuminator_ros.mavlink.messages import encode_payload, STATUS_ID
+from illuminator_ros.mavlink.messages import encode_payload
 import pytest
 from support.fake_light import status_message
 from support.messages import decode_payload

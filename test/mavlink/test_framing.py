@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -27,7 +28,6 @@ from illuminator_ros.mavlink.messages import (
     encode_payload,
     Heartbeat,
     LAYOUTS,
-    STATUS_ID,
 )
 from illuminator_ros.mavlink.signing import signature
 import pytest

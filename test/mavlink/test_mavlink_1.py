@@ -20,6 +20,7 @@ from collections import deque
 from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
@@ -29,7 +30,6 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     Heartbeat,
     heartbeat,
-    IlluminatorStatus,
     Message,
 )
 from illuminator_ros.mavlink.signing import Signing, SigningMode

@@ -22,6 +22,7 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink import messages
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -35,7 +36,6 @@ from illuminator_ros.mavlink.messages import (
     MavType,
     Message,
     result_name,
-    STATUS_ID,
 )
 from pymavlink.dialects.v20 import common
 import pytest

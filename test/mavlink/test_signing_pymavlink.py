@@ -18,9 +18,10 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink import signing as module
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import Address, encode_payload, STATUS_ID
+from illuminator_ros.mavlink.messages import Address, encode_payload
 from illuminator_ros.mavlink.signing import (
     MAX_STREAMS,
     Signing,

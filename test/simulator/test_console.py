@@ -16,11 +16,12 @@
 
 from illuminator_ros.cli.simulator.console import COMMANDS, execute
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.messages import Address, IlluminatorStatus
+from illuminator_ros.mavlink.messages import Address
 import pytest
 
 

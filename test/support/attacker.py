@@ -22,6 +22,7 @@ import random
 import struct
 from typing import Any
 
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -29,7 +30,6 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     ComponentInformationBasic,
     Heartbeat,
-    IlluminatorStatus,
     LAYOUTS,
     MavType,
 )

@@ -25,11 +25,12 @@ from illuminator_ros.cli.conformance.run import LISTEN_TIME
 from illuminator_ros.illuminator.checks.catalogue import CHECKS, REQUIREMENTS
 from illuminator_ros.illuminator.checks.tester import LightTester
 from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd, STATUS_ID
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
 from illuminator_ros.payload.checks.coroutine import Interrupted
 from illuminator_ros.payload.checks.requirement import Conditions, Requirement, Result, Verdict
 from illuminator_ros.payload.checks.suite import absence, Suite

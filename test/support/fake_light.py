@@ -20,6 +20,7 @@ from collections.abc import Mapping
 import math
 from typing import Any
 
+from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -27,12 +28,10 @@ from illuminator_ros.mavlink.messages import (
     CommandInt,
     CommandLong,
     ComponentInformationBasic,
-    IlluminatorStatus,
     INFORMATION_ID,
     MavCmd,
     MavResult,
     MavType,
-    STATUS_ID,
 )
 from illuminator_ros.payload.identity import Identity
 

@@ -23,6 +23,7 @@ import threading
 from types import TracebackType
 from typing import Any
 
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -31,7 +32,6 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     MavCmd,
     MavResult,
-    STATUS_ID,
 )
 from illuminator_ros.mavlink.url import parse_url
 from support.fake_light import FakeLight

@@ -18,6 +18,7 @@ One message of each kind that is handled.
 No field is at its default, and float32 has each number exactly.
 """
 
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink import messages
 from illuminator_ros.mavlink.messages import (
     CommandAck,
@@ -25,7 +26,6 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     ComponentInformationBasic,
     Heartbeat,
-    IlluminatorStatus,
     Message,
 )
 

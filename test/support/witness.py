@@ -23,6 +23,7 @@ from typing import Any
 
 from illuminator_ros.illuminator.configuration import CONFIGURE_LIMIT
 from illuminator_ros.illuminator.light import Light
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.mavlink.messages import (
@@ -30,7 +31,6 @@ from illuminator_ros.mavlink.messages import (
     CommandAck,
     CommandLong,
     Heartbeat,
-    IlluminatorStatus,
     MavCmd,
     MavResult,
 )

@@ -20,13 +20,8 @@ from . import configuration, information, status, switch, thermal
 from .describe import describe
 from .specification import ILLUMINATOR
 from .tester import LightTester
-from ...mavlink.messages import (
-    ComponentInformationBasic,
-    Heartbeat,
-    IlluminatorStatus,
-    MavType,
-    Message,
-)
+from ..messages import IlluminatorStatus
+from ...mavlink.messages import ComponentInformationBasic, Heartbeat, MavType, Message
 from ...payload.checks import command, heartbeat, whole_run
 from ...payload.checks.payload_checks import Option, PayloadChecks
 from ...payload.checks.requirement import Requirement

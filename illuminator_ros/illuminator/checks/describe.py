@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
+from ..messages import IlluminatorStatus
 from ..model import flag_names, Status
-from ...mavlink.messages import ComponentInformationBasic, IlluminatorStatus, Message
+from ...mavlink.messages import ComponentInformationBasic, Message
 from ...payload.checks import describe as protocols
 from ...payload.identity import Identity
 

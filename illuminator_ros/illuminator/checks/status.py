@@ -22,8 +22,8 @@ import math
 from .describe import status_text
 from .specification import ILLUMINATOR
 from .tester import CHANGES, LightTester
+from ..messages import IlluminatorStatus
 from ..model import flag_names, KNOWN_FLAGS, Mode, Status
-from ...mavlink.messages import IlluminatorStatus
 from ...payload.checks.requirement import Failed, MESSAGES, requirement, Skipped
 from ...payload.checks.whole_run import none_of
 

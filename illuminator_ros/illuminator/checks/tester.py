@@ -20,8 +20,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .describe import status_text
+from ..messages import IlluminatorStatus
 from ..model import Configuration, DIMMING_FLAGS, Mode, NOTHING, shortest, Status
-from ...mavlink.messages import IlluminatorStatus, MavCmd, MavResult
+from ...mavlink.messages import MavCmd, MavResult
 from ...payload.checks.payload_checks import NOT_AGREED
 from ...payload.checks.requirement import Conditions, Skipped
 from ...payload.checks.session import MESSAGE_TIMEOUT, Session
