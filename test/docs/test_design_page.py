@@ -17,7 +17,12 @@
 from importlib import import_module
 from pathlib import Path
 import re
+from types import ModuleType
 
+from illuminator_ros.mavlink import command, link_state
+from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.payload import request
+import pytest
 from support.tables import table
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +50,18 @@ def test_the_layout_names_each_module_once() -> None:
                if path.name != '__init__.py']
 
     assert sorted(listed_modules()) == sorted(modules)
+
+
+@pytest.mark.parametrize(('module', 'first'), [
+    (link_state, 'OPENING'), (request, 'WAITING'), (command, 'SENT ')], ids=str)
+def test_a_diagram_has_the_transitions_of_the_table(module: ModuleType, first: str) -> None:
+    [diagram] = re.findall(rf'```\n({first}.*?)```', PAGE, re.DOTALL)
+    drawn = re.findall(r'(?=\b([A-Z_]+) +--([A-Z_]+)--> +([A-Z_]+))', diagram)
+    transitions = module.TRANSITIONS.items()
+
+    assert sorted(drawn) == sorted(
+        (state.name, MavResult(by).name if isinstance(by, int) else by.name, after.name)
+        for (state, by), after in transitions if after.name != 'STOPPED')
 
 
 def test_the_places_to_add_something_exist() -> None:

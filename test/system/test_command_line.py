@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``bridge`` and ``simulator`` on the command line (DESIGN.md, 4)."""
+"""``bridge`` and ``simulator`` on the command line."""
 
 from pathlib import Path
 import re
