@@ -43,7 +43,7 @@ LIMITS = Limits(float32(0.05), float32(10.0))
     ('strobe_period', 0, 0.0),
     ('strobe_period', 3600, 3600.0),
 ])
-def test_what_a_light_may_get_is_returned_as_it_is_sent(name, value, expected):
+def test_a_valid_value_is_returned_as_it_is_sent(name, value, expected):
     result = checked(name, value)
     assert result == expected
     assert type(result) is type(expected)
@@ -54,7 +54,7 @@ def test_what_a_light_may_get_is_returned_as_it_is_sent(name, value, expected):
     True, False, '50', None, [50.0], b'50', Decimal(50), 1j, NAN, INF, -INF, -0.001, -1, 1e300,
     10 ** 18,
 ])
-def test_what_is_no_number_or_no_possible_one_is_refused(name, value):
+def test_a_value_that_is_not_a_possible_number_is_refused(name, value):
     with pytest.raises(InvalidValue, match=name):
         checked(name, value)
 
@@ -62,7 +62,7 @@ def test_what_is_no_number_or_no_possible_one_is_refused(name, value):
 @pytest.mark.parametrize(('name', 'value'), [
     ('brightness', 100.001), ('strobe_duty_cycle', 100.001), ('strobe_period', 3600.001),
 ])
-def test_what_is_above_the_range_is_refused_with_the_range(name, value):
+def test_a_value_above_the_range_is_refused_with_the_range(name, value):
     with pytest.raises(InvalidValue, match=r'out of range: 0 to (100 %|3600 s)$'):
         checked(name, value)
 
@@ -113,7 +113,7 @@ def test_the_shortest_number_is_the_same_float32(bits):
 
 
 @pytest.mark.parametrize(('value', 'expected'), [(1e39, INF), (-1e39, -INF), (0.5, 0.5)])
-def test_what_does_not_fit_a_float_field_is_infinite_there(value, expected):
+def test_a_number_too_large_for_a_float_field_is_infinite(value, expected):
     assert float32(value) == expected
 
 

@@ -29,7 +29,7 @@ THROTTLED, SHUT_DOWN, THERMISTOR = 1, 2, 4
     {}, {'brightness': 50.4}, {'brightness': 49.6}, {'strobe_duty_cycle': 25.4},
     {'strobe_period': 1.009}, {'brightness': float32(50.1)},
 ])
-def test_what_a_light_rounds_to_its_steps_is_no_difference(changes):
+def test_rounding_to_the_steps_of_a_light_is_not_a_difference(changes):
     assert BASE.differences(replace(BASE, **changes)) == []
 
 
@@ -61,7 +61,7 @@ def test_steps_are_differences_where_they_are_asked_for(changes):
     assert BASE.differences(replace(BASE, **changes), step=False) == list(changes)
 
 
-def test_what_is_asked_of_a_light_of_unknown_mode_is_internal_control():
+def test_a_light_of_unknown_mode_is_sent_internal_control():
     assert UNKNOWN.params() == (1.0, 50.0, 1.0, 25.0)
     assert SYNCED.params() == (2.0, 50.0, 1.0, 25.0)
 
@@ -83,11 +83,6 @@ def test_a_description_has_units_and_can_be_partial():
 def test_a_hot_light_may_be_dimmer_but_not_brighter(flags, brightness, names, step):
     reported = replace(BASE, brightness=brightness)
     assert unexpected_differences(BASE, reported, flags, step=step) == names
-
-
-def test_heat_explains_nothing_but_brightness():
-    shown = replace(BASE, brightness=25.0, strobe_period=2.0)
-    assert unexpected_differences(BASE, shown, THROTTLED, step=True) == ['strobe_period']
 
 
 @pytest.mark.parametrize('step', [True, False])

@@ -85,7 +85,7 @@ PIECE = FRAME | st.builds(
 @pytest.mark.parametrize('kind', sorted(SIEGES))
 @given(pieces=st.lists(PIECE, min_size=1, max_size=20))
 @settings(max_examples=60, deadline=None, derandomize=True)
-def test_whatever_comes_nothing_breaks(kind: str, pieces: list[bytes]) -> None:
+def test_arbitrary_bytes_break_nothing(kind: str, pieces: list[bytes]) -> None:
     siege = SIEGES[kind]('hypothesis', SigningMode.OFF)
     for piece in pieces:
         siege.link.receive((piece, PEER))

@@ -61,13 +61,13 @@ class TestGuideEmulator:
     def pair(self):
         return Pair(GuideEmulator()).settle()
 
-    def test_it_is_found_and_served(self, pair):
+    def test_the_light_is_found_and_served(self, pair):
         assert pair.light.address == Address(255, 0)
         assert pair.enable(True).success
         assert pair.configure(brightness=30, strobe_period=1, strobe_duty_cycle=50).success
         assert pair.other.fields['brightness'] == 30.0
 
-    def test_it_is_served_with_command_long_only(self, pair):
+    def test_the_light_is_served_with_command_long_only(self, pair):
         pair.enable(True)
         assert not any(isinstance(message, CommandInt) for message in pair.commands())
 
@@ -97,16 +97,16 @@ class TestArduSub:
     def pair(self):
         return Pair(ArduSub()).settle()
 
-    def test_it_is_found_by_its_status(self, pair):
+    def test_the_light_is_found_by_its_status(self, pair):
         assert pair.light.address == Address(1, 1)
         assert pair.recorder.events == ['connected']
 
-    def test_what_it_does_not_measure_is_not_known(self, pair):
+    def test_a_temperature_that_is_not_measured_is_unknown(self, pair):
         assert pair.light.temperature is None
         assert pair.light.limits == Limits()
         assert not pair.light.limits.known
 
-    def test_it_can_be_switched(self, pair):
+    def test_the_light_can_be_switched(self, pair):
         assert pair.enable(True).success
         assert pair.light.status.brightness == 50.0
         assert pair.enable(False).success

@@ -46,19 +46,12 @@ class TestAtTheFirstConnection:
         assert pair.recorder.restorations[0][0] is True
         assert pair.snapshot.configuration.brightness == 30.0
 
-    def test_they_are_sent_once(self, fake):
-        pair = overriding(fake, brightness=30.0).settle(60.0)
-        assert len(sent(pair)) == 1
-
-    def test_they_are_sent_when_the_light_comes_however_late(self, fake):
+    def test_overrides_are_sent_however_late_the_light_is_found(self, fake):
         fake.silent = True
         pair = overriding(fake, brightness=30.0).settle(600.0)
         fake.silent = False
         pair.run(2.0)
         assert sent(pair) == [(1, 30, 0, 0)]
-
-    def test_without_overrides_nothing_is_sent(self, fake):
-        assert sent(Pair(fake).settle(60.0)) == []
 
     def test_a_light_that_was_away_gets_nothing_again(self, fake):
         pair = overriding(fake, brightness=30.0).settle()
@@ -68,7 +61,7 @@ class TestAtTheFirstConnection:
         pair.run(30.0)
         assert len(sent(pair)) == 1
 
-    def test_what_the_light_says_to_be_impossible_is_refused_and_the_rest_sent(self, fake):
+    def test_an_override_outside_the_limits_is_refused_and_the_rest_sent(self, fake):
         pair = overriding(fake, brightness=30.0, strobe_period=20.0).settle()
         assert sent(pair) == [(1, 30, 0, 0)]
         (failed, reason), (done, _) = pair.recorder.restorations
@@ -106,12 +99,7 @@ class TestAtTheFirstConnection:
         assert [success for success, _ in pair.recorder.restorations] == [True]
         assert pair.snapshot.discrepancy == ''
 
-    def test_retries_leave_the_line_alone_in_between(self, fake):
-        fake.results[CONFIGURE] = None
-        pair = overriding(fake, brightness=30.0).settle(60.0)
-        assert len(sent(pair)) <= 4 * 60 / RESTORE_INTERVAL
-
-    def test_what_a_light_accepts_and_never_shows_is_given_up(self, fake):
+    def test_overrides_that_a_light_accepts_and_never_shows_are_given_up(self, fake):
         # A light that clamps: it takes 100 % and gives 80 %.
         fake.applies = False
         fake.fields['brightness'] = 80.0
@@ -132,7 +120,7 @@ class TestAtTheFirstConnection:
         assert len(sent(pair)) == 2 * given_up
         assert [success for success, _ in pair.recorder.restorations] == [False, False]
 
-    def test_what_was_set_meanwhile_is_not_overridden(self, fake):
+    def test_a_field_that_was_set_meanwhile_is_not_overridden(self, fake):
         fake.results[CONFIGURE] = None
         pair = overriding(fake, brightness=30.0, strobe_period=2.0).settle(1.5)
         fake.results[CONFIGURE] = MavResult.ACCEPTED
@@ -157,27 +145,12 @@ class TestAfterARestart:
         assert pair.configure(strobe_period=2, strobe_duty_cycle=40).success
         return pair
 
-    def test_what_was_agreed_since_is_sent_with_the_overrides(self, fake, agreed):
+    def test_the_confirmed_configuration_is_sent_with_the_overrides(self, fake, agreed):
         fake.restart(agreed.now)
         agreed.run(5.0)
         assert sent(agreed)[-1] == (1, 30, 2, 40)
         assert fake.fields['brightness'] == 30.0
         assert [success for success, _ in agreed.recorder.restorations] == [True, True]
-
-    def test_the_defaults_of_the_light_are_no_change_from_outside(self, fake, agreed):
-        changes = len(agreed.recorder.changes)
-        fake.restart(agreed.now)
-        agreed.run(10.0)
-        assert len(agreed.recorder.changes) == changes
-
-    def test_it_works_for_a_restart_in_an_absence(self, fake, agreed):
-        fake.silent = True
-        agreed.run(20.0)
-        fake.restart(agreed.now)
-        agreed.run(5.0)
-        fake.silent = False
-        agreed.run(5.0)
-        assert fake.fields['strobe_period'] == 2.0
 
     def test_a_light_that_kept_its_configuration_gets_nothing(self, fake, agreed):
         at, kept = agreed.now, dict(fake.fields)
@@ -201,7 +174,7 @@ class TestAfterARestart:
         agreed.run(10.0)
         assert (fake.fields['brightness'], fake.fields['strobe_period']) == (30.0, 2.0)
 
-    def test_what_is_set_during_the_restoring_wins(self, fake, agreed):
+    def test_a_field_set_during_the_restoring_keeps_its_value(self, fake, agreed):
         fake.results[CONFIGURE] = [None] * 8 + [MavResult.ACCEPTED]
         fake.restart(agreed.now)
         agreed.run(1.2)
@@ -259,9 +232,6 @@ class TestWithoutRestoring:
     @pytest.fixture
     def pair(self, fake):
         return overriding(fake, Settings(restore_configuration=False), brightness=30.0).settle()
-
-    def test_overrides_are_sent_at_the_first_connection_all_the_same(self, pair):
-        assert sent(pair) == [(1, 30, 0, 0)]
 
     def test_after_a_restart_the_light_is_followed(self, fake, pair):
         fake.restart(pair.now)

@@ -24,7 +24,7 @@ from support.faulty_wire import Faults
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 
 
-def test_requests_are_carried_out_in_order(pair):
+def test_off_overtakes_the_requests_before_it(pair):
     wishes = [True, False, True, True, False]
     answers = [pair.ask_enable(on) for on in wishes]
     pair.run(5.0)
@@ -42,21 +42,6 @@ def test_each_configuration_builds_on_the_one_before(pair):
     assert (last.param2, last.param3, last.param4) == (40, 2, 30)
 
 
-def test_a_configuration_does_not_build_on_one_that_was_refused(fake, faked):
-    fake.results[CONFIGURE] = [MavResult.DENIED, MavResult.ACCEPTED]
-    faked.ask_configure(brightness=40)
-    assert faked.wait_for(faked.ask_configure(strobe_period=2)).success
-    assert fake.fields['brightness'] == 100.0
-
-
-def test_one_command_of_a_kind_is_in_flight(fake, faked):
-    fake.results[ON_OFF] = None
-    for _ in range(5):
-        faked.ask_enable(True)
-    faked.run(0.1)
-    assert len(faked.commands(ON_OFF)) == 1
-
-
 def test_switching_and_configuring_do_not_wait_for_one_another(fake, faked):
     fake.results[ON_OFF] = None
     slow = faked.ask_enable(True)
@@ -71,7 +56,7 @@ def test_switching_and_configuring_do_not_wait_for_one_another(fake, faked):
     assert not slow.results
 
 
-def test_there_is_an_end_to_what_may_wait(fake, faked):
+def test_requests_above_the_limit_are_refused_at_once(fake, faked):
     fake.results[ON_OFF] = None
     answers = [faked.ask_enable(True) for _ in range(MAX_WAITING + 3)]
     refused = [answer for answer in answers if answer.results]
@@ -130,12 +115,6 @@ class TestCallbacksThatAskForMore:
                 pair.light.enable(not pair.lamp.enabled, now, done)
         pair.light.enable(True, pair.now, done)
 
-    def test_switching_again_from_the_answer(self, pair):
-        log = []
-        self.toggle(pair, 6, log)
-        pair.run(2.0)
-        assert log == [(True, True), (True, False)] * 3
-
     def test_configuring_again_from_the_answer(self, pair):
         log = []
 
@@ -148,37 +127,6 @@ class TestCallbacksThatAskForMore:
         pair.run(2.0)
         assert log == [True] * 6
         assert pair.lamp.configuration.brightness == 50.0
-
-    def test_refreshing_again_from_the_answer(self, pair):
-        log = []
-
-        def done(result, now):
-            log.append(result.success)
-            if len(log) < 3:
-                pair.light.refresh(now, done)
-
-        pair.light.refresh(pair.now, done)
-        pair.run(2.0)
-        assert log == [True] * 3
-
-    @pytest.mark.parametrize('end', ['refused', 'lost'])
-    def test_asking_again_after_a_failure(self, fake, faked, end):
-        fake.results[ON_OFF] = [MavResult.DENIED, MavResult.DENIED, MavResult.ACCEPTED]
-        if end == 'lost':
-            fake.results[ON_OFF] = None
-        log = []
-
-        def done(result, now):
-            log.append(result.success)
-            if not result.success and len(log) < 5:
-                faked.light.enable(True, now, done)
-
-        faked.light.enable(True, faked.now, done)
-        faked.turn()
-        if end == 'lost':
-            faked.close()
-        faked.run(10.0)
-        assert log == ([False, False, True] if end == 'refused' else [False] * 5)
 
     def test_another_request_from_the_answer_to_one_that_waited(self, fake, faked):
         fake.results[CONFIGURE] = None

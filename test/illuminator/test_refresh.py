@@ -41,7 +41,7 @@ def test_both_are_asked_for_and_come(pair):
     assert asked == {STATUS_ID, INFORMATION_ID}
 
 
-def test_what_has_become_of_the_light_is_known_afterwards(fake, faked):
+def test_refresh_updates_status_and_identity(fake, faked):
     fake.fields['brightness'] = 12.0
     fake.identity = fake.identity.__class__(serial_number='T-2')
     faked.wait_for(refresh(faked))
@@ -66,16 +66,6 @@ def test_without_a_status_it_is_a_failure_that_says_why(fake, faked):
         'COMPONENT_INFORMATION_BASIC: refused: MAV_RESULT_UNSUPPORTED (')
 
 
-def test_it_ends_as_soon_as_both_are_decided(fake, faked):
-    fake.stream = 0.0
-    fake.results[REQUEST] = [MavResult.ACCEPTED, MavResult.DENIED]
-    answer = refresh(faked)
-    result = faked.wait_for(answer)
-    assert result.message.startswith('ILLUMINATOR_STATUS: MAV_RESULT_DENIED, '
-                                     'COMPONENT_INFORMATION_BASIC: received')
-    assert answer.seconds < 0.02
-
-
 def test_a_status_that_was_promised_is_waited_for_until_the_limit(fake, faked):
     fake.stream = 0.0
     fake.answers.discard(STATUS_ID)
@@ -93,17 +83,9 @@ def test_the_limit_holds_however_long_a_command_may_take(fake):
         'ILLUMINATOR_STATUS: nothing came, COMPONENT_INFORMATION_BASIC: nothing came (5.00 s)')
 
 
-def test_a_status_that_comes_by_itself_will_do(fake, faked):
-    fake.answers.discard(STATUS_ID)
-    fake.stream, fake._status_due = 10.0, faked.now + 3.0
-    answer = refresh(faked)
-    assert faked.wait_for(answer).success
-    assert answer.seconds == pytest.approx(3.0, abs=0.01)
-
-
 @pytest.mark.parametrize('result', [None, MavResult.ACCEPTED, MavResult.IN_PROGRESS,
                                     MavResult.TEMPORARILY_REJECTED])
-def test_it_ends_once_and_in_time_whatever_the_light_does(fake, faked, result):
+def test_refresh_ends_once_and_in_time_whatever_the_light_does(fake, faked, result):
     fake.stream = 0.0
     fake.answers.clear()
     fake.results[REQUEST] = result
@@ -113,15 +95,7 @@ def test_it_ends_once_and_in_time_whatever_the_light_does(fake, faked, result):
     assert max(answer.seconds for answer in answers) <= REFRESH_LIMIT
 
 
-def test_it_fails_at_once_where_the_light_is_lost(fake, faked):
-    fake.silent = True
-    faked.run(10.0)
-    answer = refresh(faked)
-    assert answer.seconds == 0.0
-    assert 'is lost' in answer.result.message
-
-
-def test_it_ends_when_the_link_is_lost(pair):
+def test_refresh_ends_when_the_link_is_lost(pair):
     answer = refresh(pair)
     pair.close()
     pair.run(0.1)

@@ -49,13 +49,6 @@ def test_no_more_lights_are_looked_for_at_once_than_a_slow_line_bears() -> None:
     assert len(pair.commands(MavCmd.REQUEST_MESSAGE, since=pair.now)) == MAX_ASKED
 
 
-def test_lights_that_are_there_are_not_looked_for() -> None:
-    pair = Pair().settle()
-    pair.controller.link_opened(pair.now)
-    pair.turn()
-    assert pair.commands(since=pair.now) == []
-
-
 CYCLES = 200
 
 

@@ -29,14 +29,6 @@ def heard(*statuses):
     return [times.sent_by(uptime, at) for uptime, at in statuses][-1]
 
 
-def test_the_first_status_counts_as_sent_when_it_came():
-    assert heard((5000, 100.0)) == 100.0
-
-
-def test_a_status_in_time_counts_as_sent_when_it_came():
-    assert heard((5000, 100.0), (5990, 101.0), (7001, 102.0)) == 102.0
-
-
 def test_a_status_that_was_on_its_way_for_long_was_sent_earlier():
     sent_by = heard((5000, 100.0), (6001, 101.0), (6301, 103.3))
     assert sent_by == pytest.approx(101.3, abs=0.06)

@@ -42,11 +42,6 @@ def different() -> Pair:
     return two(enable=1, brightness=40.0).settle(6.0)
 
 
-def test_two_lights_that_show_different_things_are_told_within_three_seconds():
-    pair = two(enable=1, brightness=40.0)
-    pair.run_until(lambda: pair.controller.lights and pair.snapshot.shared_address, within=3.0)
-
-
 def test_two_lights_that_show_the_same_are_one():
     pair = two().settle(10.0)
     assert not pair.snapshot.shared_address
@@ -88,16 +83,6 @@ def test_a_command_that_one_of_two_lights_does_not_carry_out_is_no_success(diffe
     assert 'several lights answer as 1/1' in result.message
 
 
-def test_clocks_of_their_own_do_not_hide_the_light_that_does_not_obey():
-    pair = two(second_boot=-3600.0, enable=1, brightness=40.0).settle(10.0)
-    for light in pair.other.lights:
-        light.fields['enable'] = 0
-    pair.run(3.0)
-    pair.other.lights[0].applies = False
-    result = pair.enable(True)
-    assert (result.success, 'shows off' in result.message) == (False, True)
-
-
 def test_a_status_that_is_lost_does_not_move_the_parameters(different):
     agreed = different.snapshot.configuration
     for light in different.other.lights:
@@ -127,16 +112,6 @@ def test_parameters_follow_again_once_the_lights_agree(different):
         light.fields |= {'enable': 1, 'brightness': 55.0}
     different.run(6.0)
     assert different.snapshot.configuration.brightness == 55.0
-
-
-def test_one_light_that_somebody_changes_there_and_back_is_followed(fake):
-    pair = Pair(fake, settings=Settings()).settle()
-    fake.fields['brightness'] = 40.0
-    pair.run(1.0)
-    assert pair.snapshot.configuration.brightness == 40.0
-    fake.fields['brightness'] = 100.0
-    pair.run(2.0)
-    assert pair.snapshot.configuration.brightness == 100.0
 
 
 @pytest.mark.parametrize('instance', [0, 2])

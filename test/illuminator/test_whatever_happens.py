@@ -116,7 +116,7 @@ class Chaos:
 
 
 @pytest.mark.parametrize('seed', range(30))
-def test_whatever_happens(seed):
+def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed):
     chaos = Chaos(seed)
     pair = chaos.pair
     end = pair.now + SECONDS
