@@ -54,13 +54,7 @@ EVERY_NODE_HAS = re.compile('parameter|logger|type_description|rosout|clock')
 
 def range_of(spec: ParameterSpec) -> str:
     """Return the values that a parameter may have, as the reference shows them."""
-    descriptor = spec.descriptor(read_only=False)
-    _, found, choices = descriptor.additional_constraints.partition('one of: ')
-    if found:
-        return ', '.join(f'`{choice}`' for choice in choices.split(', '))
-    limits = [(each.from_value, each.to_value) for each in descriptor.floating_point_range]
-    limits += [(each.from_value, each.to_value) for each in descriptor.integer_range]
-    return ', '.join(f'{low:g} to {high:g}' for low, high in limits)
+    return ', '.join(f'`{one}`' for one in spec.choices) or spec.shown_range
 
 
 def meaning_of(spec: ParameterSpec) -> str:
