@@ -34,7 +34,7 @@ setup(
     # With package.xml's set by catkin_prepare_release, which wants it written here in full.
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
-    package_data={package_name: ['py.typed']},
+    package_data={package_name: ['py.typed', 'ros/fastdds.xml']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

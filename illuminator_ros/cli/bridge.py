@@ -133,19 +133,22 @@ def _serve(
     from rclpy.signals import SignalHandlerOptions
 
     from ..ros.bridge import Bridge
-    from ..ros.node import PayloadNode
+    from ..ros.node import MAX_NODE_NAME, PayloadNode
     from ..ros.parameters import ParameterError
 
     # From here on the ROS graph has to be left in order, so a signal only has effect later.
     termination.calls(lambda: None)
-    if (refusal := _log_directory_refusal()):
+    if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or _log_directory_refusal():
         return _wrong(refusal)
+    _limit_memory()
     # On a terminal rcutils colours its lines; it sees a pipe in its place.
     if termination.is_terminal:
         os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
     try:
         rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = PayloadNode(NODE_NAME)
+    except OSError as error:
+        return _wrong(f'cannot start: {error}')
     except Exception as error:
         # rclpy has an exception of its own for each thing that can be wrong with an argument.
         return _wrong(f'wrong ROS arguments: {error}')
@@ -163,6 +166,24 @@ def _serve(
     bridge.run()
     rclpy.try_shutdown()
     return 0
+
+
+def _limit_memory() -> None:
+    """Use our profile of Fast DDS, unless the user has one."""
+    names = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+    files = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
+    if not (any(map(os.environ.get, names)) or any(map(os.path.exists, files))):
+        profile = os.path.join(os.path.dirname(__file__), os.pardir, 'ros', 'fastdds.xml')
+        os.environ.update(dict.fromkeys(names, os.path.abspath(profile)))
+
+
+def _long_name_refusal(arguments: list[str], limit: int) -> str:
+    """Return that a node's name and namespace are too long, '' if they are not."""
+    given = {key: value for argument in arguments for key, rule, value in [
+        argument.partition(':=')] if rule and key in ('__ns', '__node', '__name')}
+    length = sum(len(value) + 1 for value in given.values())
+    return (f'node name and namespace have {length} characters together: the limit is {limit}'
+            if length > limit else '')
 
 
 def _log_directory_refusal() -> str:

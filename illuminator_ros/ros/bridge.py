@@ -54,9 +54,6 @@ TICK = 0.25
 CHECK_INTERVAL = 0.02
 # s between checks for another node of the same name.
 NAMES_INTERVAL = 5.0
-# Characters of a node's full name: topics and services below it, with the prefixes and suffixes
-# of the middleware, must have at most 255.
-MAX_NODE_NAME = 255 - len('rq//set_parameters_atomicallyRequest') - 8
 
 
 class Bridge:
@@ -73,10 +70,6 @@ class Bridge:
         self, node: Node, arguments: Sequence[str], types: Mapping[str, PayloadType],
     ) -> None:
         self.node = node
-        if len(node.get_fully_qualified_name()) > MAX_NODE_NAME:
-            raise ParameterError(
-                f'the node name {node.get_fully_qualified_name()[:40]}... has more than '
-                f'{MAX_NODE_NAME} characters')
         self.log = NodeLog(node.get_logger())
         LogForwarder.install(self.log)
         self.parameters = parameters = declare_link_parameters(node)

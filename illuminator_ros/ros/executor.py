@@ -22,12 +22,13 @@ itself takes 0.01 ms.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 import contextlib
 import functools
 import os
 import threading
+import time
 from typing import Any
 
 from rclpy.context import Context
@@ -40,6 +41,10 @@ from .log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1
+# Every client of a service gets the answers to all, and by default keeps the last 10 only. Where
+# more requests wait than this, their answers are sent this far apart, s.
+CROWD = 8
+CROWD_INTERVAL = 0.008
 
 # Takes a request and the function that sends the response, from any thread. Messages and
 # entities of rclpy have no common type.
@@ -74,6 +79,11 @@ class NodeExecutor(SingleThreadedExecutor):
         self._log = log
         self._entities: _Entities | None = None
         self._calls: deque[Callable[[], None]] = deque()
+        # Requests that were not answered, by service, and answers that are sent one by one.
+        self._open: Counter[int] = Counter()
+        self._counting = threading.Lock()
+        self._spaced: deque[Callable[[], None]] = deque()
+        self._spaced_due = 0.0
         self._stale = threading.Event()
         self._stale.set()
         self._ended = threading.Event()
@@ -127,11 +137,13 @@ class NodeExecutor(SingleThreadedExecutor):
         if self._entities is None:
             super().spin_once(FALLBACK_PERIOD if timeout_sec is None else timeout_sec)
         else:
-            services, subscriptions = self._entities.wait(timeout_sec)
+            services, subscriptions = self._entities.wait(
+                CROWD_INTERVAL if self._spaced else timeout_sec)
             for service in services:
                 self._serve(service)
             for subscription in subscriptions:
                 self._deliver(subscription)
+        self._send_spaced()
         while self._calls:
             self._calls.popleft()()
         if not self.context.ok():
@@ -154,6 +166,8 @@ class NodeExecutor(SingleThreadedExecutor):
             request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is None:
             return
+        with self._counting:
+            self._open[id(service)] += 1
         respond = functools.partial(self._respond, service, header)
         try:
             if isinstance(service.callback, DeferredService):
@@ -168,10 +182,24 @@ class NodeExecutor(SingleThreadedExecutor):
     def _respond(self, service: Any, header: Any, response: Any) -> None:
         # The middleware waits up to 0.1 s for a client that it does not know yet. Only here: it
         # must not hold up the link's thread.
-        if header.request_id.sequence_number <= 1:
-            self.call(lambda: _send(service, header, response))
+        send = functools.partial(_send, service, header, response)
+        with self._counting:
+            crowded = bool(self._spaced) or self._open[id(service)] > CROWD
+            self._open[id(service)] -= 1
+            if crowded:
+                self._spaced.append(send)
+        if crowded:
+            self._wakeup.trigger()
+        elif header.request_id.sequence_number <= 1:
+            self.call(send)
         else:
-            _send(service, header, response)
+            send()
+
+    def _send_spaced(self) -> None:
+        now = time.monotonic()
+        if self._spaced and now >= self._spaced_due:
+            self._spaced_due = now + CROWD_INTERVAL
+            self._spaced.popleft()()
 
     @staticmethod
     def _deliver(subscription: Any) -> None:

@@ -38,8 +38,13 @@ STATE_QOS = QoSProfile(
 STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Matches reliable and best-effort publishers.
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-# Requests that the middleware queues; more than LinkCalls lets wait.
-SERVICE_QOS = QoSProfile(depth=2 * MAX_PENDING, reliability=ReliabilityPolicy.RELIABLE)
+# Requests that the middleware queues while others are taken, so that each gets an answer.
+SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+
+
+# Characters of a node's full name: services below it, with the prefixes and suffixes of the
+# middleware, may have 247.
+MAX_NODE_NAME = 247 - len('rq/_255_255/set_parameters_atomicallyRequest')
 
 
 class PayloadNode(Node):
