@@ -23,18 +23,18 @@ from .frame import encode_frame, Frame
 from .messages import Address, encode_payload, Message
 from .signing import Signing, stamp_of
 
-# s for which an unsigned frame may come back. Each second that is remembered is one more sequence
+# s for which an unsigned frame may return. Each second that is remembered is one more sequence
 # number with which the heartbeat of another sender with our address would pass for ours.
 MEMORY = 1.0
 MAX_FRAMES = 64
-# Time stamps of signed frames, which are unique: they may come back at any time.
+# Time stamps of signed frames, which are unique: they may return at any time.
 MAX_STAMPS = 4096
 
 _Key = tuple[Address, int, int, bytes]
 
 
 class LoopbackFilter:
-    """Tells our own frames that come back from those of another sender with our address."""
+    """Distinguishes our own returning frames from frames of another sender with our address."""
 
     def __init__(self) -> None:
         self._sent: deque[tuple[float, _Key]] = deque(maxlen=MAX_FRAMES)
@@ -62,7 +62,7 @@ class LoopbackFilter:
 
 class FrameWriter:
     """
-    Makes frames of messages, and recognises them when they come back.
+    Makes frames of messages, and recognises them when they return.
 
     :param version: 1 or 2, of all frames.
     :ivar sequences: the next sequence number of each address that was sent from.
@@ -106,5 +106,5 @@ class FrameWriter:
         return frame
 
     def is_loopback(self, frame: Frame, now: float) -> bool:
-        """Return whether a frame is one of ours that has come back."""
+        """Return whether a frame is one of our own, returned."""
         return frame.source in self.sequences and self._loopback.has(frame, now)

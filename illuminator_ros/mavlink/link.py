@@ -204,7 +204,7 @@ class Link:
             copy.copy(self._receiver.counters), copy.copy(self._signing.counters))
 
     def reset_loss(self, source: Address) -> None:
-        """Forget recent losses of a component: it has begun to count its frames anew."""
+        """Forget recent losses of a component: its sequence numbers have restarted."""
         if counter := self._traffic.sources.get(source):
             counter.reset_loss()
 

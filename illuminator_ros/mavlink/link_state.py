@@ -62,7 +62,7 @@ class LinkState(Enum):
 
 
 class LinkInput(Enum):
-    """What changes the state of a link."""
+    """The inputs that change the state of a link."""
 
     OPENED = 'opened'
     PROVED = 'proved'
@@ -94,7 +94,7 @@ class LinkEvent:
     :param name: the transport, or the URL where there is none.
     :param reason: why it is not open.
     :param was_open: whether it is lost, and not just not open yet.
-    :param unreported: openings and losses before this one that were not reported.
+    :param unreported: number of earlier openings and losses without a report.
     """
 
     is_open: bool
@@ -144,7 +144,7 @@ class LinkSnapshot:
 
 class LinkStatus:
     """
-    The state of a link, and the events that are to be reported.
+    The state of a link, and the events that must be reported.
 
     :param label: the name of the link while there is no transport.
     :ivar since: when it was opened or lost, s.

@@ -36,8 +36,8 @@ class Router:
     """
     The ways to components, learnt from what comes from them.
 
-    A component that is heard over several peers is sent to over all of them: somebody who claims
-    to be it takes nothing away from the one that was there before.
+    A component that is heard over several peers is sent to over all of them: an impostor
+    diverts nothing from the real component.
     """
 
     def __init__(self) -> None:

@@ -39,8 +39,8 @@ NEW_STREAM_TICKS = 60 * TICKS_PER_SECOND
 # How far ahead of our clock a peer is followed: 10 years. A computer without a battery may wake
 # up some years in the past; a receiver that forgets the rollover of GPS weeks is 19.6 years off.
 FOLLOWED_TICKS = 10 * 365 * 86_400 * TICKS_PER_SECOND
-# A clock that is no further behind the time stamps of this link is taken to be right: another
-# clock has been ahead. One that is further behind has no battery.
+# A clock that is behind the time stamps of this link by less than this counts as correct: another
+# clock was ahead. A clock further behind has no battery.
 CLOCK_TOLERANCE_TICKS = 86_400 * TICKS_PER_SECOND
 MAX_STREAMS = 256
 KEY_SIZE = 32
@@ -48,7 +48,7 @@ KEY_SIZE = 32
 
 class SigningMode(Enum):
     """
-    What is signed and what is believed.
+    Which frames are signed, and which are accepted.
 
     ``off``: nothing is signed, and every frame is taken. ``sign``: what we send is signed;
     unsigned frames are taken, wrongly signed ones are not. ``require``: only rightly signed
@@ -98,7 +98,7 @@ def signature(key: bytes, signed_part: bytes) -> bytes:
 @dataclass
 class Signing:
     """
-    Signs what goes out on a link and checks what comes in.
+    Signs sent frames and checks received ones.
 
     :param key: 32 bytes; may be missing only where the mode is off.
     :param link_id: 0..255, our id for this link in what we sign.
@@ -135,7 +135,7 @@ class Signing:
         return frame + signature(self.key, frame)
 
     def accepts(self, frame: Frame, unix_time: float) -> bool:
-        """Return whether a frame is to be believed."""
+        """Return whether a frame is accepted."""
         if self.mode is SigningMode.OFF:
             self.counters.unchecked += frame.signature is not None
             return True
@@ -166,8 +166,8 @@ class Signing:
         elif stamp <= last:
             return False
         self._streams[stream] = stamp
-        # A peer with a better clock, or a longer memory, is followed; but not one whose clock is
-        # mad, or everybody with the right time would be too old from now on.
+        # A peer with a better clock, or a longer memory, is followed; but not
+        # an implausible clock, after which correct time stamps would count as too old.
         if stamp <= ticks(unix_time) + FOLLOWED_TICKS:
             self.timestamp = max(self.timestamp, stamp)
         return True

@@ -117,7 +117,7 @@ class SequenceCounter:
         self._newest = self._next = -1
 
     def reset_loss(self) -> None:
-        """Have nothing lost recently: the sender has begun to count anew."""
+        """Forget recent losses: the sequence numbers of the sender have restarted."""
         self._recently_lost = self._recently_received = WindowedCounter()
 
     def sample(self, now: float) -> None:
@@ -136,7 +136,7 @@ class SequenceCounter:
 @dataclass(slots=True)
 class Traffic:
     """
-    What went over a link since it was made.
+    The traffic of a link since it was made.
 
     :param bytes_received: all, good or not.
     :param frames_dropped: those that found no room to go out.

@@ -53,7 +53,7 @@ REPORT_INTERVAL = 10.0
 
 
 class Figures:
-    """What was done so far."""
+    """Counters of a run."""
 
     def __init__(self) -> None:
         self.begun = time.monotonic()

@@ -51,7 +51,7 @@ def of_passphrase(passphrase: str) -> bytes:
     return hashlib.sha256(passphrase.encode()).digest()
 
 
-# What a key file may hold
+# Contents of a key file
 
 @pytest.mark.parametrize(('content', 'key'), [
     pytest.param(RAW, RAW, id='32 raw bytes'),

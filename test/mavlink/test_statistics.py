@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a link loses, repeats and reorders, by the sequence numbers."""
+"""Lost, repeated and reordered frames, by the sequence numbers."""
 
 from __future__ import annotations
 

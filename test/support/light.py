@@ -172,11 +172,11 @@ class ServedLight:
         return float(self.do(act))
 
     def restart(self, **fields: Any) -> None:
-        """Lose power and come back with the default settings, or others."""
+        """Restart with the default settings, or others."""
         self.do(lambda now: self.fake.restart(now, **fields))
 
     def send(self, message: Any, source: Address | None = None) -> None:
-        """Send any message, if wanted as somebody else."""
+        """Send any message, optionally from another address."""
         self.do(lambda now: self.fake.outgoing.append((source or self.fake.source, message)))
 
     def acknowledge(
@@ -209,7 +209,7 @@ class ServedLight:
         return [message for message in list(self.fake.received) if message.command == command]
 
     def wait_for(self, command: int, count: int = 1, timeout: float = PATIENCE) -> list[Any]:
-        """Wait until a command has come ``count`` times, and return those that have."""
+        """Wait until a command has come ``count`` times, and return its receptions."""
         with self.fake.changed:
             assert self.fake.changed.wait_for(
                 lambda: len(self.commands(command)) >= count, timeout), (

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Links in threads of their own, over real sockets, and somebody to talk to."""
+"""Links in threads of their own, over real sockets, and a peer."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ OPENER = 'mavlink-open'
 
 class Talker(Endpoint):
     """
-    Somebody who sends heartbeats, and keeps what comes in.
+    A peer that sends heartbeats and keeps received messages.
 
     :ivar heard: source and message, in order.
-    :ivar greetings: how often there was somebody new to greet.
+    :ivar greetings: how often a new peer was greeted.
     :ivar turns: how often the link's thread has gone round.
     """
 

@@ -36,7 +36,7 @@ MAX_IDLE_TURNS = 200
 
 
 class _Socket:
-    """What a UDP socket is to a channel."""
+    """A UDP socket as a channel uses it."""
 
     def __init__(self, take: Callable[[bytes, Any], None]) -> None:
         self.inbox: deque[Datagram] = deque()

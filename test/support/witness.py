@@ -225,7 +225,7 @@ class Judge:
         return 'heard' if heard else ''
 
 
-# Of an answer: the kind of outcome, whether it is a success, whether it is true.
+# An answer: the kind of outcome, whether it is a success, whether it is true.
 TAKEN = 'taken as agreed'
 _CHECKS: dict[str, tuple[str, bool, Callable[[Judge, Request], str]]] = {
     'confirmed by ILLUMINATOR_STATUS': ('confirmed', True, Judge._confirmed),

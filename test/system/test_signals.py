@@ -241,6 +241,6 @@ def test_a_program_under_nohup_outlives_its_terminal() -> None:
                       'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')
     program.wait_for('link open')
 
-    # What is ignored and not blocked has no effect.
+    # A signal that is ignored and not blocked has no effect.
     assert blocked(program) == {signal.SIGINT, signal.SIGTERM}
     assert program.end(signal.SIGTERM) == 0

@@ -70,7 +70,7 @@ def test_a_tcp_server_that_is_restarted(run: Callable[[LiveLink], LiveLink]) -> 
         sockets[1].sendall(heartbeat_frame())
 
     def go() -> None:
-        # What was said has to be heard, or the connection was of no use.
+        # A message must arrive, otherwise the connection was not used.
         link.endpoint.heard.wait_for(lambda heard: True, count=link.history().count(True))
         # The listener first, or the link would be in its queue before it is gone.
         while sockets:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a link reports of its openings and losses, and how often."""
+"""Reports of the openings and losses of a link, and their rate."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Run = Callable[[LiveLink], LiveLink]
 
 @pytest.fixture
 def port() -> int:
-    """Return a TCP port that nobody uses."""
+    """Return a free TCP port."""
     return free_port(socket.SOCK_STREAM)
 
 
@@ -57,7 +57,7 @@ def served_once(run: Run, port: int) -> LiveLink:
     with listening_socket(port=port) as server:
         link = run(LiveLink(f'tcp://127.0.0.1:{port}'))
         connection = server.accept()[0]
-    # With nobody listening any more, the link cannot be in a queue when the connection ends.
+    # Without a listener, the link cannot be in a queue when the connection ends.
     with connection:
         connection.sendall(heartbeat_frame())
         link.endpoint.wait_for(LIGHT)

@@ -40,7 +40,7 @@ NEVER_ENDING = 10_000
 
 
 class Fault(Exception):
-    """What a test makes go wrong."""
+    """The fault that a test injects."""
 
 
 class Faulty(Talker):

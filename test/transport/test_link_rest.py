@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a link does while there is nothing to do, or nobody to talk to."""
+"""A link that is idle, or has no peer."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Simulation:
 
     @property
     def greeted_at(self) -> list[float]:
-        """When somebody new was, or might have been, within hearing."""
+        """Times at which a new peer may have appeared."""
         return list(self.endpoint.greetings)
 
 

@@ -72,7 +72,7 @@ def test_it_says_since_when_it_is_open_or_not(run: Run) -> None:
         assert begun + STEP <= link.state().since < begun + 2 * STEP
 
         clock.ahead += STEP
-        # What opens again at once would begin anew.
+        # A channel that opens again at once would restart it.
         server.close()
         connection.close()
         link.wait_lost(2)

@@ -93,7 +93,7 @@ def test_a_run_that_ends_without_a_word_repeats_none(run: Run, store: Noting) ->
     link.ask(lambda now: None)
 
     eventually(lambda: len(store.stored) > count, 'stored again')
-    # What a crash would leave.
+    # The file as a crash leaves it.
     assert store.load() > store.stored[-1]
     assert store.load() > signing.timestamp
 
