@@ -12,21 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""With ``off_on_shutdown`` the light goes dark with the node, within the second that it has."""
+"""With ``off_on_shutdown`` every light is switched off with the node, within the second it has."""
 
 from collections.abc import Callable, Iterator
 import contextlib
 import signal
 
-from illuminator_ros.ros import bridge as bridge_module
 import pytest
-from std_srvs.srv import SetBool
-from support.embedded import embedded_bridge
-from support.light import Address, CONFIGURE, eventually, MavResult, ON_OFF, ServedLight
+from rcl_interfaces.srv import GetParameters
+from support.light import Address, CONFIGURE, MavResult, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, start_bridge, start_slow_bridge
 from support.slow import CLOCK, pass_time_until
-from support.waiting import PATIENCE
+from support.waiting import eventually
 
 
 @contextlib.contextmanager
@@ -43,109 +41,96 @@ def lit(
             program.kill()
 
 
-def goes_off(light: ServedLight) -> None:
+def assert_goes_off(light: ServedLight) -> None:
     # The bridge does not wait for it beyond its end.
     eventually(lambda: light.fake.fields['enable'] == 0)
 
 
-def ends(program: Program, number: int = signal.SIGTERM) -> bool:
-    return program.end(number) == 0 and 'Traceback' not in program.log
+def assert_ends(program: Program, number: int = signal.SIGTERM) -> None:
+    assert (program.end(number), 'Traceback' in program.log) == (0, False), program.log
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_the_light_is_switched_off(own_ros: Ros, port: int, number: int) -> None:
-    with lit(own_ros, port) as (program, light):
-        assert ends(program, number)
-
-        goes_off(light)
-
-
-def test_every_light_is_switched_off(own_ros: Ros, port: int) -> None:
+def test_every_light_is_switched_off_and_named(own_ros: Ros, port: int, number: int) -> None:
     with (lit(own_ros, port) as (program, light),
           ServedLight(port, source=Address(1, 244), enable=1) as other):
         Parameters(own_ros, '/illuminator_1_244').wait(brightness=100.0)
 
-        assert ends(program)
+        assert_ends(program, number)
 
-        goes_off(light)
-        goes_off(other)
+        for one in (light, other):
+            assert_goes_off(one)
+            assert program.count(f'light {one.fake.source} is off: off, confirmed') == 1
 
 
-def test_without_it_the_light_is_left_as_it_is(own_ros: Ros, port: int) -> None:
+def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, port: int) -> None:
     with lit(own_ros, port, off_on_shutdown=False) as (program, light):
-        assert ends(program)
+        assert_ends(program)
 
         assert light.commands(ON_OFF) == []
+        [line] = [line for line in program.lines if 'light 1/243 is left on' in line]
+        assert line.startswith('[WARN]')
 
 
-def test_a_lost_command_is_sent_again(
-    own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(bridge_module, 'OFF_LIMIT', PATIENCE)
-    with (ServedLight(port, enable=1) as light,
-          embedded_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge):
-        Parameters(own_ros).wait(brightness=100.0)
+def test_lost_command_is_sent_again(own_ros: Ros, port: int) -> None:
+    with lit(own_ros, port) as (program, light):
         light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
 
-        bridge.end()
+        program.send(signal.SIGTERM)
         light.wait_for(ON_OFF)
         CLOCK.forward(0.5)
 
-        goes_off(light)
+        assert_goes_off(light)
+        assert program.wait() == 0
 
 
-def test_a_light_that_says_nothing_does_not_hold_the_node(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port, start=start_bridge) as (program, light):
-        light.fake.results[ON_OFF] = None
-
-        assert ends(program)
-
-
-@pytest.mark.parametrize(('result', 'limit', 'line'), [
-    (MavResult.ACCEPTED, PATIENCE, '[INFO] light 1/243 is off: off, confirmed'),
-    (MavResult.DENIED, PATIENCE,
-     '[ERROR] light 1/243 may still be on: refused: MAV_RESULT_DENIED (1 try, '),
-    (None, 0.05, '[ERROR] light 1/243 may still be on: no confirmation within 50 ms'),
+@pytest.mark.parametrize(('result', 'line'), [
+    (MavResult.DENIED, 'light 1/243 may still be on: refused: MAV_RESULT_DENIED (1 try, '),
+    (None, 'light 1/243 may still be on: no confirmation within '),
 ])
-def test_the_log_says_what_became_of_it(
-    own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
-    result: int | None, limit: float, line: str,
+def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end(
+    own_ros: Ros, port: int, result: int | None, line: str,
 ) -> None:
-    monkeypatch.setattr(bridge_module, 'OFF_LIMIT', limit)
-    with (ServedLight(port, enable=1) as light,
-          embedded_bridge(own_ros.domain, port, off_on_shutdown=True)):
-        Parameters(own_ros).wait(brightness=100.0)
+    with lit(own_ros, port, start=start_bridge) as (program, light):
         light.fake.results[ON_OFF] = result
 
-    severity, text = line.split(' ', 1)
-    assert [found for found in ''.join(capfd.readouterr()).splitlines()
-            if found.startswith(severity) and text in found]
+        assert_ends(program)
+
+        assert [found[:7] for found in program.lines if line in found] == ['[ERROR]']
 
 
-def test_requests_that_the_light_takes_long_for_do_not_hold_it_up(
-    own_ros: Ros, port: int,
-) -> None:
+def test_requests_in_progress_do_not_delay_it(own_ros: Ros, port: int) -> None:
     with lit(own_ros, port) as (program, light):
         light.fake.results[ON_OFF] = [MavResult.IN_PROGRESS, MavResult.ACCEPTED]
         light.fake.results[CONFIGURE] = MavResult.IN_PROGRESS
-        own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
-        own_ros.start(SetBool, '/illuminator/enable', SetBool.Request(data=True))
+        own_ros.start_enable()
+        own_ros.start_enable()
         Parameters(own_ros).start_set(brightness=20.0)
         light.wait_for(ON_OFF)
         light.wait_for(CONFIGURE)
 
-        assert ends(program)
+        assert_ends(program)
 
-        goes_off(light)
+        assert_goes_off(light)
         assert [command.param1 for command in light.commands(ON_OFF)] == [1.0, 0.0]
 
 
-def test_a_lost_light_is_not_waited_for(own_ros: Ros, port: int) -> None:
+def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
+    with lit(own_ros, port, start=start_bridge) as (program, light):
+        own_ros.start(GetParameters, '/illuminator/get_parameters',
+                      GetParameters.Request(names=['x'] * 1_000_000))
+
+        assert_ends(program)
+
+        assert_goes_off(light)
+
+
+def test_lost_light_is_an_error_and_gets_no_command(own_ros: Ros, port: int) -> None:
     with lit(own_ros, port) as (program, light):
         light.fake.silent = True
         pass_time_until(lambda: program.count('lost'))
 
-        assert ends(program)
+        assert_ends(program)
 
         assert light.commands(ON_OFF) == []
         assert program.count('light 1/243 may still be on: light 1/243 is lost: no heartbeat')

@@ -1,0 +1,127 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bridge serves whatever its output, its callers and its publishers do."""
+
+from collections.abc import Iterator
+import contextlib
+import fcntl
+import json
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+import pytest
+from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+from support.light import MavResult, ON_OFF, ServedLight
+from support.processes import environment, prepare_child
+from support.ros import bridge_arguments, Parameters, Ros, running_bridge
+from support.waiting import eventually, PATIENCE
+
+
+@contextlib.contextmanager
+def blocked_pipe() -> Iterator[int]:
+    """Yield the writing end of a full pipe that is never read."""
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    os.write(writing, bytes(4096))
+    try:
+        yield writing
+    finally:
+        os.close(reading)
+        os.close(writing)
+
+
+@pytest.mark.parametrize('light_answers', [True, False])
+def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
+    own_ros: Ros, port: int, light_answers: bool,
+) -> None:
+    with blocked_pipe() as output, ServedLight(port) as light:
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'illuminator_ros.bridge',
+             *bridge_arguments(port, '--log-level', 'debug', off_on_shutdown=True)],
+            env=environment({'ROS_DOMAIN_ID': str(own_ros.domain)}), stdin=subprocess.DEVNULL,
+            stdout=output, stderr=output, preexec_fn=prepare_child)
+        try:
+            Parameters(own_ros).wait(brightness=100.0)
+            assert own_ros.enable().success
+            assert Parameters(own_ros).set(brightness=200.0)[0].reason
+            if not light_answers:
+                light.fake.results[ON_OFF] = None
+
+            process.send_signal(signal.SIGTERM)
+
+            assert process.wait(PATIENCE) == 0
+            light.wait_for(ON_OFF, 2)
+            eventually(lambda: light.fake.fields['enable'] == int(not light_answers))
+        finally:
+            process.kill()
+            process.wait()
+
+
+def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        bridge.wait_for('connected')
+        own_ros.enable()
+        clients = [own_ros.node.create_client(SetBool, '/illuminator/enable')
+                   for _ in range(50)]
+        eventually(lambda: all(client.service_is_ready() for client in clients))
+        own_ros.catch_up()
+
+        light.fake.results[ON_OFF] = None
+        light.forget()
+        futures = [client.call_async(SetBool.Request(data=True)) for client in clients]
+        light.wait_for(ON_OFF)
+        # Those for which there is no room are answered at once, and the rest when the light is.
+        light.fake.results[ON_OFF] = MavResult.ACCEPTED
+        light.acknowledge(ON_OFF, MavResult.FAILED)
+        eventually(lambda: all(future.done() for future in futures))
+
+        outcomes = [future.result() for future in futures]
+        assert all(outcome is not None and outcome.message for outcome in outcomes)
+        assert {outcome.success for outcome in outcomes if 'confirmed' in outcome.message} == {True}
+
+
+def test_best_effort_publisher_is_heard(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        bridge.wait_for('connected')
+        publisher = own_ros.node.create_publisher(
+            Bool, '/illuminator/cmd/enable', qos_profile_sensor_data)
+        eventually(publisher.get_subscription_count)
+
+        def heard() -> bool:
+            publisher.publish(Bool(data=True))
+            return bool(light.commands(ON_OFF))
+
+        eventually(heard)
+
+
+def test_parameters_dumped_before_the_first_light_can_be_loaded(
+    own_ros: Ros, port: int, tmp_path: Path,
+) -> None:
+    """As ``ros2 param dump`` and ``--params-file`` do."""
+    with running_bridge(own_ros.domain, port):
+        parameters = Parameters(own_ros)
+        names = parameters.names()
+        dump = {name: list(value) if isinstance(value, list | tuple) else value
+                for name, value in zip(names, parameters.get(*names), strict=True)}
+    file = tmp_path / 'dump.yaml'
+    file.write_text(json.dumps({'/illuminator': {'ros__parameters': dump}}))
+
+    with running_bridge(own_ros.domain, port, '--params-file', str(file)) as bridge:
+        assert bridge.count('WARN') + bridge.count('ERROR') == 0
