@@ -222,7 +222,9 @@ def declare_read_only(
     for spec in specs:
         override = given_parameters(node).get(spec.name)
         default = (defaults or {}).get(spec.name, spec.default)
-        value = spec.check(default if override is None else override.value)
+        # rcl reads an empty list, as "ros2 param dump" writes it, as a parameter without a value.
+        value = spec.check(
+            default if override is None or override.value is None else override.value)
         # The type of an empty list cannot be inferred.
         node.declare_parameter(
             spec.name, spec.type if value == [] else value,
