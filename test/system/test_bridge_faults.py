@@ -15,63 +15,20 @@
 """A bridge under attack and under load: it answers, it says what is wrong, and it ends in time."""
 
 from collections.abc import Iterator
-import contextlib
-import fcntl
-import os
 import signal
-import subprocess
 import sys
-import time
 
 import pytest
 from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetParameters, SetLoggerLevels
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Bool
+from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool, Trigger
-from support.light import eventually, ON_OFF, ServedLight
-from support.processes import ended, environment, Program, python
+from support.light import eventually, ServedLight
+from support.processes import ended, Program, python
 from support.recording import Call
-from support.ros import bridge_arguments, Parameters, Ros, running_bridge, start_bridge
+from support.ros import Parameters, Ros, running_bridge, start_bridge
 
 BRIDGE = 'illuminator_ros.bridge'
-# s, real time: a signal ends the bridge within 1 s, and the tests share their processors.
-END_LIMIT = 2.0
-BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-@contextlib.contextmanager
-def blocked_bridge(ros: Ros, port: int, **parameters: object) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a bridge whose stderr is a full pipe that nothing reads."""
-    reader, writer = os.pipe()
-    fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 4096)
-    os.write(writer, bytes(4096))
-    process = subprocess.Popen(
-        [sys.executable, '-m', BRIDGE, *bridge_arguments(port, **parameters)], stderr=writer,
-        env=environment({'ROS_DOMAIN_ID': str(ros.domain)}))
-    os.close(writer)
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-        os.close(reader)
-
-
-def test_bridge_serves_and_switches_off_while_nothing_reads_its_log(
-    own_ros: Ros, port: int,
-) -> None:
-    with (ServedLight(port, enable=1) as light,
-          blocked_bridge(own_ros, port, off_on_shutdown=True) as bridge):
-        Parameters(own_ros).wait(brightness=100.0)
-        assert own_ros.enable().success
-
-        began = time.monotonic()
-        bridge.send_signal(signal.SIGTERM)
-        assert bridge.wait(END_LIMIT) == 0
-        assert time.monotonic() - began < END_LIMIT
-
-        eventually(lambda: light.fake.fields['enable'] == 0)
 
 
 def test_shutdown_covers_lights_that_have_no_node_yet_and_names_each(
@@ -115,17 +72,6 @@ def in_real_time(own_ros: Ros, port: int) -> Iterator[Program]:
         yield bridge
 
 
-def test_fifty_requests_at_once_are_all_answered(own_ros: Ros, in_real_time: Program) -> None:
-    clients = [own_ros.node.create_client(SetBool, '/illuminator/enable') for _ in range(50)]
-    for client in clients:
-        eventually(client.service_is_ready)
-    assert own_ros.enable().success
-
-    calls = [Call(client.call_async(SetBool.Request(data=True))) for client in clients]
-
-    assert all(call.result().message for call in calls)
-
-
 def test_refreshes_beyond_the_limit_are_refused_at_once(
     own_ros: Ros, in_real_time: Program,
 ) -> None:
@@ -152,17 +98,6 @@ def test_long_list_of_names_gets_an_empty_answer(
 
     assert not any(getattr(answer, field) for field in answer.get_fields_and_field_types())
     assert own_ros.enable().success
-
-
-def test_best_effort_publisher_of_a_command_is_heard(
-    own_ros: Ros, served: tuple[Program, ServedLight],
-) -> None:
-    publisher = own_ros.node.create_publisher(Bool, '/illuminator/cmd/enable', BEST_EFFORT)
-    eventually(publisher.get_subscription_count)
-
-    eventually(lambda: publisher.publish(Bool(data=True)) or served[1].commands(ON_OFF))
-
-    served[0].wait_for('light 1/243 was switched on by topic')
 
 
 def test_second_bridge_of_the_same_name_is_noticed(own_ros: Ros, port: int) -> None:

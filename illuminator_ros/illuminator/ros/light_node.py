@@ -179,6 +179,8 @@ class LightNode:
         self, changes: Mapping[str, Any], now: float, answer: Callable[[str], None],
     ) -> None:
         def done(result: Result, now: float) -> None:
+            if result.note:
+                self._log.info(f'light {self.address}: {result.note}', 'note')
             answer('' if result.success else result.message)
 
         light = self._light()

@@ -156,7 +156,7 @@ class Lights(ServedPayload):
         if lights:
             enable_all(lights, request.data, now,
                        lambda result, now: answer(result.success, result.message),
-                       name=self._name_of)
+                       name=self._name_of, detail='enable_all')
         else:
             answer(False, self._first.absence(now))
 
