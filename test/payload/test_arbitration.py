@@ -1,0 +1,147 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which source may command a device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+from hypothesis import given, strategies
+from illuminator_ros.payload.arbitration import Arbiter, Cause, HolderChanged, Policy
+import pytest
+
+LEASE = 3.0
+RANKS = {'high': 0, 'middle': 1, 'low': 2}
+HOLD, PRIORITY, TAKEOVER = Policy
+
+
+def arbiter(policy: Policy, *, remembers: bool = False, overruling: str = '') -> Arbiter[str]:
+    return Arbiter(policy, RANKS.__getitem__, lease=LEASE, remembers=remembers,
+                   overruling={overruling})
+
+
+# The holder after a claim of 'middle', by policy and by the holder before.
+CLAIMS = {
+    (HOLD, None): 'middle', (PRIORITY, None): 'middle', (TAKEOVER, None): 'middle',
+    (HOLD, 'middle'): 'middle', (PRIORITY, 'middle'): 'middle', (TAKEOVER, 'middle'): 'middle',
+    (HOLD, 'low'): 'low', (PRIORITY, 'low'): 'middle', (TAKEOVER, 'low'): 'middle',
+    (HOLD, 'high'): 'high', (PRIORITY, 'high'): 'high', (TAKEOVER, 'high'): 'middle',
+}
+
+
+@pytest.mark.parametrize('remembers', [False, True])
+@pytest.mark.parametrize(('policy', 'holder'), CLAIMS)
+def test_a_claim_moves_the_device_as_the_policy_says(
+        policy: Policy, holder: str | None, remembers: bool) -> None:
+    one = arbiter(policy, remembers=remembers)
+    if holder:
+        one.claim(holder, 0.0)
+
+    change = one.claim('middle', 1.0)
+
+    after = CLAIMS[policy, holder]
+    assert one.holder == after
+    assert change == (None if after == holder else HolderChanged(holder, after, Cause.CLAIM))
+    assert one.since == (0.0 if change is None else 1.0)
+
+
+@pytest.mark.parametrize('policy', Policy)
+def test_an_overruling_source_takes_the_device_under_each_policy(policy: Policy) -> None:
+    one = arbiter(policy, overruling='low')
+    one.claim('high', 0.0)
+
+    assert one.claim('low', 1.0) == HolderChanged('high', 'low', Cause.CLAIM)
+
+
+def test_priority_does_not_take_the_device_from_an_overruling_source() -> None:
+    one = arbiter(PRIORITY, overruling='low')
+    one.claim('low', 0.0)
+
+    assert one.claim('high', 1.0) is None
+    assert one.holder == 'low'
+
+
+# How a claim ends: what happens to the arbiter in which 'high' holds.
+ENDS: dict[Cause, Callable[[Arbiter[str]], HolderChanged[str] | None]] = {
+    Cause.RELEASE: lambda one: one.release('high', 2.5),
+    Cause.SILENCE: lambda one: one.poll(LEASE),
+}
+
+
+@pytest.mark.parametrize(('cause', 'end'), ENDS.items())
+@pytest.mark.parametrize(('remembers', 'after'), [(False, None), (True, 'middle')])
+def test_the_highest_remembered_claim_follows_when_the_holders_claim_ends(
+        cause: Cause, end: Callable[[Arbiter[str]], HolderChanged[str] | None],
+        remembers: bool, after: str | None) -> None:
+    one = arbiter(PRIORITY, remembers=remembers)
+    one.claim('high', 0.0)
+    one.claim('low', 1.0)
+    one.claim('middle', 2.0)
+
+    assert end(one) == HolderChanged('high', after, cause)
+    assert one.holder == after
+
+
+@pytest.mark.parametrize('renewed', [False, True])
+def test_a_sign_of_life_of_the_holder_extends_its_lease(renewed: bool) -> None:
+    one = arbiter(HOLD)
+    one.claim('low', 0.0)
+    if renewed:
+        one.renew('low', 2.0)
+
+    one.poll(LEASE)
+
+    assert one.holder == ('low' if renewed else None)
+
+
+@pytest.mark.parametrize('act', [
+    lambda one: one.renew('high', 1.0), lambda one: one.release('high', 1.0),
+    lambda one: one.poll(1.0)], ids=['renew', 'release', 'poll'])
+def test_nothing_but_a_claim_gives_a_source_the_device(
+        act: Callable[[Arbiter[str]], object]) -> None:
+    one = arbiter(HOLD)
+    one.claim('low', 0.5)
+
+    act(one)
+
+    assert one.holder == 'low'
+
+
+@given(strategies.sampled_from(Policy), strategies.booleans(), strategies.lists(strategies.tuples(
+    strategies.sampled_from(['claim', 'renew', 'release', 'poll']),
+    strategies.sampled_from(list(RANKS)), strategies.floats(0, 4)), max_size=40))
+def test_the_holder_has_claimed_and_neither_released_nor_been_silent(
+        policy: Policy, remembers: bool, steps: list[tuple[str, str, float]]) -> None:
+    one = arbiter(policy, remembers=remembers)
+    heard: dict[str, float] = {}
+    now = 0.0
+    for kind, source, pause in steps:
+        now += pause
+        one.poll(now)
+        heard = {name: at for name, at in heard.items() if now < at + LEASE}
+        if kind == 'claim':
+            one.claim(source, now)
+            heard[source] = now
+        elif kind == 'renew':
+            one.renew(source, now)
+            heard |= {source: now} if source in heard else {}
+        elif kind == 'release':
+            one.release(source, now)
+            heard.pop(source, None)
+        assert one.holder is None or one.holder in heard
+        if policy is PRIORITY and remembers:
+            assert one.holder == min(heard, key=RANKS.__getitem__, default=None)
+        assert one.next_deadline() > now or math.isinf(one.next_deadline())
