@@ -28,6 +28,8 @@ from .events import (
     Cause,
     ConfigurationChanged,
     ConfigurationRestored,
+    LimitExceeded,
+    SetpointClipped,
     SetpointFailed,
 )
 from .model import (
@@ -37,10 +39,11 @@ from .model import (
     InvalidValue,
     Limits,
     NOTHING,
+    SafetyLimits,
     Status,
     unexpected_differences,
 )
-from ..payload.events import RateLimit
+from ..payload.events import RateLimit, RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
 # s; rqt_reconfigure gives up after 1.0 s, and a set must have answered by then.
@@ -56,6 +59,10 @@ DEFAULT_DUTY_CYCLE = 50.0
 # s after a command of ours in which a light may show what it asks for, and what it implies.
 LATE_TIME = 30.0
 IMPLIED_TIME = 2.0
+# s between two commands that undo a change by another sender.
+REPEAT_INTERVAL = 2.0
+# s between two log lines on setpoints beyond a limit.
+CLIP_INTERVAL = 5.0
 # s between two log lines on changes by other senders.
 REPORT_INTERVAL = 1.0
 
@@ -65,12 +72,13 @@ class Origin(Enum):
 
     OVERRIDE = 'override'
     RESTART = 'restart'
+    LIMIT = 'limit'
 
 
 @dataclass
 class Pending:
     """
-    Values to be sent: overrides, or a configuration that a restart has undone.
+    Values to be sent: overrides, or what a restart or another sender has undone.
 
     :param attempts: how often the light has accepted them and shown others.
     :param due: when they are sent next, s.
@@ -98,15 +106,17 @@ class ConfigurationManager:
     Keeps one light configured.
 
     :param emit: takes the events.
+    :param limits: hold for each command that is sent.
     :ivar confirmed: the configuration that was last accepted from us or, where another sender
         has changed it since, reported; None before the first status.
     :ivar discrepancy: how the light differs from a configuration that it has accepted, ''
         if it does not.
+    :ivar limit_exceeded: how the light differs from the limits.
     """
 
     def __init__(
-        self, target: Target, emit: Callable[[AnyLightEvent], None], *, instance: int = 0,
-        restore: bool = True,
+        self, target: Target, emit: Callable[[AnyLightEvent], None], *,
+        limits: SafetyLimits, instance: int = 0, restore: bool = True,
     ) -> None:
         self.confirmed: Configuration | None = None
         self.discrepancy = ''
@@ -115,6 +125,11 @@ class ConfigurationManager:
         self._emit = emit
         self._instance = instance
         self._restore = restore
+        self._safety = limits
+        self._is_limited = limits != SafetyLimits()
+        self.limit_exceeded = LimitExceeded(target.address, (), '')
+        self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
+        self._clipping = RateLimit(CLIP_INTERVAL)
         self._queue: RequestQueue[Status] = RequestQueue(target)
         self._status: Status | None = None
         self._shared_address = False
@@ -160,6 +175,8 @@ class ConfigurationManager:
         """
         try:
             values = self._checked(changes)
+            for name, value in values.items():
+                self._safety.check(name, value)
             self._goal(values)
         except InvalidValue as error:
             done(Result(False, str(error), permanent=True), now)
@@ -174,6 +191,12 @@ class ConfigurationManager:
 
     def set_brightness(self, brightness: float, now: float) -> None:
         """Take a setpoint of a stream, %, checked; the light is connected."""
+        try:
+            self._safety.check('brightness', brightness)
+        except InvalidValue as error:
+            brightness = self._safety.max_brightness
+            if (left_out := self._clipping.take(now)) is not None:
+                self._emit(SetpointClipped(self._address, str(error), left_out))
         current = self._queue.current
         if (current is not None and current.is_stream and not current.is_finished
                 and isinstance(current.change, Configure)
@@ -192,6 +215,13 @@ class ConfigurationManager:
         """
         self._want({**(self._pending.values if self._pending else {}), **values},
                    self._pending.origin if self._pending else Origin.OVERRIDE, now)
+
+    def _undo(self, values: Mapping[str, Any], origin: Origin, due: float) -> None:
+        """Have values sent that another sender has changed, after those that already wait."""
+        pending = self._pending
+        self._pending = Pending(
+            {**values, **(pending.values if pending else {})},
+            pending.origin if pending else origin, due)
 
     def _want(self, values: dict[str, Any], origin: Origin, now: float) -> None:
         wait = 0.0 if self.confirmed else STATUS_TIMEOUT
@@ -235,7 +265,10 @@ class ConfigurationManager:
                 note = ('strobe_duty_cycle was 0 %, at which nothing strobes, and was set to '
                         f'{DEFAULT_DUTY_CYCLE:g} %')
             goal = self._sendable(self.confirmed, values).with_changes(values)
-        return Configure(goal, list(values), self._instance, note)
+        # Here, since each command is made here: no way to the light passes around the limits.
+        limited = self._safety.clipped(goal, self._limits)
+        return Configure(limited, list(dict.fromkeys((*values, *goal.differences(limited)))),
+                         self._instance, note)
 
     def _sendable(
         self, confirmed: Configuration, changes: Mapping[str, Any],
@@ -319,6 +352,16 @@ class ConfigurationManager:
         if was_changing or self.confirmed is None and not status.complete:
             return
         reported = status.configuration(self.confirmed or NOTHING)
+        self._take_configuration(
+            report, reported, now, can_follow=can_follow, switched_at=switched_at)
+        if self._is_limited:
+            self._keep_limits(reported, now)
+
+    def _take_configuration(
+        self, report: Report[Status], reported: Configuration, now: float, *, can_follow: bool,
+        switched_at: float,
+    ) -> None:
+        status = report.status
         if self._unapplied and not unexpected_differences(
                 self._unapplied, reported, status.error_flags, step=True):
             self._applied()
@@ -326,7 +369,7 @@ class ConfigurationManager:
             self._adopt(reported, Cause.FIRST_STATUS, now)
             if self._pending:
                 self._pending.due = min(self._pending.due, now)
-        elif self._pending and self._pending.origin is Origin.RESTART:
+        elif self._pending and self._pending.origin is not Origin.OVERRIDE:
             wanted = self.confirmed.with_changes(self._pending.values)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
                 # It kept its configuration, or got it back from another sender.
@@ -383,6 +426,19 @@ class ConfigurationManager:
             cause = Cause.REQUEST if own else Cause.LIGHT
         self._adopt(confirmed.with_changes({name: getattr(reported, name) for name in names}),
                     cause, now)
+
+    def _keep_limits(self, reported: Configuration, now: float) -> None:
+        """Bring a light that exceeds a limit back within it, once."""
+        exceeded = LimitExceeded(self._address, self._safety.excess(reported),
+                                 self._safety.impossible(self._limits))
+        if exceeded != self.limit_exceeded:
+            self.limit_exceeded = exceeded
+            self._emit(exceeded)
+        if exceeded.excess and self._pending is None and (
+                due := self._limiting.take(now)) is not None:
+            limited = self._safety.clipped(reported, self._limits)
+            self._undo({name: getattr(limited, name) for name in reported.differences(limited)},
+                       Origin.LIMIT, due)
 
     def _is_own(
         self, name: str, reported: Configuration, switched_at: float, now: float,

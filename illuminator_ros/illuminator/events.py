@@ -143,6 +143,27 @@ class SetpointFailed(LightEvent):
 
 
 @dataclass(frozen=True)
+class SetpointClipped(LightEvent):
+    """A setpoint of a stream was beyond a limit, and is sent as that limit."""
+
+    message: str
+    left_out: int
+
+
+@dataclass(frozen=True)
+class LimitExceeded(LightEvent):
+    """
+    A light reports values beyond the limits that the operator has set.
+
+    :param excess: what exceeds which limit, for people; empty once nothing does.
+    :param impossible: why the light cannot strobe within the limits, '' if it can.
+    """
+
+    excess: tuple[str, ...]
+    impossible: str
+
+
+@dataclass(frozen=True)
 class LightSwitched(LightEvent):
     """
     A light was switched on or off.
@@ -168,6 +189,7 @@ class LightSnapshot:
     :param status_interval: s between statuses that the light was asked for, 0 for its own rate.
     :param configuration: as confirmed, None before the first status.
     :param discrepancy: how the light differs from what it has accepted, '' if it does not.
+    :param limit_exceeded: how it differs from the limits that the operator has set.
     :param identity_is_settled: whether the identity is known, or will not be known soon.
     :param unreachable: why requests cannot reach the light, '' if they can.
     """
@@ -182,6 +204,7 @@ class LightSnapshot:
     temperature: float | None
     configuration: Configuration | None
     discrepancy: str
+    limit_exceeded: LimitExceeded
     identity: Identity | None
     identity_is_settled: bool
     shared_address: bool

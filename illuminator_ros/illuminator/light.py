@@ -36,7 +36,7 @@ from .events import (
     StatusReceived,
 )
 from .messages import STATUS_ID
-from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, Status
+from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
 from .status import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
@@ -61,11 +61,13 @@ class Settings:
     :param status_interval: s, >= 0, between statuses to ask the light for; 0 leaves its own.
     :param restore_configuration: whether a light that has restarted gets its confirmed
         configuration again.
+    :param limits: hold for everything that is sent.
     """
 
     heartbeat_timeout: float = 3.0
     status_interval: float = 0.0
     restore_configuration: bool = True
+    limits: SafetyLimits = SafetyLimits()
 
 
 class Light:
@@ -109,7 +111,8 @@ class Light:
             status_name='ILLUMINATOR_STATUS')
         self._identity_query = IdentityQuery(self._target)
         self._configuration = ConfigurationManager(
-            self._target, emit, instance=instance, restore=settings.restore_configuration)
+            self._target, emit, limits=settings.limits, instance=instance,
+            restore=settings.restore_configuration)
         self._switching: RequestQueue[Status] = RequestQueue(self._target)
         self._tracker = StatusTracker()
         self._measures_temperature = False
@@ -272,6 +275,7 @@ class Light:
             self.address, self.connected, self.heard_at, self.status, self.status_at,
             self.settings.status_interval, self.restarts, self.temperature,
             self._configuration.confirmed, self._configuration.discrepancy,
+            self._configuration.limit_exceeded,
             self._identity_query.identity, self._identity_query.is_settled(now),
             self._tracker.conflict.detected, self.unreachable(now))
 

@@ -229,6 +229,60 @@ def _check_period(period: float, limits: Limits | None) -> None:
             f'{shortest(limits.min_strobe_period):g} to {shortest(limits.max_strobe_period):g} s')
 
 
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """
+    Limits that the operator sets for the people around a light.
+
+    :param max_brightness: %, 0..100.
+    :param min_strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`; 0 for no limit.
+    """
+
+    max_brightness: float = 100.0
+    min_strobe_period: float = 0.0
+
+    def check(self, name: str, value: Any) -> None:
+        """
+        Check the value of a field that :func:`checked` has returned.
+
+        :raises InvalidValue: if it is beyond a limit.
+        """
+        if excess := self._excess(name, value):
+            raise InvalidValue(excess)
+
+    def _excess(self, name: str, value: Any) -> str:
+        if name == 'brightness' and value > self.max_brightness:
+            return f'brightness {value:g} % is above max_brightness {self.max_brightness:g} %'
+        if name == 'strobe_period' and 0 < float32(value) < float32(self.min_strobe_period):
+            return (f'strobe_period {value:g} s is below min_strobe_period '
+                    f'{self.min_strobe_period:g} s')
+        return ''
+
+    def clipped(self, configuration: Configuration, limits: Limits) -> Configuration:
+        """
+        Return the configuration within the limits that is nearest to another one.
+
+        :param limits: those of the light; where these exclude each other it does not strobe.
+        """
+        brightness = min(configuration.brightness, self.max_brightness)
+        period = configuration.strobe_period
+        if self._excess('strobe_period', period):
+            period = 0.0 if self.impossible(limits) else self.min_strobe_period
+        return replace(configuration, brightness=brightness, strobe_period=period)
+
+    def excess(self, configuration: Configuration) -> tuple[str, ...]:
+        """Describe how a configuration exceeds the limits by more than a light's own steps."""
+        return tuple(self._excess(name, getattr(configuration, name)) for name
+                     in configuration.differences(self.clipped(configuration, Limits())))
+
+    def impossible(self, limits: Limits) -> str:
+        """Describe why a light cannot strobe within the limits, '' if it can."""
+        if not limits.known or float32(self.min_strobe_period) <= limits.max_strobe_period:
+            return ''
+        return (f'min_strobe_period {self.min_strobe_period:g} s is above the '
+                f'{shortest(limits.max_strobe_period):g} s that the light can do')
+
+
 @dataclass(slots=True)
 class Status:
     """

@@ -39,6 +39,36 @@ class Listeners(Generic[E]):
             listener(event)
 
 
+class RepeatLimit:
+    """
+    Limits how often a change by another sender is undone.
+
+    Two programs that both insist would otherwise make a light flash.
+
+    :param times: how often in a row; a row ends after :attr:`row_time` s without a change.
+    :param interval: s between two of a row.
+    """
+
+    row_time = 30.0
+
+    def __init__(self, times: int, interval: float) -> None:
+        self._times = times
+        self._interval = interval
+        self._last = -math.inf
+        self._count = 0
+
+    def take(self, now: float) -> float | None:
+        """Return when a change may be undone, s; None if it must be left as it is."""
+        if now >= self._last + self.row_time:
+            self._count = 0
+        if self._count >= self._times:
+            self._last = now
+            return None
+        self._count += 1
+        self._last = max(now, self._last + self._interval)
+        return self._last
+
+
 class RateLimit:
     """
     Limits how often something that a peer can trigger is reported.

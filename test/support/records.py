@@ -55,6 +55,7 @@ class Recorder:
     changed_at: list[float] = field(default_factory=list)
     failed_setpoints: list[str] = field(default_factory=list)
     failed_at: list[float] = field(default_factory=list)
+    others: list[AnyLightEvent] = field(default_factory=list)
 
     def __call__(self, event: AnyLightEvent) -> None:
         match event:
@@ -77,6 +78,8 @@ class Recorder:
             case SetpointFailed():
                 self.failed_at.append(self.clock())
                 self.failed_setpoints.append(event.message)
+            case _:
+                self.others.append(event)
 
 
 @dataclass

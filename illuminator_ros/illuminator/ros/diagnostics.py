@@ -116,6 +116,9 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[Finding]:
     if light.shared_address:
         findings.append((WARN, f'several lights answer as {light.address}: their statuses '
                                'contradict one another'))
+    if light.limit_exceeded.impossible:
+        findings.append((ERROR, light.limit_exceeded.impossible))
+    findings += [(WARN, text) for text in light.limit_exceeded.excess]
     if light.discrepancy:
         findings.append((WARN, light.discrepancy))
     return findings

@@ -27,12 +27,12 @@ from std_srvs.srv import SetBool, Trigger
 
 from .beam import BeamPublisher
 from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
-from .parameters import BeamGeometry, DEVICE_PARAMETERS
+from .parameters import BeamGeometry, device_parameters
 from .publishers import LightPublishers, PUBLICATIONS
 from ..client import IlluminatorClient
 from ..events import AnyLightEvent
 from ..light import Light
-from ..model import checked, InvalidValue
+from ..model import checked, InvalidValue, SafetyLimits
 from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
@@ -76,8 +76,9 @@ class LightNode:
         self._started = host.link.clock()
         self._hardware_id = ''
         self._switching = LatestOnly(self._switch)
-        parameters = DeviceParameters(node, DEVICE_PARAMETERS)
-        self._overrides = _checked(parameters.overrides())
+        limits = client.settings.limits
+        parameters = DeviceParameters(node, device_parameters(limits))
+        self._overrides = _checked(parameters.overrides(), limits)
         interface = NodeInterface(
             node, host.link, log, publications=PUBLICATIONS,
             services=(
@@ -92,7 +93,7 @@ class LightNode:
         ParameterServices(
             node, host.link, log, parameters, self._check_value, self._configure)
         self._publishers = LightPublishers(
-            node, interface, parameters, log, frame_id=geometry.frame_id,
+            node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
             check_diagnostics=host.check_diagnostics)
         self._beam = BeamPublisher(node, geometry) if geometry.beam_range else None
         self.source = DiagnosticsSource(self.name, self.full_name, self._look)
@@ -173,7 +174,8 @@ class LightNode:
     # The value of a parameter is of any type.
     def _check_value(self, name: str, value: Any) -> None:
         light = self._light()
-        checked(name, value, light.limits if light else None)
+        self._client.settings.limits.check(
+            name, checked(name, value, light.limits if light else None))
 
     def _configure(
         self, changes: Mapping[str, Any], now: float, answer: Callable[[str], None],
@@ -207,8 +209,12 @@ class LightNode:
         return LightsHeard(len(client.lights), tuple(some), client.limit_reached)
 
 
-def _checked(overrides: Mapping[str, Any]) -> dict[str, Any]:
+def _checked(overrides: Mapping[str, Any], limits: SafetyLimits) -> dict[str, Any]:
     try:
-        return {name: checked(name, value) for name, value in overrides.items()}
+        values: dict[str, Any] = {
+            name: checked(name, value) for name, value in overrides.items()}
+        for name, value in values.items():
+            limits.check(name, value)
+        return values
     except InvalidValue as error:
         raise ParameterError(str(error)) from None

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import re
 import reprlib
 from typing import Any
@@ -25,7 +25,7 @@ from typing import Any
 from rclpy.node import Node
 
 from ..light import Settings
-from ..model import MAX_STROBE_PERIOD, MODES
+from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ...mavlink.messages import Address
 from ...ros.parameters import declare_read_only, given_parameters, ParameterError, ParameterSpec
 
@@ -48,6 +48,11 @@ LIGHT_PARAMETERS = (
     ParameterSpec('off_on_shutdown', False, 'switch the lights off when the node ends'),
     ParameterSpec('restore_configuration', True,
                   'configure a light that has restarted as it was before'),
+    ParameterSpec('max_brightness', 100.0, 'limit of the brightness that is sent', '%', 0.0,
+                  100.0),
+    ParameterSpec('min_strobe_period', 0.0,
+                  'limit of the strobe period that is sent; 0 = none', 's', 0.0,
+                  MAX_STROBE_PERIOD),
 )
 
 DEVICE_PARAMETERS = (
@@ -102,7 +107,20 @@ def ignored_parameters(node: Node, first: Node) -> list[str]:
 def settings(values: Mapping[str, Any]) -> Settings:
     """Return how lights are treated."""
     return Settings(values['heartbeat_timeout'], values['status_interval'],
-                    values['restore_configuration'])
+                    values['restore_configuration'],
+                    SafetyLimits(values['max_brightness'], values['min_strobe_period']))
+
+
+def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
+    """Return the parameters of a light, with limits in their descriptions."""
+    notes = {}
+    if limits.max_brightness < 100.0:
+        notes['brightness'] = f'at most {limits.max_brightness:g} %, which is max_brightness'
+    if limits.min_strobe_period:
+        notes['strobe_period'] = (f'0 = no strobe, else at least {limits.min_strobe_period:g} s, '
+                                  'which is min_strobe_period, and within what the light reports')
+    return tuple(replace(spec, constraints=notes.get(spec.name, spec.constraints))
+                 for spec in DEVICE_PARAMETERS)
 
 
 class Selection:

@@ -35,11 +35,21 @@ from ..events import (
     LightLost,
     LightRestarted,
     LightSwitched,
+    LimitExceeded,
     Origin,
+    SetpointClipped,
     SetpointFailed,
     StatusReceived,
 )
-from ..model import Configuration, Limits, MAX_STROBE_PERIOD, Mode, shortest, Status
+from ..model import (
+    Configuration,
+    Limits,
+    MAX_STROBE_PERIOD,
+    Mode,
+    SafetyLimits,
+    shortest,
+    Status,
+)
 from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.log import NodeLog
@@ -74,7 +84,7 @@ class LightPublishers:
 
     def __init__(
         self, node: Node, interface: NodeInterface, parameters: DeviceParameters, log: NodeLog, *,
-        frame_id: str, check_diagnostics: Callable[[], None],
+        limits: SafetyLimits, frame_id: str, check_diagnostics: Callable[[], None],
     ) -> None:
         self._clock = node.get_clock()
         self._interface = interface
@@ -83,6 +93,7 @@ class LightPublishers:
         self._frame_id = frame_id
         self._check_diagnostics = check_diagnostics
         self._identity: object = None
+        self._max_brightness = limits.max_brightness
         self._limits = Limits()
         self._condition: tuple[object, ...] = ()
         self._shared = False
@@ -98,6 +109,8 @@ class LightPublishers:
             ConfigurationChanged: self._configuration_changed,
             ConfigurationRestored: self._configuration_restored,
             SetpointFailed: self._setpoint_failed,
+            SetpointClipped: self._setpoint_clipped,
+            LimitExceeded: self._limit_exceeded,
         }
         interface.publish('connected', False)
 
@@ -175,11 +188,15 @@ class LightPublishers:
                            'changed')
         if 'strobe_period' in names:
             self._fit(configuration.strobe_period)
+        if 'brightness' in names:
+            self._fit_brightness(configuration.brightness)
         reason = self._parameters.show({name: _value(configuration, name) for name in names})
         if reason:
             self._log.error(f'cannot update parameters from status: {reason}', 'parameters')
         if 'strobe_period' in names:
             self._fit(0.0)
+        if 'brightness' in names:
+            self._fit_brightness(0.0)
         self._check_diagnostics()
 
     def _configuration_restored(self, event: ConfigurationRestored) -> None:
@@ -192,6 +209,23 @@ class LightPublishers:
 
     def _setpoint_failed(self, event: SetpointFailed) -> None:
         self._log.warning(f'~/cmd/brightness: {event.message}', 'setpoint')
+
+    def _setpoint_clipped(self, event: SetpointClipped) -> None:
+        self._log.warning(f'~/cmd/brightness: {event.message}: the limit is sent'
+                          f'{_left_out(event.left_out)}', 'clipped')
+
+    def _limit_exceeded(self, event: LimitExceeded) -> None:
+        if event.impossible:
+            self._log.error(f'light {event.address}: {event.impossible}', 'impossible limit')
+        if event.excess:
+            self._log.warning(f'light {event.address}: {", ".join(event.excess)}',
+                              'limit exceeded')
+        self._check_diagnostics()
+
+    def _fit_brightness(self, brightness: float) -> None:
+        """Show the limit of the brightness, or more where the light shines brighter."""
+        if self._max_brightness < 100.0:
+            self._parameters.set_high('brightness', max(self._max_brightness, brightness))
 
     def _fit(self, period: float) -> None:
         """

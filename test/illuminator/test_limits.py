@@ -1,0 +1,132 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""``max_brightness`` and ``min_strobe_period`` hold for each frame that is sent."""
+
+from dataclasses import replace
+
+from hypothesis import given, settings, strategies
+from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.model import FIELDS, float32, SafetyLimits
+from illuminator_ros.mavlink.messages import MavCmd
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
+from support.faulty_wire import Faults
+
+CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
+LIMITS = SafetyLimits(max_brightness=60.0, min_strobe_period=0.34)
+LIMITED = Settings(limits=LIMITS)
+percent = strategies.floats(0, 100)
+period = strategies.one_of(strategies.just(0.0), strategies.floats(0.01, 2))
+EXCEEDED = ('brightness 80 % is above max_brightness 60 %',
+            'strobe_period 0.1 s is below min_strobe_period 0.34 s')
+
+
+def limited(**fields: object) -> tuple[FakeLight, Pair]:
+    """Return a light and a client with limits that know each other."""
+    light = FakeLight(**{'min_strobe_period': 0.01, 'max_strobe_period': 5.0, **fields})
+    return light, Pair(light, settings=LIMITED).settle()
+
+
+def assert_within_limits(pair: Pair) -> None:
+    for command in pair.commands(CONFIGURE):
+        assert float32(command.param2) <= float32(60.0)
+        assert command.param3 == 0 or float32(command.param3) >= float32(0.34)
+
+
+@settings(max_examples=60, deadline=None)
+@given(strategies.lists(strategies.tuples(
+    strategies.sampled_from(['configure', 'stream', 'override', 'restart', 'other sender']),
+    percent, period, strategies.floats(0, 3)), max_size=12), strategies.integers(0, 99))
+def test_limits_hold_for_each_frame_on_the_wire(
+        steps: list[tuple[str, float, float, float]], seed: int) -> None:
+    pair = Pair(there=Faults(drop=0.3, duplicate=0.2, delay=0.2), settings=LIMITED, seed=seed)
+    pair.run_until(lambda: pair.controller.lights)
+    for way, brightness, strobe_period, pause in steps:
+        if way == 'configure':
+            pair.ask_configure(strobe_period=strobe_period)
+            pair.ask_configure(brightness=brightness, strobe_duty_cycle=10.0)
+        elif way == 'stream':
+            pair.light.set_brightness(brightness, pair.now)
+        elif way == 'override':
+            pair.light.set_desired(
+                {'brightness': brightness, 'strobe_period': strobe_period}, pair.now)
+        elif way == 'restart':
+            pair.device.restart(pair.now)
+        else:
+            pair.lamp.configuration = replace(
+                pair.lamp.configuration, brightness=brightness, strobe_period=strobe_period)
+        pair.run(pause)
+    pair.run(5.0)
+
+    assert_within_limits(pair)
+
+
+@pytest.mark.parametrize(('change', 'reason'), [
+    ({'brightness': 60.1}, 'brightness 60.1 % is above max_brightness 60 %'),
+    ({'strobe_period': 0.33}, 'strobe_period 0.33 s is below min_strobe_period 0.34 s'),
+    ({'brightness': 60.0, 'strobe_period': 0.34}, '')])
+def test_a_value_beyond_a_limit_is_refused_with_the_limits_name(
+        change: dict[str, float], reason: str) -> None:
+    _, pair = limited(brightness=50.0)
+
+    result = pair.configure(**change)
+
+    assert (result.success, result.message) == (False, reason) if reason else result.success
+
+
+def test_a_stream_beyond_a_limit_is_clipped_with_one_warning_for_many_setpoints() -> None:
+    _, pair = limited(brightness=50.0)
+
+    for _ in range(20):
+        pair.light.set_brightness(90.0, pair.now)
+        pair.run(0.1)
+
+    assert {command.param2 for command in pair.commands(CONFIGURE)} == {60.0}
+    assert len([one for one in pair.recorder.others if isinstance(one, SetpointClipped)]) == 1
+
+
+def test_a_light_beyond_the_limits_is_reported_and_brought_back_once() -> None:
+    light, pair = limited(brightness=80.0, strobe_period=0.1, strobe_duty_cycle=10.0)
+    assert [(one.param2, one.param3) for one in pair.commands(CONFIGURE)] == [(60.0, 0.34)]
+    assert pair.snapshot.limit_exceeded.excess == ()
+
+    light.fields |= {'brightness': 80.0, 'strobe_period': 0.1}
+    pair.run(60.0)
+
+    assert len(pair.commands(CONFIGURE)) == 1
+    assert pair.snapshot.limit_exceeded.excess == EXCEEDED
+    assert [one.excess for one in pair.recorder.others if isinstance(one, LimitExceeded)] == [
+        EXCEEDED, (), EXCEEDED]
+
+
+def test_a_limit_above_what_the_light_can_do_is_reported_and_the_light_does_not_strobe() -> None:
+    _, pair = limited(strobe_period=0.1, max_strobe_period=0.2, strobe_duty_cycle=10.0)
+
+    assert pair.snapshot.limit_exceeded.impossible == (
+        'min_strobe_period 0.34 s is above the 0.2 s that the light can do')
+    assert [command.param3 for command in pair.commands(CONFIGURE)] == [0.0]
+
+
+def test_a_complete_set_of_overrides_for_a_light_without_statuses_is_clipped() -> None:
+    light = FakeLight(stream=0.0)
+    light.answers.clear()
+    pair = Pair(light, settings=LIMITED).settle()
+    pair.light.set_desired(dict(zip(FIELDS, ('internal_control', 90.0, 0.1, 10.0), strict=True)),
+                           pair.now)
+    pair.run(5.0)
+
+    assert pair.commands(CONFIGURE)
+    assert_within_limits(pair)
