@@ -146,7 +146,8 @@ class Bridge:
         thread, once.
         """
         self._ended.set()
-        self._shut_down_devices()
+        if self.link.is_running():
+            self._shut_down_devices()
         self.link.stop(STOP_LIMIT)
         self._closed.set()
         self._wake.set()

@@ -110,7 +110,7 @@ class LinkSnapshot:
 
 def link_snapshot(link: Link, component: Component, url: str, now: float) -> LinkSnapshot:
     """Return a snapshot of the link; call it in the link's thread."""
-    state = link.state()
+    state = link.snapshot(now)
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
     commands = component.commands
     devices: dict[Address, Mapping[str, Value]] = {}

@@ -112,7 +112,9 @@ def test_requests_in_progress_do_not_delay_it(own_ros: Ros, port: int) -> None:
         assert_ends(program)
 
         assert_goes_off(light)
-        assert [command.param1 for command in light.commands(ON_OFF)] == [1.0, 0.0]
+        # An OFF whose acknowledgement may be that of the ON is sent again.
+        on, *off = [command.param1 for command in light.commands(ON_OFF)]
+        assert (on, set(off)) == (1.0, {0.0})
 
 
 def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
