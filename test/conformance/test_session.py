@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
-from illuminator_ros.payload.checks.history import LIMIT
+from illuminator_ros.payload.checks.session import MAX_ENTRIES
 import pytest
 from support.conformance_run import Run, TESTER
 
@@ -94,7 +94,7 @@ def test_a_flood_from_the_light_takes_a_bounded_memory() -> None:
     session.runner.run(command())
     tracemalloc.start()
     try:
-        before = receive(3 * LIMIT)
-        assert receive(LIMIT) - before < 500_000
+        before = receive(3 * MAX_ENTRIES)
+        assert receive(MAX_ENTRIES) - before < 500_000
     finally:
         tracemalloc.stop()

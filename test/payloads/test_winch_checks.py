@@ -42,7 +42,7 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
         component.behave(winch.faults.add(component.behaviour, fault), 0.0)
     checks = WINCH.load('checks')
     session = checks.session(Address(255, 190))
-    suite = Suite(checks.tester(session, Conditions()), checks.requirements, device=checks.device)
+    suite = Suite(checks, session, Conditions(), checks.requirements)
 
     async def run() -> None:
         await session.find(10.0, 2.0)

@@ -17,11 +17,10 @@
 from __future__ import annotations
 
 from illuminator_ros.mavlink.messages import Heartbeat
-from illuminator_ros.payload.checks import command, heartbeat, whole_run
+from illuminator_ros.payload.checks import component_requirements as component
 from illuminator_ros.payload.checks import requirement as base
-from illuminator_ros.payload.checks.payload_checks import PayloadChecks
 from illuminator_ros.payload.checks.session import Session
-from illuminator_ros.payload.checks.stream import interval_requirements
+from illuminator_ros.payload.checks.specification import MESSAGES
 from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTROL, WinchStatus
 
 
@@ -50,20 +49,21 @@ class WinchTester:
         return [] if await self.length() == float(self.saved) else ['line_length']
 
 
-@base.requirement('release', 'releases line when commanded', base.MESSAGES, 'MAV_CMD_DO_WINCH',
-                  changes=True)
+@base.requirement(
+    'release', 'releases line when commanded', MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
 async def release(tester: WinchTester) -> None:
     """Release 2 m, and compare the status."""
     before = await tester.length()
     one = await tester.session.command(DO_WINCH, 1, WINCH_RELATIVE_LENGTH_CONTROL, 2.0)
     after = await tester.length()
-    base.fail_if([None if after == before + 2.0 else one.finding(f'{before} m, then {after} m')])
+    if after != before + 2.0:
+        raise one.failure(f'{before} m, then {after} m')
 
 
 REQUIREMENTS: tuple[base.Requirement[WinchTester], ...] = (
-    heartbeat.heartbeat, heartbeat.heartbeat_autopilot, command.unknown_command,
-    *interval_requirements(WinchStatus), release, *whole_run.ACKNOWLEDGEMENTS)
-CHECKS = PayloadChecks(
+    component.heartbeat, component.heartbeat_autopilot, component.unknown_command,
+    *component.interval_requirements(WinchStatus), release, *component.ACKNOWLEDGEMENTS)
+CHECKS = base.PayloadChecks(
     'winch', 'winch', (WinchStatus,),
     lambda message: isinstance(message, Heartbeat) and message.type == MAV_TYPE_WINCH,
     'HEARTBEAT with MAV_TYPE_WINCH', WinchTester, REQUIREMENTS)

@@ -64,22 +64,20 @@ class Run:
         self.light = self.lights.components[0]
         self.session = CHECKS.session(TESTER, target)
         self.link = VirtualLink(self.session, self.lights)
-        self.tester = LightTester(self.session, Conditions(
-            consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat}))
+        self._conditions = Conditions(
+            consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat})
         self._requirements = [one for one in requirements if not only or one.name in only]
         self.suite = self._suite('')
         self.session.runner.run(self._main())
 
     def _suite(self, missing: str) -> Suite[LightTester]:
-        return Suite(self.tester, self._requirements, device='light', missing=missing,
-                     no_consent=CHECKS.no_consent)
+        return Suite(CHECKS, self.session, self._conditions, self._requirements, missing)
 
     async def _main(self) -> None:
         with contextlib.suppress(Interrupted):
             await self.session.find(FIND_TIMEOUT, LISTEN_TIME)
             if self.session.found is None:
-                self.suite = self._suite(
-                    absence(self.session, 'light', CHECKS.evidence, FIND_TIMEOUT))
+                self.suite = self._suite(absence(self.session, CHECKS, FIND_TIMEOUT))
         await self.suite.run()
 
     @property

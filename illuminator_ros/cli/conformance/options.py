@@ -25,7 +25,7 @@ from ..options import add_signing, address, integer, number, Parser
 from ..payloads import PAYLOADS
 from ... import __version__
 from ...mavlink.messages import Address
-from ...payload.checks.payload_checks import PayloadChecks
+from ...payload.checks.requirement import PayloadChecks
 
 FIND_TIMEOUT = 10.0
 DEFAULT_PAYLOAD = 'illuminator'

@@ -42,9 +42,8 @@ from ...mavlink.signing import Signing
 from ...mavlink.signing_files import KeyFileError, TimestampStore
 from ...mavlink.url import parse_url, Url, UrlError
 from ...payload.checks.coroutine import Main
-from ...payload.checks.payload_checks import PayloadChecks
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
-from ...payload.checks.requirement import Conditions, Requirement, Result
+from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, Result
 from ...payload.checks.suite import absence, names, Suite
 
 # s to listen before the first command.
@@ -120,8 +119,7 @@ class Conformance:
             bool(self._announcement) and self._announce_and_ask(),
             lambda: self._link.state().decoding.crc_errors, self._own_options())
         suite = self._suite = Suite(
-            checks.tester(self._session, conditions), self._requirements, device=checks.device,
-            missing=missing, no_consent=checks.no_consent, on_result=self._show)
+            checks, self._session, conditions, self._requirements, missing, self._show)
         self._finish(suite.run())
         self._link.stop()
         self._write_line(*self._table.end())
@@ -172,16 +170,16 @@ class Conformance:
         state = self._link.state()
         if session.found is None:
             self._missing = (
-                absence(session, checks.device, checks.evidence, wait) if state.is_open
+                absence(session, checks, wait) if state.is_open
                 else f'{NOT_OPEN}{state.name}: {state.reason}')
             return
         changed = any(one.changes for one in self._requirements)
         self._announcement = [f'found {checks.device} {session.found}, which ' + (
             'the checks will change and then restore' if changed else 'stays unchanged')]
-        if others := sorted(session.devices - {session.found}):
+        if others := session.devices - {session.found}:
             self._announcement.append(
                 f'not checked: {checks.device} {names(others)}; --target selects another')
-        if others := sorted(session.heard - session.devices - {session.found}):
+        if others := session.heard - session.devices - {session.found}:
             self._announcement.append(f'also on this link: {names(others)}')
 
     def _announce_and_ask(self) -> bool:
@@ -194,7 +192,8 @@ class Conformance:
         return _is_terminal(sys.stdin) and _is_terminal(sys.stdout) and self._ask()
 
     def _ask(self) -> bool:
-        _print(self._checks.ask(self._session.device, self._own_options()), end='')
+        _print(self._checks.question.format(
+            device=self._session.device, **self._own_options()), end='')
         # Not input(), which a signal does not end.
         while not self._session.runner.interrupted:
             if select.select([sys.stdin], [], [], 0.1)[0]:
@@ -227,8 +226,7 @@ class Conformance:
         session, device = self._session, self._checks.device
         if session.found is None:
             return f'no {device}: {missing}' if missing else f'no {device}'
-        identity = self._checks.identity(session)
-        return f'{device} {session.found}' + (f': {identity}' if identity else '')
+        return f'{device} {session.found}' + (f': {session.identity}' if session.identity else '')
 
 
 def _is_terminal(stream: TextIO | None) -> bool:

@@ -16,42 +16,34 @@
 
 from __future__ import annotations
 
-from . import configuration, information, status, switch, thermal
-from .describe import describe
-from .specification import ILLUMINATOR
-from .tester import LightTester
+from . import commands, status
+from .tester import ILLUMINATOR, LightTester, status_text
 from ..messages import IlluminatorStatus
+from ..model import Status
 from ...mavlink.messages import ComponentInformationBasic, Heartbeat, MavType, Message
-from ...payload.checks import command, heartbeat, whole_run
-from ...payload.checks.payload_checks import Option, PayloadChecks
-from ...payload.checks.requirement import Requirement
-from ...payload.checks.stream import interval_requirements, stream_requirements
+from ...payload.checks import component_requirements as component
+from ...payload.checks.requirement import Option, PayloadChecks, Requirement
 
 REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
-    heartbeat.heartbeat,
-    heartbeat.heartbeat_type(MavType.ILLUMINATOR, 'an illuminator'),
-    heartbeat.heartbeat_autopilot,
-    heartbeat.address,
-    *stream_requirements(IlluminatorStatus, ILLUMINATOR, 'Message/Command/Enum Summary',
-                         'Illuminator Connection'),
+    component.heartbeat, component.heartbeat_type(MavType.ILLUMINATOR, 'an illuminator'),
+    component.heartbeat_autopilot, component.address,
+    component.status_stream(IlluminatorStatus, ILLUMINATOR, 'Message/Command/Enum Summary'),
+    component.sent_on_request(
+        'status-request', IlluminatorStatus, ILLUMINATOR, 'Illuminator Connection'),
     status.content, status.mode, status.limits, status.flags,
-    information.on_request, information.terminated, information.text,
-    command.unknown_command,
-    command.unknown_message,
-    command.broadcast(IlluminatorStatus),
-    switch.other_target, switch.command_int, switch.repeated,
-    switch.on, switch.off, switch.values,
-    configuration.internal, configuration.external, configuration.modes,
-    configuration.brightness, configuration.brightness_values,
-    configuration.strobe, configuration.strobe_limits, configuration.strobe_values,
-    configuration.duty, configuration.duty_values, configuration.not_a_number,
-    *interval_requirements(IlluminatorStatus),
-    thermal.thermal,
-    whole_run.heartbeat_rate,
-    status.uptime,
-    *whole_run.ACKNOWLEDGEMENTS,
-    status.agrees, status.unchanged,
-    whole_run.checksums,
+    component.sent_on_request(
+        'information-request', ComponentInformationBasic, ILLUMINATOR,
+        'COMPONENT_INFORMATION_BASIC', lambda session: session.identity or 'no names'),
+    *component.IDENTITY_STRINGS,
+    component.unknown_command, component.unknown_message, component.broadcast(IlluminatorStatus),
+    commands.other_target, commands.command_int, commands.repeated,
+    commands.on, commands.off, commands.on_off_values,
+    commands.internal, commands.external, commands.mode_values,
+    commands.brightness, commands.brightness_values, *commands.STROBE, commands.not_a_number,
+    *component.interval_requirements(IlluminatorStatus),
+    status.thermal,
+    component.heartbeat_rate, status.uptime, *component.ACKNOWLEDGEMENTS,
+    status.agrees, status.unchanged, component.checksums,
 )
 
 
@@ -61,11 +53,15 @@ def is_light(message: Message) -> bool:
             or isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR)
 
 
+def describe(message: Message) -> str:
+    """Return an ILLUMINATOR_STATUS in one line, '' for another message."""
+    return f'{message.name} {status_text(Status.from_message(message))}' if isinstance(
+        message, IlluminatorStatus) else ''
+
+
 CHECKS: PayloadChecks[LightTester] = PayloadChecks(
-    payload='illuminator', device='light',
-    messages=(IlluminatorStatus, ComponentInformationBasic),
-    is_device=is_light, evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS',
-    describe=describe, identity=information.describe_identity,
+    payload='illuminator', device='light', messages=(IlluminatorStatus,), is_device=is_light,
+    evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS', describe=describe,
     tester=LightTester, requirements=REQUIREMENTS,
     risk='strobe, or shine at 100 %',
     question='Some checks make light {device} strobe, and shine at 100 % for {heat:g} s. '

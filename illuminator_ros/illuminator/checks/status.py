@@ -19,13 +19,17 @@ from __future__ import annotations
 from functools import partial
 import math
 
-from .describe import status_text
-from .specification import ILLUMINATOR
-from .tester import CHANGES, LightTester
+from .tester import CONFIGURE, ILLUMINATOR, LightTester, ON_OFF, status_text
 from ..messages import IlluminatorStatus
-from ..model import flag_names, KNOWN_FLAGS, Mode, Status
-from ...payload.checks.requirement import Failed, MESSAGES, requirement, Skipped
-from ...payload.checks.whole_run import none_of
+from ..model import ErrorFlag, flag_names, KNOWN_FLAGS, Mode, Status
+from ...payload.checks.component_requirements import none_of
+from ...payload.checks.requirement import Requirement, requirement
+from ...payload.checks.session import Failed, Skipped
+from ...payload.checks.specification import MESSAGES
+
+# Smallest rise of temperature that explains a flag, K.
+STEP = 0.5
+THERMAL = (ErrorFlag.THERMAL_THROTTLING, ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
 
 reports = partial(requirement, specification=MESSAGES, section='ILLUMINATOR_STATUS')
 
@@ -100,24 +104,81 @@ async def uptime(tester: LightTester) -> str:
     return f'{passed:.1f} s in {end - begin:.1f} s'
 
 
-def _count(tester: LightTester, *, accepted: bool) -> int:
-    count = sum(one.expected and one.command in CHANGES and one.result is not None
-                and one.accepted == accepted for one in tester.session.transactions)
-    if not count:
-        raise Skipped('no change was ' + ('accepted' if accepted else 'rejected'))
-    return count
+def _compared(name: str, title: str, *, accepted: bool) -> Requirement[LightTester]:
+    """Return a requirement on the status after the accepted, or after the rejected changes."""
+    kind = 'accepted' if accepted else 'rejected'
+
+    @requirement(name, title, ILLUMINATOR, 'STATUS', whole_run=True)
+    async def check(tester: LightTester) -> str:
+        count = sum(one.expected and one.command in (ON_OFF, CONFIGURE) and one.result is not None
+                    and one.accepted == accepted for one in tester.session.transactions)
+        if not count:
+            raise Skipped(f'no change was {kind}')
+        return none_of(tester.disagreements if accepted else tester.rejected_but_applied,
+                       count, f'{kind} changes')
+    return check
 
 
-@requirement('status-agrees', 'shows every accepted change in ILLUMINATOR_STATUS', ILLUMINATOR,
-             'STATUS', whole_run=True)
-async def agrees(tester: LightTester) -> str:
-    """Count the contradictions that the tester recorded."""
-    return none_of(tester.disagreements, _count(tester, accepted=True), 'accepted changes')
+agrees = _compared(
+    'status-agrees', 'shows every accepted change in ILLUMINATOR_STATUS', accepted=True)
+unchanged = _compared(
+    'status-unchanged', 'shows no change after a rejected command', accepted=False)
 
 
-@requirement('status-unchanged', 'shows no change after a rejected command', ILLUMINATOR,
-             'STATUS', whole_run=True)
-async def unchanged(tester: LightTester) -> str:
-    """Count the changes that the tester recorded."""
-    return none_of(
-        tester.rejected_but_applied, _count(tester, accepted=False), 'rejected changes')
+@requirement('thermal-flags', 'sets thermal error flags according to its temperature', ILLUMINATOR,
+             'ILLUMINATOR_ERROR_FLAGS', needs_consent=True)
+async def thermal(tester: LightTester) -> str:
+    """Keep it at 100 % for some time, then off for as long, and compare."""
+    heat = tester.conditions.options['heat']
+    if not heat:
+        raise Skipped('disabled by --heat 0')
+    await tester.baseline()
+    start = await tester.status()
+    if start is None or start.temperature is None:
+        raise Skipped('it reports no temperature')
+    if start.error_flags & ErrorFlag.THERMISTOR_FAILURE:
+        raise Skipped('its temperature sensor has failed')
+    await tester.configure(brightness=100.0)
+    on = (await tester.switch(True)).transaction
+    if not on.accepted:
+        raise Skipped(f'it cannot be switched on: {on.answer}')
+    seen = [start, *await _sample(tester, heat)]
+    await tester.switch(False)
+    seen += await _sample(tester, heat)
+    return _judge([one for one in seen if one.temperature is not None], heat)
+
+
+async def _sample(tester: LightTester, heat: float) -> list[Status]:
+    samples, until = [], tester.session.now + heat
+    while tester.session.now < until:
+        samples.append(await tester.status())
+        await tester.session.runner.sleep(min(0.5, heat / 5))
+    return [one for one in samples if one is not None]
+
+
+def _judge(seen: list[Status], seconds: float) -> str:
+    """
+    Return the temperatures at which flags were set.
+
+    A flag must not be set at a temperature at which it was not set at first. Consecutive samples
+    are not compared: between them a small light may heat up and cool down.
+
+    :raises Failed: if a flag was.
+    """
+    start, hottest = seen[0].temperature or 0.0, max(one.temperature or 0.0 for one in seen)
+    if not any(one.temperature for one in seen):
+        raise Skipped('it reports no temperature')
+    ranges = []
+    for flag in THERMAL:
+        flagged = [one.temperature or 0.0 for one in seen if one.error_flags & flag]
+        if not flagged or seen[0].error_flags & flag:
+            continue
+        name = flag_names(flag)[0]
+        if min(flagged) < start + STEP:
+            raise Failed(f'{name} at {min(flagged):.1f} degC; it was not set at '
+                         f'{start:.1f} degC before')
+        ranges.append(f'{name} from {min(flagged):.1f} to {max(flagged):.1f} degC')
+    if not ranges:
+        raise Skipped(f'{seconds:g} s at 100 % heated it from {start:.1f} to {hottest:.1f} degC '
+                      'and set no flag; try a longer --heat')
+    return ', '.join(ranges)

@@ -19,22 +19,36 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .describe import status_text
 from ..messages import IlluminatorStatus
-from ..model import Configuration, DIMMING_FLAGS, Mode, NOTHING, shortest, Status
+from ..model import Configuration, DIMMING_FLAGS, flag_names, Mode, NOTHING, shortest, Status
 from ...mavlink.messages import MavCmd, MavResult
-from ...payload.checks.payload_checks import NOT_AGREED
-from ...payload.checks.requirement import Conditions, Skipped
-from ...payload.checks.session import MESSAGE_TIMEOUT, Session
-from ...payload.checks.stream import restore_stream
-from ...payload.checks.transaction import Finding, Transaction
+from ...payload.checks.component_requirements import restore_interval
+from ...payload.checks.requirement import Conditions, NOT_AGREED
+from ...payload.checks.session import Failed, MESSAGE_TIMEOUT, Session, Skipped, Transaction
+from ...payload.checks.specification import Specification
+
+ILLUMINATOR = Specification(
+    'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')
 
 # Brightness at which the light may be on without consent, and the limit of it, %.
 LOW = 10.0
 DIM = 20.0
-CHANGES = (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE)
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 # s to wait for a status of the stream, where the light sends none on request.
 STREAM_TIMEOUT = 2.5
+
+
+def status_text(status: Status) -> str:
+    """Return a status in one line."""
+    on = {True: 'on', False: 'off', None: 'enable invalid'}[status.enabled]
+    numbers = ', '.join(
+        f'{name} {"invalid" if value is None else f"{value:g}"}{unit}' for name, value, unit in (
+            ('brightness', status.brightness, ' %'),
+            ('strobe_period', status.strobe_period, ' s'),
+            ('strobe_duty_cycle', status.strobe_duty_cycle, ' %'),
+            ('temp_c', status.temperature, '')))
+    flags = ', '.join(flag_names(status.error_flags)) or 'no flags'
+    return f'{on}, mode {status.mode.label}, {numbers}, {flags}, uptime_ms {status.uptime_ms}'
 
 
 def differences(asked: Configuration, status: Status) -> list[str]:
@@ -60,17 +74,17 @@ class Change:
     A command that changes the light, and what the status shows of it.
 
     :param not_shown: the fields in which the status does not show the accepted change.
-    :param contradiction: the finding about them.
+    :param contradiction: the failure because of them.
     """
 
     transaction: Transaction
     not_shown: tuple[str, ...] = ()
-    contradiction: Finding | None = None
+    contradiction: Failed | None = None
 
-    def unmet(self, *names: str) -> Finding | None:
+    def unmet(self, *names: str) -> Failed | None:
         """Return why some fields were not changed; None if a status does not contradict."""
         if not self.transaction.accepted:
-            return self.transaction.finding()
+            return self.transaction.failure()
         return self.contradiction if set(names) & set(self.not_shown) else None
 
 
@@ -86,8 +100,8 @@ class LightTester:
     def __init__(self, session: Session, conditions: Conditions) -> None:
         self.session = session
         self.conditions = conditions
-        self.disagreements: list[Finding] = []
-        self.rejected_but_applied: list[Finding] = []
+        self.disagreements: list[Failed] = []
+        self.rejected_but_applied: list[Failed] = []
         self._before: Status | None = None
 
     # Commands and what the light shows
@@ -102,7 +116,7 @@ class LightTester:
 
     async def switch(self, on: bool, *, as_int: bool = False) -> Change:
         """Switch the light, and compare the status."""
-        one = await self.session.command(MavCmd.ILLUMINATOR_ON_OFF, float(on), as_int=as_int)
+        one = await self.session.command(ON_OFF, float(on), as_int=as_int)
         return await self._compared(one, lambda status: [] if status.enabled == on else ['enable'])
 
     async def configure(
@@ -111,15 +125,14 @@ class LightTester:
     ) -> Change:
         """Configure the light, and compare the status."""
         asked = Configuration(Mode(mode), brightness, period, duty)
-        one = await self.session.command(
-            MavCmd.DO_ILLUMINATOR_CONFIGURE, mode, brightness, period, duty)
+        one = await self.session.command(CONFIGURE, mode, brightness, period, duty)
         return await self._compared(one, lambda status: differences(asked, status))
 
     async def _compared(self, one: Transaction, differ: Callable[[Status], list[str]]) -> Change:
         if not one.accepted:
             return Change(one)
         session = self.session
-        mark, since = session.log.count, session.now
+        mark, since = session.log.total, session.now
         while True:
             status = await self.status()
             not_shown = [] if status is None else differ(status)
@@ -128,26 +141,26 @@ class LightTester:
             if session.now - since >= MESSAGE_TIMEOUT:
                 break
             await session.runner.sleep(0.1)
-        self.disagreements.append(Finding(
+        self.disagreements.append(Failed(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
             one.lines + session.log.since(mark)[-2:]))
         return Change(one, tuple(not_shown), self.disagreements[-1])
 
-    async def rejected(self, command: int, *params: float) -> Finding | None:
-        """Send a command that must be rejected; return a finding if its result is another."""
+    async def rejected(self, command: int, *params: float) -> Failed | None:
+        """Send a command that must be rejected; return a failure if its result is another."""
         before = await self.status()
         one = await self.session.command(command, *params)
         after = await self.status()
         restarted = before and after and after.uptime_ms < before.uptime_ms
         if before and after and not (one.accepted or restarted or same(before, after)):
             self.rejected_but_applied.append(
-                one.finding(f'{one.answer}, and then {status_text(after)}'))
+                one.failure(f'{one.answer}, and then {status_text(after)}'))
         if one.result == MavResult.DENIED:
             return None
         if one.accepted:
             await self.baseline()
-        return one.finding()
+        return one.failure()
 
     # States that checks start from
 
@@ -159,14 +172,14 @@ class LightTester:
             await self._switch_off()
             status = await self.status()
         if status is None or differences(low, status):
-            await self.session.command(MavCmd.DO_ILLUMINATOR_CONFIGURE, *low.params())
+            await self.session.command(CONFIGURE, *low.params())
             status = await self.status()
         if status is not None and status.enabled:
             # A light whose brightness is its switch.
             await self._switch_off()
 
     async def _switch_off(self) -> None:
-        await self.session.command(MavCmd.ILLUMINATOR_ON_OFF, 0.0)
+        await self.session.command(ON_OFF, 0.0)
 
     async def ensure_dim(self) -> None:
         """
@@ -222,10 +235,10 @@ class LightTester:
         wanted, enabled = _saved(self._before), bool(self._before.enabled)
         # First, so that the changes are not visible.
         await self._switch_off()
-        await self.session.command(MavCmd.DO_ILLUMINATOR_CONFIGURE, *wanted.params())
+        await self.session.command(CONFIGURE, *wanted.params())
         # After it, because a light whose brightness is its switch is now on.
-        await self.session.command(MavCmd.ILLUMINATOR_ON_OFF, float(enabled))
-        await restore_stream(self.session, IlluminatorStatus)
+        await self.session.command(ON_OFF, float(enabled))
+        await restore_interval(self.session, IlluminatorStatus)
         status = await self.status()
         if status is None:
             return ['unknown']

@@ -22,7 +22,8 @@ import json
 from typing import Any
 from xml.etree import ElementTree
 
-from .requirement import HEARTBEAT, Requirement, Result, Verdict
+from .requirement import Requirement, Result, Verdict
+from .specification import HEARTBEAT
 from ... import __version__
 
 SHOWN_LINES = 12
@@ -69,12 +70,13 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
     :param verbose: whether a requirement that is met gets the lines of the log, too.
     """
     one = result.requirement
-    detail = f' ({result.detail})' if result.detail and result.verdict is Verdict.PASS else ''
+    met = result.verdict is Verdict.PASS
+    detail = f' ({result.detail})' if result.detail and met else ''
     text = [f'{result.verdict.value:8}{one.name:23}{one.title}{detail}']
-    if result.verdict is not Verdict.PASS:
+    if not met:
         text.append(f'{"":8}{result.detail}')
     if result.verdict is Verdict.FAIL or verbose:
-        text.append(f'{"":8}see {section(one)}')
+        text.append(f'{"":8}see {one.place}: {one.specification.url}')
         shown = [line for line in result.exchange
                  if one.specification is HEARTBEAT or ' HEARTBEAT ' not in line]
         text += [f'{"":8}  {line}' for line in shown[:SHOWN_LINES]]
@@ -96,33 +98,27 @@ class Table:
 
     def add(self, result: Result) -> list[str]:
         """Add a result, and return the lines that are complete."""
-        if not result.reached:
-            ended = []
-            if self._unreached and self._unreached[0].detail != result.detail:
-                ended = self.end()
-            self._unreached.append(result)
-            return ended
-        return [*self.end(), *lines(result, verbose=self._verbose)]
+        if result.reached:
+            return [*self.end(), *lines(result, verbose=self._verbose)]
+        ended = self.end() if any(
+            one.detail != result.detail for one in self._unreached[:1]) else []
+        self._unreached.append(result)
+        return ended
 
     def end(self) -> list[str]:
         """Return the lines that were held back."""
         held, self._unreached = self._unreached, []
-        if len(held) < 2:
-            return [text for one in held for text in lines(one, verbose=self._verbose)]
-        return [f'{Verdict.SKIPPED.value:8}{len(held)} requirements: {held[0].detail}']
-
-
-def section(one: Requirement[Any]) -> str:
-    """Return the section of the specification that contains a requirement."""
-    return f'{one.specification.title}, "{one.section}": {one.specification.url}'
+        if len(held) > 1:
+            return [f'{Verdict.SKIPPED.value:8}{len(held)} requirements: {held[0].detail}']
+        return [text for one in held for text in lines(one, verbose=self._verbose)]
 
 
 def catalogue(requirements: Iterable[Requirement[Any]], kind: str) -> list[str]:
     """Return all requirements on a kind of device, a line each."""
     notes = {(False, False): '', (True, False): f', changes the {kind}',
              (True, True): ', needs your consent'}
-    return [f'{one.name:23}{one.title} [{one.specification.title}, "{one.section}"'
-            f'{notes[one.changes, one.needs_consent]}]' for one in requirements]
+    return [f'{one.name:23}{one.title} [{one.place}{notes[one.changes, one.needs_consent]}]'
+            for one in requirements]
 
 
 def as_json(report: Report) -> str:
@@ -135,51 +131,45 @@ def as_json(report: Report) -> str:
         'seconds': round(report.seconds, 3),
         'restored': report.restored,
         'counts': {one.value: report.count(one) for one in Verdict},
-        'results': [_result(one) for one in report.results],
+        'results': [{
+            'name': one.requirement.name,
+            'title': one.requirement.title,
+            'verdict': one.verdict.value,
+            'detail': one.detail,
+            'specification': one.requirement.specification.title,
+            'section': one.requirement.section,
+            'specification_url': one.requirement.specification.url,
+            'seconds': round(one.seconds, 3),
+            'exchange': one.exchange,
+        } for one in report.results],
     }, indent=2) + '\n'
-
-
-def _result(result: Result) -> dict[str, Any]:
-    one = result.requirement
-    return {
-        'name': one.name,
-        'title': one.title,
-        'verdict': result.verdict.value,
-        'detail': result.detail,
-        'specification': one.specification.title,
-        'section': one.section,
-        'specification_url': one.specification.url,
-        'seconds': round(result.seconds, 3),
-        'exchange': result.exchange,
-    }
 
 
 def as_junit(report: Report) -> str:
     """Return the report as JUnit XML, in UTF-8."""
+    def add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
+        return ElementTree.SubElement(
+            parent, tag, {name: text.translate(_NOT_XML) for name, text in attributes.items()})
+
     suite = ElementTree.Element(
         'testsuite', name=f'{report.payload} conformance', tests=str(len(report.results)),
         failures=str(report.count(Verdict.FAIL)), errors='0',
         skipped=str(report.count(Verdict.SKIPPED)), time=f'{report.seconds:.3f}')
-    properties = ElementTree.SubElement(suite, 'properties')
+    properties = add(suite, 'properties')
     for name, value in (('url', report.url), (report.kind, report.device),
                         ('restored', report.restored)):
-        ElementTree.SubElement(properties, 'property', name=name, value=_clean(value))
+        add(properties, 'property', name=name, value=value)
     for result in report.results:
         one = result.requirement
-        case = ElementTree.SubElement(
-            suite, 'testcase', name=f'{one.name}: {one.title}',
-            classname=one.specification.title, time=f'{result.seconds:.3f}')
+        case = add(suite, 'testcase', name=f'{one.name}: {one.title}',
+                   classname=one.specification.title, time=f'{result.seconds:.3f}')
         if result.verdict is Verdict.FAIL:
-            failure = ElementTree.SubElement(case, 'failure', message=_clean(result.detail))
-            failure.text = f'see {section(one)}'
+            failure = add(case, 'failure', message=result.detail)
+            failure.text = f'see {one.place}: {one.specification.url}'
         elif result.verdict is Verdict.SKIPPED:
-            ElementTree.SubElement(case, 'skipped', message=_clean(result.detail))
-        ElementTree.SubElement(case, 'system-out').text = _clean('\n'.join(result.exchange))
+            add(case, 'skipped', message=result.detail)
+        add(case, 'system-out').text = '\n'.join(result.exchange).translate(_NOT_XML)
     ElementTree.indent(suite)
     # Not 'unicode', which declares the encoding of the locale.
     text: bytes = ElementTree.tostring(suite, encoding='utf-8', xml_declaration=True)
     return text.decode() + '\n'
-
-
-def _clean(text: str) -> str:
-    return text.translate(_NOT_XML)

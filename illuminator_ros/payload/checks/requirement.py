@@ -12,44 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Requirements and their results."""
+"""Requirements, the checks of a payload that they make up, and their results."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from .session import Session
-from .transaction import Finding
+from .specification import Specification
+from ...mavlink.messages import Address, Message
 
-
-class Failed(Exception):
-    """
-    The device does not meet a requirement; the text gives the deviation.
-
-    :ivar lines: the lines of the log that show it, None for all of the check.
-    """
-
-    def __init__(self, reason: str, lines: list[str] | None = None) -> None:
-        super().__init__(reason)
-        self.lines = lines
-
-
-class Skipped(Exception):
-    """A requirement cannot be checked here; the text gives the reason."""
-
-
-def fail_if(findings: Iterable[Finding | None]) -> None:
-    """
-    Raise if there are findings.
-
-    :raises Failed: with all of them.
-    """
-    if found := [one for one in findings if one is not None]:
-        raise Failed('; '.join(one.text for one in found),
-                     [line for one in found for line in one.lines])
+NOT_AGREED = 'not agreed to; see --yes'
 
 
 class Verdict(Enum):
@@ -58,22 +34,6 @@ class Verdict(Enum):
     PASS = 'PASS'
     FAIL = 'FAIL'
     SKIPPED = 'SKIPPED'
-
-
-@dataclass(frozen=True)
-class Specification:
-    """A page of the MAVLink guide."""
-
-    title: str
-    url: str
-
-
-_GUIDE = 'https://mavlink.io/en/'
-HEARTBEAT = Specification('heartbeat protocol', _GUIDE + 'services/heartbeat.html')
-COMMAND = Specification('command protocol', _GUIDE + 'services/command.html')
-MESSAGES = Specification('common message set', _GUIDE + 'messages/common.html')
-ROUTING = Specification('routing', _GUIDE + 'guide/routing.html')
-SERIALIZATION = Specification('serialization', _GUIDE + 'guide/serialization.html')
 
 
 @dataclass(frozen=True)
@@ -92,15 +52,15 @@ class Conditions:
 
 
 class Tester(Protocol):
-    """The part of a payload that operates the device; a check gets it."""
+    """
+    The part of a payload that operates the device; a check gets it.
 
-    @property
-    def session(self) -> Session:
-        """Return the session with the device."""
+    :ivar session: the session with the device.
+    :ivar conditions: the conditions of the run.
+    """
 
-    @property
-    def conditions(self) -> Conditions:
-        """Return the conditions of the run."""
+    session: Session
+    conditions: Conditions
 
     @property
     def saved(self) -> str:
@@ -125,10 +85,10 @@ class Requirement(Generic[T]):
     :param name: its id, as in ``--only``.
     :param title: what the device does, as a clause without subject.
     :param section: of the specification.
-    :param check: returns a measurement as text, or None; raises :class:`Failed` or
-        :class:`Skipped`.
+    :param check: returns a measurement as text, or None; raises ``Failed`` or ``Skipped``.
     :param changes: whether the check changes the state of the device.
-    :param needs_consent: whether the operator must agree to the check.
+    :param needs_consent: whether the operator must agree to the check, which then also changes
+        the state of the device.
     :param presence: whether it fails where no device is found; all others are skipped.
     :param whole_run: whether it judges the messages of the whole run, so that it can be checked
         after the device was lost.
@@ -144,19 +104,22 @@ class Requirement(Generic[T]):
     presence: bool = False
     whole_run: bool = False
 
+    @property
+    def place(self) -> str:
+        """Return the section of the specification, as text."""
+        return f'{self.specification.title}, "{self.section}"'
+
 
 def requirement(
-    name: str, title: str, specification: Specification, section: str, *, changes: bool = False,
-    needs_consent: bool = False, presence: bool = False, whole_run: bool = False,
+    name: str, title: str, specification: Specification, section: str, **flags: bool,
 ) -> Callable[[Check[T]], Requirement[T]]:
-    """Return a decorator that makes a check a :class:`Requirement`."""
-    def decorate(check: Check[T]) -> Requirement[T]:
-        return Requirement(name, title, specification, section, check, changes or needs_consent,
-                           needs_consent, presence, whole_run)
-    return decorate
+    """Return a decorator that makes a check a :class:`Requirement`, with flags of that class."""
+    changes = flags.pop('changes', False) or flags.get('needs_consent', False)
+    return lambda check: Requirement(
+        name, title, specification, section, check, changes, **flags)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Result:
     """
     The result of a check.
@@ -175,11 +138,46 @@ class Result:
     reached: bool = True
 
 
-def periods(times: Sequence[float]) -> list[float]:
-    """Return the differences of consecutive times."""
-    return [later - earlier for earlier, later in zip(times, times[1:], strict=False)]
+class Option(NamedTuple):
+    """An option of the command line that only this payload has: a number with a range."""
+
+    name: str
+    metavar: str
+    default: float
+    low: float
+    high: float
+    help: str  # noqa: A003
 
 
-def median(values: Sequence[float]) -> float:
-    """Return the median, the upper one of two."""
-    return sorted(values)[len(values) // 2]
+@dataclass(frozen=True)
+class PayloadChecks(Generic[T]):
+    """
+    The checks of one payload, as ``PayloadType.checks`` names them.
+
+    :param payload: its name, as in ``--payload``.
+    :param device: the kind of device.
+    :param messages: the classes of its messages.
+    :param is_device: whether a message identifies its sender as a device of this payload.
+    :param evidence: those messages, as text.
+    :param tester: returns a tester that operates the device of a session.
+    :param describe: text of one of its messages, '' for the message's name.
+    :param risk: what the device does in the checks that need consent, as a clause.
+    :param question: asked before them; ``{device}`` and the options are filled in.
+    :param options: options of the command line, for :attr:`Conditions.options`.
+    """
+
+    payload: str
+    device: str
+    messages: tuple[type[Message], ...]
+    is_device: Callable[[Message], bool]
+    evidence: str
+    tester: Callable[[Session, Conditions], T]
+    requirements: tuple[Requirement[T], ...]
+    describe: Callable[[Message], str] = lambda message: ''
+    risk: str = ''
+    question: str = ''
+    options: tuple[Option, ...] = ()
+
+    def session(self, address: Address, target: Address | None = None) -> Session:
+        """Return a session with a device, from our address."""
+        return Session(address, self.messages, self.is_device, self.describe, target)

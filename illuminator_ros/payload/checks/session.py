@@ -16,19 +16,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import astuple, dataclass, field
 import math
-from typing import cast, TypeVar
+from typing import cast, NamedTuple, TypeVar
 
 from .coroutine import CoroutineRunner
-from .describe import command_name, describe
-from .history import History
-from .transaction import Ack, Transaction
+from ..identity import Identity
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
-from ...mavlink.messages import Address, CommandAck, MavCmd, MavResult, Message
+from ...mavlink.messages import Address, CommandAck, MavCmd, MavResult, Message, result_name
 
+T = TypeVar('T')
 M = TypeVar('M', bound=Message)
 
 # s
@@ -45,10 +45,149 @@ REJECTION_PAUSE = 0.3
 
 ATTEMPTS = 4
 REJECTIONS = 12
+# Entries kept of each record, and acknowledgements of one command.
+MAX_ENTRIES = 10_000
+MAX_ACKS = 400
 
 
 class DeviceLost(Exception):
     """The device has stopped sending."""
+
+
+class Skipped(Exception):
+    """A requirement cannot be checked here; the text gives the reason."""
+
+
+class Failed(Exception):
+    """
+    The device does not meet a requirement; the text gives the deviation.
+
+    :ivar lines: the lines of the log that show it, None for all of the check.
+    """
+
+    def __init__(self, reason: str, lines: list[str] | None = None) -> None:
+        super().__init__(reason)
+        self.lines = lines
+
+
+def fail_if(failures: Iterable[Failed | None]) -> None:
+    """
+    Raise if there are failures.
+
+    :raises Failed: with all of them.
+    """
+    if found := [one for one in failures if one is not None]:
+        raise Failed('; '.join(map(str, found)),
+                     [line for one in found for line in one.lines or ()])
+
+
+class History(deque[T]):
+    """
+    The newest entries, so that a flood takes a bounded memory.
+
+    :ivar total: entries ever appended.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(maxlen=MAX_ENTRIES)
+        self.total = 0
+
+    def append(self, entry: T, /) -> None:
+        """Append an entry; the oldest one is dropped where there is no room."""
+        super().append(entry)
+        self.total += 1
+
+    def since(self, count: int) -> list[T]:
+        """Return the entries that were appended after the first ``count`` and are still kept."""
+        return list(self)[max(len(self) - (self.total - count), 0):]
+
+
+class Ack(NamedTuple):
+    """
+    A COMMAND_ACK.
+
+    :param at: when it was received, s.
+    :param target: its target fields; 0/0 if the device leaves them empty.
+    """
+
+    at: float
+    result: int
+    progress: int
+    target: Address
+
+
+@dataclass
+class Transaction:
+    """
+    One command with its acknowledgements.
+
+    :param expected: whether every device must acknowledge this command.
+    :ivar sent: time of each attempt, s.
+    :ivar lines: the lines of the session's log about this command.
+    """
+
+    command: int
+    params: tuple[float, ...]
+    expected: bool
+    sent: list[float] = field(default_factory=list)
+    acks: list[Ack] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+
+    def acknowledge(self, ack: Ack, line: str) -> None:
+        """Record an acknowledgement, with its line of the log."""
+        if len(self.acks) < MAX_ACKS:
+            self.acks.append(ack)
+            self.lines.append(line)
+
+    @property
+    def text(self) -> str:
+        """Return the command and its parameters."""
+        return ' '.join([_command_name(self.command), *(f'{param:g}' for param in self.params)])
+
+    @property
+    def finals(self) -> list[Ack]:
+        """Return the acknowledgements that do not report progress."""
+        return [ack for ack in self.acks if ack.result != MavResult.IN_PROGRESS]
+
+    @property
+    def result(self) -> int | None:
+        """Return the latest result, None if there is none."""
+        return self.finals[-1].result if self.finals else None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the command was accepted."""
+        return self.result == MavResult.ACCEPTED
+
+    @property
+    def answer(self) -> str:
+        """Return the name of the result."""
+        return 'no acknowledgement' if self.result is None else result_name(self.result)
+
+    def failure(self, reason: str = '') -> Failed:
+        """Return a failure of this command, by default with its result."""
+        return Failed(f'{self.text}: {reason or self.answer}', self.lines)
+
+
+def _command_name(command: int) -> str:
+    try:
+        return f'MAV_CMD_{MavCmd(command).name}'
+    except ValueError:
+        return f'MAV_CMD {command}'
+
+
+def _protocol_text(message: Message) -> str:
+    if isinstance(message, CommandAck):
+        target = Address(message.target_system, message.target_component)
+        progress = message.result == MavResult.IN_PROGRESS
+        return (f'COMMAND_ACK {_command_name(message.command)}: {result_name(message.result)}'
+                + (f', progress {message.progress}' if progress else '')
+                + (f' to {target}' if any(target) else ''))
+    if isinstance(message, messages.Heartbeat):
+        return f'HEARTBEAT type {message.type}, autopilot {message.autopilot}'
+    if isinstance(message, messages.ComponentInformationBasic):
+        return f'{message.name} {", ".join(map(repr, astuple(Identity.from_message(message))))}'
+    return message.name
 
 
 class Session(Endpoint):
@@ -61,7 +200,7 @@ class Session(Endpoint):
     :param address: our own address.
     :param payload_messages: the classes of the payload's messages.
     :param is_device: whether a message identifies its sender as a device of this payload.
-    :param describe: text of a message of the payload.
+    :param describe: text of a message of the payload, '' for its name.
     :param target: the device; None selects the first that is heard.
     :ivar found: the device, once it is heard.
     :ivar heard: all senders.
@@ -72,13 +211,14 @@ class Session(Endpoint):
     """
 
     def __init__(
-        self, address: Address, payload_messages: Sequence[type[Message]], *,
-        is_device: Callable[[Message], bool], describe: Callable[[Message], str] = describe,
-        target: Address | None = None,
+        self, address: Address, payload_messages: Sequence[type[Message]],
+        is_device: Callable[[Message], bool], describe: Callable[[Message], str],
+        target: Address | None,
     ) -> None:
         super().__init__()
         self.address = address
-        self.messages = (messages.Heartbeat, CommandAck, *payload_messages)
+        self.messages = (messages.Heartbeat, CommandAck, messages.ComponentInformationBasic,
+                         *payload_messages)
         self.target = target
         self.runner = CoroutineRunner()
         self.found: Address | None = None
@@ -119,7 +259,7 @@ class Session(Endpoint):
             self.found = source
         if source == self.found:
             self._last_heard = now
-            self._note('<', message)
+            self._note('<', self._describe(message) or _protocol_text(message))
             self._record(message)
         self.runner.advance(now)
 
@@ -129,7 +269,7 @@ class Session(Endpoint):
         if isinstance(message, CommandAck) and message.command in self._latest:
             self._latest[message.command].acknowledge(
                 Ack(self.now, message.result, message.progress,
-                    Address(message.target_system, message.target_component)), self.log.last)
+                    Address(message.target_system, message.target_component)), self.log[-1])
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
@@ -151,9 +291,8 @@ class Session(Endpoint):
         self._began = now if self._began is None else self._began
         self.runner.now = now
 
-    def _note(self, direction: str, message: Message) -> None:
-        elapsed = self.now - (self._began or 0.0)
-        self.log.append(f'{elapsed:8.3f} s {direction} {self._describe(message)}')
+    def _note(self, direction: str, text: str) -> None:
+        self.log.append(f'{self.now - (self._began or 0.0):8.3f} s {direction} {text}')
 
     # The record
 
@@ -167,6 +306,13 @@ class Session(Endpoint):
         """Return the address of the device, which has been heard."""
         assert self.found is not None
         return self.found
+
+    @property
+    def identity(self) -> str:
+        """Return the names that the device has sent, '' if there are none."""
+        received = self.received(messages.ComponentInformationBasic)
+        one = Identity.from_message(received[-1][1]) if received else Identity()
+        return ', '.join(filter(None, (one.vendor, one.model, one.serial_number)))
 
     def received(self, cls: type[M]) -> History[tuple[float, M]]:
         """Return the messages of a class that the device has sent, with their times, s."""
@@ -194,8 +340,8 @@ class Session(Endpoint):
     ) -> list[tuple[float, M]]:
         """Return the messages of a class that come within a time, s; end at the count-th."""
         received = self.received(cls)
-        before = received.count
-        await self.runner.until(lambda: received.count >= before + count, timeout)
+        before = received.total
+        await self.runner.until(lambda: received.total >= before + count, timeout)
         return received.since(before)
 
     async def command(
@@ -213,7 +359,7 @@ class Session(Endpoint):
             # Requirements of their own cover COMMAND_INT and other targets.
             one = self._begin(command, params, expected=not as_int and target is None)
             for attempt in range(ATTEMPTS):
-                self._send(one, params, confirmation + attempt, as_int, target or self.device)
+                self._send(one, target or self.device, confirmation + attempt, as_int=as_int)
                 if await self._answered(one):
                     break
                 if self.now - self._last_heard > LOST_TIMEOUT:
@@ -226,53 +372,50 @@ class Session(Endpoint):
     async def send_to_other(self, target: Address, command: int, *params: float) -> Transaction:
         """Send a command to another address, and return what our device answers to it."""
         one = self._begin(command, params, expected=False)
-        self._send(one, params, 0, False, target)
+        self._send(one, target)
         await self.runner.until(lambda: one.acks, NO_ANSWER_TIME)
         await self.runner.sleep(SETTLE_TIME)
         return one
 
     async def request(self, cls: type[M]) -> M | None:
         """Request a message until it comes; return it, None if it does not come."""
-        received = self.received(cls)
         for _ in range(ATTEMPTS):
-            before = received.count
+            before = self.received(cls).total
             one = await self.command(MavCmd.REQUEST_MESSAGE, cls.id)
             if not one.accepted and one.result is not None:
                 return None
-            if await self.runner.until(partial(received.since, before), MESSAGE_TIMEOUT):
-                return received.last[1]
+            if self.received(cls).total > before or await self.receive_more(cls, MESSAGE_TIMEOUT):
+                return self.received(cls)[-1][1]
         return None
 
     def _begin(self, command: int, params: tuple[float, ...], *, expected: bool) -> Transaction:
-        text = ' '.join([command_name(command), *(f'{param:g}' for param in params)])
-        one = Transaction(text, command, expected)
+        one = self._latest[command] = Transaction(command, params, expected)
         self.transactions.append(one)
-        self._latest[command] = one
         return one
 
     def _send(
-        self, one: Transaction, params: tuple[float, ...], confirmation: int, as_int: bool,
-        target: Address,
+        self, one: Transaction, target: Address, confirmation: int = 0, *, as_int: bool = False,
     ) -> None:
-        values = [*map(float, params), *[0.0] * (7 - len(params))]
+        values = [*map(float, one.params), *[0.0] * (7 - len(one.params))]
         message = messages.CommandInt(
             *target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3], 0, 0, 0.0,
         ) if as_int else messages.CommandLong(
             *target, one.command, min(confirmation, 255), *values)
         one.sent.append(self.now)
         self.outgoing.append((self.address, message))
-        self._note('>', message)
-        one.lines.append(self.log.last)
+        self._note('>', f'{message.name} to {target}: {one.text}'
+                   + (f', confirmation {confirmation}' if confirmation else ''))
+        one.lines.append(self.log[-1])
+
+    async def _acknowledged(self, one: Transaction, timeout: float) -> bool:
+        before = len(one.acks)
+        return await self.runner.until(lambda: len(one.acks) > before, timeout)
 
     async def _answered(self, one: Transaction) -> bool:
         """Wait for the result of an attempt, as long as progress is reported."""
         timeout, until = ACK_TIMEOUT, self.now + PROGRESS_LIMIT
-        while self.now < until:
-            seen = len(one.acks)
-            await self.runner.until(partial(one.acks_since, seen), timeout)
-            if one.finals:
-                break
-            if len(one.acks) == seen:
+        while not one.finals and self.now < until:
+            if not await self._acknowledged(one, timeout):
                 return False
             timeout = PROGRESS_TIMEOUT
         # A late acknowledgement must not be assigned to the next command.

@@ -21,8 +21,8 @@ import logging
 from typing import Generic
 
 from .coroutine import Interrupted
-from .requirement import Failed, Requirement, Result, Skipped, T, Verdict
-from .session import DeviceLost, Session
+from .requirement import Conditions, NOT_AGREED, PayloadChecks, Requirement, Result, T, Verdict
+from .session import DeviceLost, Failed, Session, Skipped
 from ...mavlink.messages import Address
 
 # s
@@ -40,38 +40,35 @@ class _Unreached(Skipped):
     """There is no device to check."""
 
 
-def names(addresses: Sequence[Address]) -> str:
-    """Return a list of addresses as text, the first few by name."""
-    texts = [str(one) for one in addresses[:MAX_NAMED]]
+def names(addresses: set[Address]) -> str:
+    """Return addresses as text, the first few by name."""
+    *most, last = [str(one) for one in sorted(addresses)[:MAX_NAMED]]
     if len(addresses) > MAX_NAMED:
-        texts.append(f'{len(addresses) - MAX_NAMED} more')
-    *most, last = texts
+        most, last = [*most, last], f'{len(addresses) - MAX_NAMED} more'
     return f'{", ".join(most)} and {last}' if most else last
 
 
-def absence(session: Session, device: str, evidence: str, timeout: float) -> str:
+def absence(session: Session, checks: PayloadChecks[T], timeout: float) -> str:
     """
     Return why there is no device to check.
 
-    :param device: the kind of device.
-    :param evidence: the messages that identify one.
     :param timeout: s for which it was awaited.
     """
-    heard = sorted(session.heard)
-    others = (f'heard instead: {names(heard)}' if heard else 'nothing else was heard')
+    others = f'heard instead: {names(session.heard)}' if session.heard else (
+        'nothing else was heard')
     if session.target is not None:
         return f'{session.target} was not heard within {timeout:g} s; {others}'
-    return f'no {device} was heard within {timeout:g} s, that is, no {evidence}; {others}'
+    return (f'no {checks.device} was heard within {timeout:g} s, that is, no {checks.evidence}; '
+            + others)
 
 
 class Suite(Generic[T]):
     """
     Checks requirements one after another; :meth:`run` does it.
 
-    :param tester: operates the device.
-    :param device: the kind of device, for texts.
+    :param checks: those of the payload.
+    :param requirements: those to check.
     :param missing: why there is no device to check, '' if there is one.
-    :param no_consent: why a check that needs consent is skipped.
     :param on_result: called with each result.
     :ivar results: one for each requirement, in order, after the run.
     :ivar restored: the state in which the device was left, as text.
@@ -80,20 +77,19 @@ class Suite(Generic[T]):
     """
 
     def __init__(
-        self, tester: T, requirements: Sequence[Requirement[T]], *, device: str,
-        missing: str = '', no_consent: str = '',
+        self, checks: PayloadChecks[T], session: Session, conditions: Conditions,
+        requirements: Sequence[Requirement[T]], missing: str = '',
         on_result: Callable[[Result], None] = lambda result: None,
     ) -> None:
         self.results: list[Result] = []
         self.restored = 'nothing was changed'
         self.changed = False
         self.left_changed = False
-        self._tester = tester
-        self._session = tester.session
+        self._checks = checks
+        self._session = session
+        self._tester = checks.tester(session, conditions)
         self._requirements = requirements
-        self._device = device
         self._missing = missing
-        self._no_consent = no_consent
         self._on_result = on_result
         self._lost = ''
 
@@ -110,58 +106,56 @@ class Suite(Generic[T]):
             for one in self._requirements:
                 # Raises Interrupted, before the first check too.
                 await self._session.runner.sleep(0.0)
-                self._enter(await self._check(one))
+                self._add(await self._check(one))
         except Interrupted:
             for one in self._requirements[len(self.results):]:
-                self._enter(Result(one, Verdict.SKIPPED, 'interrupted', reached=False))
+                self._add(Result(one, Verdict.SKIPPED, 'interrupted', reached=False))
         finally:
             self._session.runner.restoring = True
             if self.changed:
                 await self._restore()
 
-    def _enter(self, result: Result) -> None:
+    def _add(self, result: Result) -> None:
         self.results.append(result)
         self._on_result(result)
 
     async def _check(self, one: Requirement[T]) -> Result:
         session = self._session
-        begun, mark = session.now, session.log.count
-        verdict, detail, lines, reached = Verdict.PASS, '', None, True
+        begun, mark = session.now, session.log.total
+        verdict, lines, reached = Verdict.FAIL, None, True
         try:
             await self._prepare(one)
-            detail = await one.check(self._tester) or ''
+            verdict, detail = Verdict.PASS, await one.check(self._tester) or ''
         except Failed as error:
-            verdict, detail, lines = Verdict.FAIL, str(error), error.lines
+            detail, lines = str(error), error.lines
         except Skipped as error:
             verdict, detail = Verdict.SKIPPED, str(error)
             reached = not isinstance(error, _Unreached)
         except DeviceLost:
-            verdict, detail = Verdict.FAIL, f'the {self._device} has stopped sending'
-            self._lost = detail
+            self._lost = detail = f'the {self._checks.device} has stopped sending'
         except Exception as error:
             _log.exception('internal error in the check %s', one.name)
-            verdict, detail = Verdict.FAIL, f'internal error in this check: {error!r}'
+            detail = f'internal error in this check: {error!r}'
         exchange = session.log.since(mark)[-MAX_LINES:] if lines is None else lines[:MAX_LINES]
         return Result(one, verdict, detail, exchange, session.now - begun, reached)
 
     async def _prepare(self, one: Requirement[T]) -> None:
         """Raise where the check cannot be made, or the device could not be restored after it."""
+        device = self._checks.device
         if self._missing:
             raise Failed(self._missing) if one.presence else _Unreached(
                 self._missing.partition(';')[0])
         if self._lost and not one.whole_run:
             raise _Unreached(self._lost)
         if one.needs_consent and not self._tester.conditions.consent:
-            raise Skipped(self._no_consent)
-        if one.changes:
-            if not await self._tester.save():
-                raise Skipped(f'the {self._device} does not report its state, so it could not be '
-                              'restored')
-            self.changed = True
+            raise Skipped(f'the {device} would {self._checks.risk}: {NOT_AGREED}')
+        if one.changes and not await self._tester.save():
+            raise Skipped(f'the {device} does not report its state, so it could not be restored')
+        self.changed |= one.changes
 
     async def _restore(self) -> None:
         """Restore the device; repeat it for some time if the device does not answer."""
-        until = self._session.now + RESTORE_TIMEOUT
+        device, until = self._checks.device, self._session.now + RESTORE_TIMEOUT
         while True:
             try:
                 differing = await self._tester.restore()
@@ -171,6 +165,6 @@ class Suite(Generic[T]):
                 break
             await self._session.runner.sleep(RESTORE_PAUSE)
         self.left_changed = bool(differing)
-        self.restored = f'the {self._device} is as it was' if not differing else (
-            f'THE {self._device.upper()} IS NOT AS IT WAS ({", ".join(differing)}): it was '
+        self.restored = f'the {device} is as it was' if not differing else (
+            f'THE {device.upper()} IS NOT AS IT WAS ({", ".join(differing)}): it was '
             + self._tester.saved)

@@ -1,0 +1,387 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Requirements on any component: heartbeat, commands, status stream, identity, whole run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from functools import partial
+from itertools import pairwise
+import math
+from statistics import median_high
+
+from .requirement import Requirement, requirement, Tester
+from .session import fail_if, Failed, Session, Skipped, Transaction
+from .specification import COMMAND, HEARTBEAT, MESSAGES, ROUTING, SERIALIZATION, Specification
+from ...mavlink import messages
+from ...mavlink.messages import Address, Heartbeat, MavCmd, MavResult, Message, result_name
+
+# s
+HEARTBEAT_TIMEOUT = 5.0
+MAX_HEARTBEAT_GAP = 2.6
+REQUEST_TIMEOUT = 3.0
+INTERVAL = 0.25
+WATCH_TIME = 2.5
+DEFAULT_TIMEOUT = 5.0
+PROMPT = 1.0
+FINISHED = 2.0
+# Not a MAV_CMD, and far from the range in which new ones are defined.
+UNKNOWN_COMMAND = 65000
+# HIL_STATE (90), which only a simulator sends.
+UNKNOWN_MESSAGE = 90
+# Failures that are quoted.
+MAX_QUOTED = 3
+
+
+def periods(received: Iterable[tuple[float, object]]) -> list[float]:
+    """Return the differences of the times of consecutive messages, s."""
+    return [later - earlier for (earlier, _), (later, _) in pairwise(received)]
+
+
+# The heartbeat protocol, and the address
+
+@requirement('heartbeat', 'sends HEARTBEAT', HEARTBEAT, 'HEARTBEAT Broadcast Frequency',
+             presence=True)
+async def heartbeat(tester: Tester) -> str:
+    """Wait for one."""
+    session = tester.session
+    received = session.received(Heartbeat)
+    if not await session.runner.until(lambda: received, HEARTBEAT_TIMEOUT):
+        raise Failed(f'no HEARTBEAT in {HEARTBEAT_TIMEOUT:g} s')
+    return f'from {session.device}'
+
+
+def _latest_heartbeat(tester: Tester) -> Heartbeat:
+    if received := tester.session.received(Heartbeat):
+        return received[-1][1]
+    raise Skipped('no HEARTBEAT was received')
+
+
+def heartbeat_type(mav_type: messages.MavType, device: str) -> Requirement[Tester]:
+    """Return the requirement on HEARTBEAT.type of a device."""
+    @requirement('heartbeat-type', f'identifies itself as MAV_TYPE_{mav_type.name} ({mav_type:d})',
+                 HEARTBEAT, 'Component Identity')
+    async def check(tester: Tester) -> None:
+        if (value := _latest_heartbeat(tester).type) != mav_type:
+            raise Failed(f'MAV_TYPE {value}: clients will not recognise it as {device}')
+    return check
+
+
+@requirement('heartbeat-autopilot', 'sets autopilot to MAV_AUTOPILOT_INVALID (8)', HEARTBEAT,
+             'Component Identity')
+async def heartbeat_autopilot(tester: Tester) -> None:
+    """Read the latest HEARTBEAT."""
+    if (value := _latest_heartbeat(tester).autopilot) != messages.MAV_AUTOPILOT_INVALID:
+        raise Failed(f'MAV_AUTOPILOT {value}: clients will take it for a flight controller')
+
+
+@requirement('address', 'has a system ID and a component ID other than 0', ROUTING,
+             'ID allocation')
+async def address(tester: Tester) -> str:
+    """Read the address of the device; 0 is the broadcast address."""
+    device = tester.session.device
+    if 0 in device:
+        raise Failed(f'it sends from {device}: 0 means broadcast, so routers cannot find it')
+    return f'{device}'
+
+
+# The command protocol
+
+@requirement('unknown-command', 'answers an unknown command with MAV_RESULT_UNSUPPORTED',
+             MESSAGES, 'MAV_RESULT')
+async def unknown_command(tester: Tester) -> None:
+    """Send a command that does not exist."""
+    one = await tester.session.command(UNKNOWN_COMMAND)
+    if one.result != MavResult.UNSUPPORTED:
+        raise one.failure()
+
+
+@requirement('unknown-message', 'rejects a request for a message that it does not have',
+             MESSAGES, 'MAV_CMD_REQUEST_MESSAGE')
+async def unknown_message(tester: Tester) -> str:
+    """Request a message that a real device does not send."""
+    one = await tester.session.command(MavCmd.REQUEST_MESSAGE, UNKNOWN_MESSAGE)
+    if one.result is None or one.accepted:
+        raise one.failure()
+    return one.answer
+
+
+def broadcast(status: type[Message]) -> Requirement[Tester]:
+    """Return the requirement on broadcast commands; the one sent requests the status."""
+    @requirement('broadcast', 'answers commands that are broadcast to its system and to all '
+                 'systems', ROUTING, 'Routing Detail')
+    async def check(tester: Tester) -> None:
+        session, failures = tester.session, []
+        for target in (Address(session.device.system, 0), Address(0, 0)):
+            one = await session.command(MavCmd.REQUEST_MESSAGE, status.id, target=target)
+            if one.result is None:
+                failures.append(one.failure(f'to {target}: {one.answer}'))
+        fail_if(failures)
+    return check
+
+
+# Messages on request: the status, and the identity
+
+def sent_on_request(
+    name: str, cls: type[Message], specification: Specification, section: str,
+    measurement: Callable[[Session], str] = lambda session: '',
+) -> Requirement[Tester]:
+    """Return the requirement that a device sends a message on request."""
+    @requirement(name, f'sends {cls.name} on request', specification, section)
+    async def check(tester: Tester) -> str:
+        session = tester.session
+        before = session.received(cls).total
+        one = await session.command(MavCmd.REQUEST_MESSAGE, cls.id)
+        if not one.accepted:
+            raise Failed(one.answer)
+        if not await session.runner.until(
+                lambda: session.received(cls).total > before,
+                REQUEST_TIMEOUT) and await session.request(cls) is None:
+            raise Failed(f'MAV_RESULT_ACCEPTED, but no {cls.name}')
+        return measurement(session)
+    return check
+
+
+def _identity_strings(
+    name: str, title: str, deviation: Callable[[str, bytes], str],
+) -> Requirement[Tester]:
+    """
+    Return a requirement on each string of COMPONENT_INFORMATION_BASIC.
+
+    :param deviation: returns what is wrong with a field of a name, '' if nothing.
+    """
+    @requirement(name, title, MESSAGES, messages.ComponentInformationBasic.name)
+    async def check(tester: Tester) -> None:
+        session, cls = tester.session, messages.ComponentInformationBasic
+        if not session.received(cls) and await session.request(cls) is None:
+            raise Skipped('no COMPONENT_INFORMATION_BASIC was received')
+        if wrong := [text for one, value in asdict(session.received(cls)[-1][1]).items()
+                     if isinstance(value, bytes) and (text := deviation(one, value))]:
+            raise Failed(', '.join(wrong))
+    return check
+
+
+def _unprintable(name: str, value: bytes) -> str:
+    raw = value.partition(b'\0')[0]
+    # The length limit may have cut the last character.
+    shown = raw.decode('utf-8', errors='ignore')
+    cut = len(raw) - len(shown.encode())
+    return '' if shown.isprintable() and cut <= 3 else f'{name} {raw!r}'
+
+
+IDENTITY_STRINGS = (
+    _identity_strings(
+        'information-terminated', 'terminates every identity string with NUL',
+        lambda name, value: '' if b'\0' in value else f'{name} has no terminator'),
+    _identity_strings(
+        'information-text', 'sends printable text in every identity string', _unprintable),
+)
+
+
+# The status stream, and its interval
+
+def status_stream(
+    status: type[Message], specification: Specification, section: str,
+) -> Requirement[Tester]:
+    """Return the requirement on the regularity of the status."""
+    @requirement('status-stream', f'sends {status.name} at a regular rate', specification,
+                 section)
+    async def check(tester: Tester) -> str:
+        times = periods(tester.session.idle(status))
+        if not times:
+            raise Failed('it sends at most one without a request')
+        if max(times) > 2 * median_high(times) + 0.1:
+            raise Failed(f'irregular: intervals of {min(times):.2f} to {max(times):.2f} s')
+        return f'every {median_high(times):.2f} s'
+    return check
+
+
+def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], ...]:
+    """Return the requirements ``interval``, ``interval-stop`` and ``interval-default``."""
+    on_interval = partial(requirement, specification=MESSAGES,
+                          section='MAV_CMD_SET_MESSAGE_INTERVAL', changes=True)
+
+    async def set_interval(tester: Tester, interval: float) -> None:
+        one = await tester.session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
+        if not one.accepted:
+            raise one.failure()
+
+    @on_interval('interval', f'sends {status.name} at the requested interval')
+    async def requested(tester: Tester) -> str:
+        await set_interval(tester, INTERVAL * 1e6)
+        # No device has this default.
+        times = periods(await tester.session.receive_more(
+            status, WATCH_TIME, round(10 * WATCH_TIME / INTERVAL)))
+        if not times:
+            raise Failed(f'accepted, but at most one was received in {WATCH_TIME:g} s')
+        text = f'requested {INTERVAL:g} s, received every {median_high(times):.2f} s'
+        if not 0.6 * INTERVAL < median_high(times) < 1.6 * INTERVAL:
+            raise Failed(text)
+        return text
+
+    @on_interval('interval-stop', 'stops the stream on interval -1')
+    async def stopped(tester: Tester) -> None:
+        await set_interval(tester, -1)
+        # A message may be under way.
+        await tester.session.runner.sleep(0.3)
+        before = tester.session.received(status).total
+        await tester.session.runner.sleep(WATCH_TIME)
+        if count := tester.session.received(status).total - before:
+            raise Failed(f'accepted, but still received in {WATCH_TIME:g} s: {count}')
+
+    @on_interval('interval-default', 'returns to its default rate on interval 0')
+    async def default(tester: Tester) -> None:
+        await set_interval(tester, 0)
+        if len(await tester.session.receive_more(status, DEFAULT_TIMEOUT, 2)) >= 2:
+            return
+        if not tester.session.idle(status):
+            raise Skipped('none was received, before the first command either')
+        raise Failed(f'accepted, but at most one was received in {DEFAULT_TIMEOUT:g} s')
+
+    return requested, stopped, default
+
+
+async def restore_interval(session: Session, status: type[Message]) -> None:
+    """Restore the interval that the status had before the first command."""
+    set_interval = partial(session.command, MavCmd.SET_MESSAGE_INTERVAL, status.id)
+    before = periods(session.idle(status))
+    if not before:
+        await set_interval(-1)
+        return
+    period = median_high(before)
+    await set_interval(0)
+    times = periods(await session.receive_more(status, 3.5 * period + 0.5, 3))
+    if not times or not math.isclose(median_high(times), period, rel_tol=0.25, abs_tol=0.02):
+        await set_interval(round(period, 3) * 1e6)
+
+
+# The messages of a whole run
+
+@requirement('heartbeat-rate', 'sends HEARTBEAT at about 1 Hz', HEARTBEAT,
+             'HEARTBEAT Broadcast Frequency', whole_run=True)
+async def heartbeat_rate(tester: Tester) -> str:
+    """Measure all intervals, and the time since the latest."""
+    received = tester.session.received(Heartbeat)
+    gaps = periods(received)
+    if not gaps:
+        raise Skipped('fewer than two were received')
+    text = f'every {median_high(gaps):.2f} s, at most {max(gaps):.2f} s apart'
+    last_gap = tester.session.now - received[-1][0]
+    if not 0.4 < median_high(gaps) < 2.0 or max(*gaps, last_gap) > MAX_HEARTBEAT_GAP:
+        raise Failed(text)
+    return text
+
+
+def none_of(failures: Sequence[Failed], total: int, objects: str) -> str:
+    """
+    Return how many objects were examined.
+
+    :raises Failed: if there are failures.
+    """
+    if failures:
+        quoted, more = failures[:MAX_QUOTED], len(failures) - MAX_QUOTED
+        raise Failed(f'{len(failures)} of {total} {objects}: {"; ".join(map(str, quoted))}'
+                     + (f'; and {more} more' if more > 0 else ''),
+                     [line for one in quoted for line in one.lines or ()])
+    return f'{total} {objects}'
+
+
+def _for_each_command(
+    name: str, title: str, section: str, deviation: Callable[[Transaction, Address], str],
+    measurement: Callable[[Sequence[Transaction]], str] = lambda every: '',
+) -> Requirement[Tester]:
+    """
+    Return a requirement on the acknowledgements of every command.
+
+    :param deviation: returns what is wrong with a command from our address, '' if nothing.
+    :param measurement: returns a text that follows the number of commands.
+    """
+    @requirement(name, title, COMMAND, section, whole_run=True)
+    async def check(tester: Tester) -> str:
+        every = [one for one in tester.session.transactions if one.expected]
+        if not every:
+            raise Skipped('no command was sent')
+        return none_of([Failed(f'{one.text} ({wrong})', one.lines) for one in every
+                        if (wrong := deviation(one, tester.session.address))],
+                       len(every), 'commands') + measurement(every)
+    return check
+
+
+def _not_at_first(one: Transaction, sender: Address) -> str:
+    # On a lossy link the attempts show the link's loss.
+    return f'{len(one.sent)} attempts, {one.answer}' if len(one.sent) > 1 or not one.acks else ''
+
+
+def _more_than_once(one: Transaction, sender: Address) -> str:
+    return f'{len(one.finals)} acknowledgements' if len(one.finals) > len(one.sent) else ''
+
+
+def _delay(one: Transaction) -> float:
+    # After a repetition it is not known which attempt was acknowledged.
+    return one.acks[0].at - one.sent[0] if len(one.sent) == 1 and one.acks else 0.0
+
+
+def _late(one: Transaction, sender: Address) -> str:
+    return f'{_delay(one):.2f} s' if _delay(one) > PROMPT else ''
+
+
+def _to_others(one: Transaction, sender: Address) -> str:
+    # The target fields are extensions, so they may be missing.
+    return ', '.join(
+        f'to {ack.target}' for ack in one.acks
+        if any(value not in (0, ours) for value, ours in zip(ack.target, sender, strict=True)))
+
+
+def _unfinished(one: Transaction, sender: Address) -> str:
+    reports = [ack for ack in one.acks if ack.result == MavResult.IN_PROGRESS]
+    if not reports:
+        return ''
+    if not one.finals:
+        return 'never'
+    if (seconds := one.finals[-1].at - one.sent[0]) > FINISHED:
+        return f'after {seconds:.1f} s'
+    return 'progress above 100 %' if any(100 < ack.progress < 255 for ack in reports) else ''
+
+
+def _busy(one: Transaction, sender: Address) -> str:
+    # Commands are never sent in parallel here.
+    return ', '.join(result_name(ack.result) for ack in one.acks
+                     if ack.result == MavResult.TEMPORARILY_REJECTED)
+
+
+ACKNOWLEDGEMENTS = (
+    _for_each_command('acknowledged', 'acknowledges every command at the first attempt',
+                      'COMMAND_LONG sequence', _not_at_first),
+    _for_each_command('acknowledged-once', 'acknowledges every command once',
+                      'COMMAND_LONG sequence', _more_than_once),
+    _for_each_command('acknowledged-promptly', f'acknowledges every command within {PROMPT:g} s',
+                      'COMMAND_INT sequence', _late, lambda every:
+                      f', the slowest {max(map(_delay, every)) * 1000:.0f} ms'),
+    _for_each_command('acknowledged-to-us', 'addresses acknowledgements to the sender, or leaves '
+                      'their target 0', 'Message/Enum Summary', _to_others),
+    _for_each_command('finished', f'completes every change within {FINISHED:g} s',
+                      'Long Running Commands', _unfinished),
+    _for_each_command('not-busy', 'never rejects a command temporarily while it is idle',
+                      'Long Running Commands', _busy),
+)
+
+
+@requirement('checksums', 'sends frames with correct checksums', SERIALIZATION, 'Checksum',
+             whole_run=True)
+async def checksums(tester: Tester) -> None:
+    """Count the frames that the link has dropped; noise on a line counts, too."""
+    if count := tester.conditions.checksum_errors():
+        raise Failed(f'{count} {"frame" if count == 1 else "frames"} with a wrong checksum')
