@@ -24,6 +24,8 @@ from support.recording import Recorder
 from support.ros import Parameters, Ros
 
 THROTTLING = 1
+# s between two lines about changes by another sender, at least.
+LOG_INTERVAL = 1.0
 START = {'mode': 'internal_control', 'brightness': 80.0, 'strobe_period': 0.0,
          'strobe_duty_cycle': 0.0}
 
@@ -49,6 +51,7 @@ def test_change_by_another_sender_moves_parameters_with_one_line_one_event_and_n
     ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program, events: Recorder,
     report: dict[str, float], shown: dict[str, object], line: str,
 ) -> None:
+    ros.outlast(LOG_INTERVAL, ['/illuminator'])
     lines = len(bridge.lines)
 
     light.report(**report)
