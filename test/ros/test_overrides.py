@@ -172,17 +172,3 @@ def test_parameters_of_one_bridge_can_be_given_to_the_next(
             assert light.fake.fields['brightness'] == 55.0
             assert bridge.count('WARN') + bridge.count('ERROR') == 0
             assert parameters.get('heartbeat_timeout') == [2.0]
-
-
-def test_parameters_dumped_before_the_first_light_can_be_loaded(
-    own_ros: Ros, port: int, tmp_path: Path,
-) -> None:
-    with running_bridge(own_ros.domain, port):
-        parameters = Parameters(own_ros)
-        names = parameters.names()
-        values = [list(value) if isinstance(value, list | tuple) else value
-                  for value in parameters.get(*names)]
-    file = write(tmp_path / 'dump.yaml', (FULL, dict(zip(names, values, strict=True))))
-
-    with running_bridge(own_ros.domain, port, '--params-file', file) as bridge:
-        assert bridge.count('WARN') + bridge.count('ERROR') == 0

@@ -24,6 +24,7 @@ import signal
 import subprocess
 import sys
 
+from illuminator_ros.mavlink.link import Link
 import pytest
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Bool
@@ -53,7 +54,8 @@ def blocked_pipe() -> Iterator[int]:
 def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
     own_ros: Ros, port: int, light_answers: bool,
 ) -> None:
-    with blocked_pipe() as output, ServedLight(port) as light:
+    # Both by the clock of the machine: the bridge compares uptimes with its own time.
+    with blocked_pipe() as output, ServedLight(port, link=Link) as light:
         process = subprocess.Popen(
             [sys.executable, '-m', 'illuminator_ros.bridge',
              *bridge_arguments(port, '--log-level', 'debug', off_on_shutdown=True)],

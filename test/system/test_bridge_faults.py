@@ -47,14 +47,6 @@ def test_shutdown_covers_lights_that_have_no_node_yet_and_names_each(
         assert bridge.count('is off: off, confirmed') == count
 
 
-def test_light_that_is_left_on_is_named(own_ros: Ros, port: int) -> None:
-    with (running_bridge(own_ros.domain, port) as bridge,
-          ServedLight(port, enable=1)):
-        Parameters(own_ros).wait(brightness=100.0)
-        bridge.end()
-        assert bridge.count('[WARN]') == bridge.count('light 1/243 is left on') == 1
-
-
 @pytest.fixture
 def served(own_ros: Ros, port: int) -> Iterator[tuple[Program, ServedLight]]:
     """Run a bridge with a light."""
