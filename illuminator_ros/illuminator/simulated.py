@@ -21,16 +21,32 @@ https://mavlink.io/en/services/illuminator.html
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 import math
 from typing import Any
 
-from .faults import FAULTS
-from .messages import STATUS_ID
-from .model import checked, Configuration, flag_names, InvalidValue, Mode
-from .simulated_lamp import SimulatedLamp
-from .simulated_properties import IlluminatorBehaviour, IlluminatorProperties
-from ..mavlink.messages import INFORMATION_ID, MavCmd, MavResult
+from .messages import IlluminatorStatus, STATUS_ID
+from .model import (
+    checked,
+    Configuration,
+    ErrorFlag,
+    flag_names,
+    InvalidValue,
+    Limits,
+    Mode,
+)
+from .simulated_properties import FAULTS, IlluminatorBehaviour, IlluminatorProperties
+from .thermal import ThermalModel
+from ..mavlink.messages import (
+    ComponentInformationBasic,
+    define,
+    INFORMATION_ID,
+    MavCmd,
+    MavResult,
+    Message,
+    UInt8,
+)
 from ..payload.faults import Behaviour
 from ..payload.settings import number
 from ..payload.simulated import (
@@ -50,107 +66,156 @@ TEMPERATURE_STEP = 5.0
 # % of a strobe that is started by hand while the duty cycle is 0 %.
 DEFAULT_DUTY_CYCLE = 50.0
 
-
 _number = number(-math.inf, math.inf)
 _celsius = number(-273.15, 1000.0)
+
+
+@define(STATUS_ID, 'ILLUMINATOR_STATUS', extensions=3)
+@dataclass(slots=True)
+class ExtendedIlluminatorStatus(IlluminatorStatus):
+    """
+    A vendor's ILLUMINATOR_STATUS of 38 bytes, to be sent; receivers ignore the last three.
+
+    :ivar zoom_level: %.
+    :ivar color_mode: 0 white, 1 red, 2 blue, 255 not applicable.
+    :ivar gimbal_device_id: component id or gimbal number, 0 for none.
+    """
+
+    zoom_level: UInt8
+    color_mode: UInt8
+    gimbal_device_id: UInt8
 
 
 def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Change:
     # 0 % is dark, so that a period alone would end the light.
     duty_cycle = (_number(words[1]) if len(words) > 1
-                  else light.lamp.configuration.strobe_duty_cycle or DEFAULT_DUTY_CYCLE)
+                  else light.configuration.strobe_duty_cycle or DEFAULT_DUTY_CYCLE)
     return light.press(now, strobe_period=_number(words[0]), strobe_duty_cycle=duty_cycle)
 
 
-COMMANDS: dict[str, ConsoleCommand[SimulatedIlluminator, Change]] = {
-    'on': ConsoleCommand('on', 'switch on, as by a button on the light',
-                         lambda light, words, now: light.press(now, enabled=True)),
-    'off': ConsoleCommand('off', 'switch off, likewise',
-                          lambda light, words, now: light.press(now, enabled=False)),
-    'brightness': ConsoleCommand(
-        'brightness PERCENT', 'set it, likewise',
-        lambda light, words, now: light.press(now, brightness=_number(words[0])), (1,)),
-    'mode': ConsoleCommand(
-        'mode MODE', 'internal_control or external_sync, likewise',
-        lambda light, words, now: light.press(now, mode=words[0]), (1,)),
-    'strobe': ConsoleCommand(
-        'strobe S [PERCENT]', 'period and duty cycle, likewise; 0 ends it', _strobe, (1, 2)),
-    'ambient': ConsoleCommand(
-        'ambient DEG_C', 'change the ambient temperature',
-        lambda light, words, now: partial(light.lamp.set_ambient, _celsius(words[0]), now),
-        (1,)),
-    'temperature': ConsoleCommand(
-        'temperature DEG_C', "change the light's own temperature",
-        lambda light, words, now: partial(light.lamp.heat_to, _celsius(words[0]), now), (1,)),
-}
+COMMANDS: tuple[ConsoleCommand[SimulatedIlluminator, Change], ...] = (
+    ConsoleCommand('on', 'switch on, as by a button on the light',
+                   lambda light, words, now: light.press(now, enabled=True)),
+    ConsoleCommand('off', 'switch off, likewise',
+                   lambda light, words, now: light.press(now, enabled=False)),
+    ConsoleCommand('brightness PERCENT', 'set it, likewise',
+                   lambda light, words, now: light.press(now, brightness=_number(words[0])), (1,)),
+    ConsoleCommand('mode MODE', 'internal_control or external_sync, likewise',
+                   lambda light, words, now: light.press(now, mode=words[0]), (1,)),
+    ConsoleCommand('strobe S [PERCENT]', 'period and duty cycle, likewise; 0 ends it', _strobe,
+                   (1, 2)),
+    ConsoleCommand('ambient DEG_C', 'change the ambient temperature', lambda light, words, now:
+                   partial(light.set_ambient, _celsius(words[0]), now), (1,)),
+    ConsoleCommand('temperature DEG_C', "change the light's own temperature", lambda light, words,
+                   now: partial(light.heat_to, _celsius(words[0]), now), (1,)),
+)
 
 
 class SimulatedIlluminator(SimulatedDevice):
-    """A simulated light, without the link: see :class:`SimulatedDevice`."""
+    """
+    A simulated light, without the link: see :class:`SimulatedDevice`.
+
+    :ivar enabled: whether it is on.
+    :ivar configuration: as commanded.
+    """
 
     changes = frozenset({MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE})
     faults = FAULTS
     commands = COMMANDS
     behaviour: IlluminatorBehaviour
-    lamp: SimulatedLamp
 
     def __init__(self, properties: IlluminatorProperties) -> None:
         super().__init__(properties.behaviour)
         self.properties = properties
-        self.lamp = SimulatedLamp(properties)
-        self.lamp.thermal.sensor_failed = self.behaviour.thermistor_failed
+        self.thermal = ThermalModel(properties.thermal)
+        self.thermal.sensor_failed = self.behaviour.thermistor_failed
+        self.restart(0.0)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """See :meth:`SimulatedDevice.behave`."""
-        self.lamp.warm(now)
+        self.warm(now)
         super().behave(behaviour, now)
-        self.lamp.thermal.sensor_failed = self.behaviour.thermistor_failed
+        self.thermal.sensor_failed = self.behaviour.thermistor_failed
 
     def restart(self, now: float) -> None:
-        """See :meth:`SimulatedDevice.restart`."""
-        self.lamp.restart(now)
+        """See :meth:`SimulatedDevice.restart`; the temperature stays."""
+        self.enabled = False
+        self.configuration = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
+        self._last_brightness = self.configuration.brightness
+        self._booted_at = now
+        self._warmed_at = now
 
     def streams(self) -> Mapping[int, float]:
         """See :meth:`SimulatedDevice.streams`."""
         return {STATUS_ID: self.properties.status_interval}
 
-    def message(self, message_id: int, now: float) -> Any:
+    def message(self, message_id: int, now: float) -> Message | None:
         """See :meth:`SimulatedDevice.message`."""
         if message_id == STATUS_ID:
             return self.status(now)
         if message_id == INFORMATION_ID and self.behaviour.identifies:
-            return self.lamp.information(self.behaviour, now)
+            return self._information(now)
         return None
 
-    def status(self, now: float) -> Any:
+    def uptime_ms(self, now: float) -> int:
+        """Return the time since the start, ms, wrapping as the field does."""
+        return int((now - self._booted_at) * 1000) & 0xFFFFFFFF
+
+    def status(self, now: float) -> IlluminatorStatus:
         """Return the ILLUMINATOR_STATUS of this moment."""
-        return self.lamp.status(self.behaviour, now)
+        self.warm(now)
+        behaviour, configuration = self.behaviour, self.configuration
+        brightness = configuration.brightness * self.thermal.output
+        if behaviour.brightness_is_switch and not self.enabled:
+            brightness = 0.0
+        flags = int(self.thermal.flags) | behaviour.false_flags
+        if behaviour.inverted_flags and self.enabled:
+            flags ^= ErrorFlag.THERMAL_THROTTLING
+        limits = self.properties.limits if behaviour.measures else Limits()
+        fields = (
+            self.uptime_ms(now) if behaviour.has_clock else 0, int(self.enabled),
+            self.properties.reported_bitmask, flags, int(configuration.mode), brightness,
+            configuration.strobe_period, configuration.strobe_duty_cycle,
+            self.thermal.reading if behaviour.measures else 0.0,
+            limits.min_strobe_period, limits.max_strobe_period)
+        if behaviour.extension is not None:
+            return ExtendedIlluminatorStatus(*fields, *behaviour.extension)
+        return IlluminatorStatus(*fields)
+
+    def _information(self, now: float) -> ComponentInformationBasic:
+        behaviour, identity = self.behaviour, self.properties.identity
+
+        def string(text: str, size: int) -> bytes:
+            if behaviour.padding:
+                return text.ljust(size, behaviour.padding).encode()[:size]
+            return text.encode()[:size - behaviour.terminates]
+
+        return ComponentInformationBasic(
+            self.uptime_ms(now) if behaviour.has_clock else 0, 0, 0,
+            string(identity.vendor, 32), string(identity.model, 32),
+            string(identity.software_version, 24), string(identity.hardware_version, 24),
+            string(identity.serial_number, 32))
 
     def execute(self, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""
-        self.lamp.warm(now)
+        self.warm(now)
         if command.command == MavCmd.ILLUMINATOR_ON_OFF:
-            return self._switch(command.param1)
+            valid = command.param1 in (0.0, 1.0) or self.behaviour.accepts_out_of_range
+            on = command.param1 == 1.0 and not (self.behaviour.toggles and self.enabled)
+            return CommandReply(
+                MavResult.ACCEPTED if valid else MavResult.DENIED, partial(self._switch, on))
         if command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE:
-            return self._configure(
+            return self._configuration_reply(
                 command.param1, command.param2, command.param3, command.param4)
         return None
 
-    def _switch(self, param: float) -> CommandReply:
-        valid = param in (0.0, 1.0) or self.behaviour.accepts_out_of_range
-        on = param == 1.0 and not (self.behaviour.toggles and self.lamp.enabled)
-        return CommandReply(
-            MavResult.ACCEPTED if valid else MavResult.DENIED, lambda: self.lamp.switch(
-                on, brightness_is_switch=self.behaviour.brightness_is_switch))
-
-    def _configure(
+    def _configuration_reply(
         self, mode: float, brightness: float, period: float, duty_cycle: float,
     ) -> CommandReply:
         behaviour, limits = self.behaviour, self.properties.limits
         known = mode in (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
         configuration = Configuration(
-            Mode(int(mode)) if known else self.lamp.configuration.mode, brightness, period,
-            duty_cycle)
+            Mode(int(mode)) if known else self.configuration.mode, brightness, period, duty_cycle)
         try:
             if mode not in self.properties.modes:
                 raise InvalidValue(f'mode {mode}')
@@ -164,9 +229,21 @@ class SimulatedIlluminator(SimulatedDevice):
             accepted = behaviour.accepts_out_of_range
         else:
             accepted = True
-        return CommandReply(
-            MavResult.ACCEPTED if accepted else MavResult.DENIED, lambda: self.lamp.configure(
-                configuration, brightness_is_switch=behaviour.brightness_is_switch))
+        return CommandReply(MavResult.ACCEPTED if accepted else MavResult.DENIED,
+                            partial(self._configure, configuration))
+
+    def _switch(self, on: bool) -> None:
+        self.enabled = on
+        # With 0 % meaning off, ON restores the last brightness above 0.
+        if (on and self.behaviour.brightness_is_switch and not self.configuration.brightness):
+            self.configuration = replace(self.configuration, brightness=self._last_brightness)
+
+    def _configure(self, configuration: Configuration) -> None:
+        self.configuration = configuration
+        if configuration.brightness > 0:
+            self._last_brightness = configuration.brightness
+        if self.behaviour.brightness_is_switch:
+            self.enabled = configuration.brightness > 0
 
     def press(self, now: float, *, enabled: bool | None = None, **changes: Any) -> Change:
         """
@@ -174,25 +251,45 @@ class SimulatedIlluminator(SimulatedDevice):
 
         :raises InvalidValue: if the light cannot be set so.
         """
-        self.lamp.warm(now)
-        configuration = self.lamp.configuration.with_changes({
+        self.warm(now)
+        configuration = self.configuration.with_changes({
             name: checked(name, value, self.properties.limits)
             for name, value in changes.items()})
 
         def change() -> None:
-            is_switch = self.behaviour.brightness_is_switch
             if changes:
-                self.lamp.configure(configuration, brightness_is_switch=is_switch)
+                self._configure(configuration)
             if enabled is not None:
-                self.lamp.switch(enabled, brightness_is_switch=is_switch)
+                self._switch(enabled)
         return change
+
+    def heat_to(self, temperature: float, now: float) -> None:
+        """Set the temperature, degC."""
+        self.warm(now)
+        self.thermal.temperature = temperature
+
+    def set_ambient(self, temperature: float, now: float) -> None:
+        """Set the ambient temperature, degC."""
+        self.warm(now)
+        self.thermal.ambient = temperature
+
+    def warm(self, now: float) -> None:
+        """Advance the temperature to this moment; call it before each change of the state."""
+        configuration = self.configuration
+        power = configuration.brightness / 100 if self.enabled else 0.0
+        if configuration.strobe_period:
+            power *= configuration.strobe_duty_cycle / 100
+        # A light that has accepted NaN heats as at full power.
+        power = min(max(power, 0.0), 1.0) if math.isfinite(power) else 1.0
+        self.thermal.advance((now - self._warmed_at) * self.properties.time_scale, power)
+        self._warmed_at = now
 
     def snapshot(self, now: float) -> Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
-        status, temperature = self.status(now), self.lamp.thermal.temperature
+        status, temperature = self.status(now), self.thermal.temperature
         period, duty = status.strobe_period, status.strobe_duty_cycle
         mode = Mode(status.mode)
-        state = ('ON ' if self.lamp.enabled else 'off', f'{status.brightness:>5.3g} %',
+        state = ('ON ' if self.enabled else 'off', f'{status.brightness:>5.3g} %',
                  f'{f"strobe {period:g} s, {duty:g} %" if period else "no strobe":18}')
         notes = tuple(filter(None, (
             '' if mode is Mode.INTERNAL_CONTROL else mode.label,

@@ -12,15 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The properties of a simulated light, and the profiles: kinds of lights seen in the field."""
+"""The properties of a simulated light, its faults, and profiles: lights seen in the field."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from .model import Limits, Mode
+from .model import ErrorFlag, Limits, Mode
 from .thermal import ThermalProperties
+from .. import __version__
 from ..mavlink.messages import (
     Address,
     MAV_AUTOPILOT_ARDUPILOTMEGA,
@@ -29,8 +30,10 @@ from ..mavlink.messages import (
     MAV_STATE_UNINIT,
     MavType,
 )
-from ..payload.faults import Behaviour
+from ..payload.faults import Behaviour, Fault, FaultTable
+from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.identity import Identity
+from ..payload.settings import integer
 
 
 class Extension(NamedTuple):
@@ -78,14 +81,33 @@ class IlluminatorBehaviour(Behaviour):
     thermistor_failed: bool = False
 
 
+FAULTS = FaultTable({
+    **COMPONENT_FAULTS,
+    'thermistor': Fault('thermistor_failed', 'its temperature sensor fails: THERMISTOR_FAILURE, '
+                        'and temp_c stays at 0'),
+    'no-clock': Fault('has_clock', 'reports an uptime of 0', default=False),
+    'no-identity': Fault('identifies', 'sends no COMPONENT_INFORMATION_BASIC', default=False),
+    'no-terminator': Fault('padding', 'fills its strings with blanks, to the last byte',
+                           default=' '),
+    'nan': Fault('accepts_nan', 'accepts NaN'),
+    'anything': Fault('accepts_out_of_range', 'accepts values out of range'),
+    'toggle': Fault('toggles', 'is switched off by switching it on again'),
+    'flags': Fault('false_flags', 'reports error flags without a reason',
+                   'FLAGS', integer(1, 0xFFFFFFFF), int(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)),
+    'cold-throttling': Fault('inverted_flags', 'reports THERMAL_THROTTLING while it is on and '
+                             'cool, not while it is hot'),
+})
+
+
 @dataclass(frozen=True)
 class IlluminatorProperties:
     """
     The properties of a simulated light.
 
     :param name: its name for people.
-    :param mode_bitmask: as reported; by default the enum values of the supported modes, or-ed.
     :param modes: the modes that it can be configured to.
+    :param mode_bitmask: as reported; None follows from the modes.
+    :param shifted_bitmask: whether mode_bitmask then has 1 << mode for a mode, else the mode.
     :param status_interval: s between statuses by default; 0 sends none.
     :param time_scale: factor by which it heats and cools faster than real time.
     :param behaviour: how it behaves at first, and without faults.
@@ -93,62 +115,64 @@ class IlluminatorProperties:
     """
 
     address: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
-    identity: Identity = field(default_factory=lambda: Identity(
-        'illuminator_ros', 'simulator', '1.0.0', '1.0.0', 'SIM-1-243'))
+    identity: Identity = Identity(
+        'illuminator_ros', 'simulator', __version__, '1.0.0', 'SIM-1-243')
     limits: Limits = Limits(0.05, 10.0)
-    mode_bitmask: int = Mode.INTERNAL_CONTROL | Mode.EXTERNAL_SYNC
+    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
+    mode_bitmask: int | None = None
+    shifted_bitmask: bool = False
     status_interval: float = 1.0
     thermal: ThermalProperties = ThermalProperties()
     time_scale: float = 1.0
     name: str = ''
-    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
     behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
     seed: int = 0
 
+    @property
+    def reported_bitmask(self) -> int:
+        """The mode_bitmask of ILLUMINATOR_STATUS."""
+        if self.mode_bitmask is not None:
+            return self.mode_bitmask
+        return sum({1 << mode if self.shifted_bitmask else mode for mode in self.modes})
 
-@dataclass(frozen=True)
-class Profile:
-    """
-    A light seen in the field.
 
-    :param shifted_bitmask: whether mode_bitmask has 1 << mode for a mode, else the mode itself.
-    """
+class Profile(NamedTuple):
+    """A light seen in the field."""
 
     description: str
-    address: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
-    behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
-    limits: Limits = Limits(0.05, 10.0)
-    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
-    shifted_bitmask: bool = False
-    identity: Identity | None = field(default=None)
+    properties: IlluminatorProperties
 
 
 PROFILES = {
-    'default': Profile('follows the protocol in everything'),
+    'default': Profile('follows the protocol in everything', IlluminatorProperties()),
     # The emulator of the developer guide, with its deviations from the protocol.
     'reference': Profile(
         'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
         'status at 1 Hz or not at all',
-        Address(255, 0),
-        IlluminatorBehaviour(
-            heartbeat_state=MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
-            status_on_change=False, terminates=False, filters_target=False,
-            answers_command_int=False, acks_target=False, apply_after=0.005, accepts_nan=True),
-        limits=Limits(0.0, 10.0),
-        identity=Identity(
-            'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
-            'Illuminator Hardware Version', 'Illuminator Serial Number')),
+        IlluminatorProperties(
+            address=Address(255, 0), limits=Limits(0.0, 10.0),
+            identity=Identity(
+                'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
+                'Illuminator Hardware Version', 'Illuminator Serial Number'),
+            behaviour=IlluminatorBehaviour(
+                heartbeat_state=MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
+                status_on_change=False, terminates=False, filters_target=False,
+                answers_command_int=False, acks_target=False, apply_after=0.005,
+                accepts_nan=True))),
     'ardusub': Profile(
         "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
         'for what it does not measure, brightness 0 is off',
-        Address(1, MAV_COMP_ID_AUTOPILOT1),
-        IlluminatorBehaviour(
-            heartbeat_type=MavType.SUBMARINE, heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA,
-            measures=False, identifies=False, brightness_is_switch=True, status_on_change=False,
-            accepts_nan=True),
-        limits=Limits(0.0, 0.0), modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True),
+        IlluminatorProperties(
+            address=Address(1, MAV_COMP_ID_AUTOPILOT1), limits=Limits(0.0, 0.0),
+            modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True,
+            behaviour=IlluminatorBehaviour(
+                heartbeat_type=MavType.SUBMARINE,
+                heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA, measures=False,
+                identifies=False, brightness_is_switch=True, status_on_change=False,
+                accepts_nan=True))),
     'extended': Profile(
         'a vendor extension: 38 bytes of status, with zoom_level, color_mode and '
         'gimbal_device_id',
-        behaviour=IlluminatorBehaviour(extension=Extension(zoom_level=25, color_mode=1))),
+        IlluminatorProperties(behaviour=IlluminatorBehaviour(
+            extension=Extension(zoom_level=25, color_mode=1)))),
 }

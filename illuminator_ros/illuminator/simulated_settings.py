@@ -16,15 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
 from .model import Limits, Mode, MODES
 from .simulated import SimulatedIlluminator
-from .simulated_properties import Extension, IlluminatorProperties, Profile, PROFILES
+from .simulated_properties import Extension, IlluminatorProperties, PROFILES
 from .thermal import ThermalProperties
-from .. import __version__
 from ..mavlink.messages import Address
 from ..payload.identity import Identity
 from ..payload.settings import integer, number, one_of, Setting, text
@@ -79,8 +78,8 @@ SETTINGS: dict[str, Setting] = {
 }
 
 
-def _profile(settings: Mapping[str, Any]) -> Profile:
-    return PROFILES[settings.get('profile', 'default')]
+def _profile(settings: Mapping[str, Any]) -> IlluminatorProperties:
+    return PROFILES[settings.get('profile', 'default')].properties
 
 
 def properties(
@@ -92,40 +91,33 @@ def properties(
     :param several: whether its serial number must differ from those of other lights.
     :raises ValueError: if they contradict each other.
     """
+    def given(names: Iterable[str]) -> dict[str, Any]:
+        return {name: settings[name] for name in names if name in settings}
+
     profile = _profile(settings)
-    limits = Limits(settings.get('min_strobe_period', profile.limits.min_strobe_period),
-                    settings.get('max_strobe_period', profile.limits.max_strobe_period))
+    limits = replace(profile.limits, **given(field.name for field in fields(Limits)))
     if limits.min_strobe_period > limits.max_strobe_period:
         raise ValueError('min_strobe_period is above max_strobe_period')
-    modes = settings.get('modes', profile.modes)
-    bitmask = 0
-    for mode in modes:
-        bitmask |= 1 << mode if profile.shifted_bitmask else mode
     behaviour = profile.behaviour
-    extension = {name: settings[name] for name in Extension._fields if name in settings}
-    if extension:
+    if extension := given(Extension._fields):
         behaviour = replace(
             behaviour, extension=(behaviour.extension or Extension())._replace(**extension))
-    identity = profile.identity or Identity(
-        'illuminator_ros', 'simulator', __version__, '1.0.0',
-        f'SIM-{address.system}-{address.component}')
-    given = {field.name: settings[field.name] for field in fields(Identity)
-             if field.name in settings}
-    if several and 'serial_number' in given:
-        given['serial_number'] += f'-{address.component}'
-    ambient = {'ambient': settings['ambient']} if 'ambient' in settings else {}
-    return IlluminatorProperties(
-        address=address, identity=replace(identity, **given), limits=limits, modes=modes,
-        mode_bitmask=settings.get('mode_bitmask', bitmask),
-        status_interval=settings.get('status_interval', 1.0),
-        thermal=ThermalProperties(**{**ambient, **settings.get('thermal', {})}),
-        time_scale=settings.get('time_scale', 1.0), behaviour=behaviour)
+    identity = profile.identity
+    if profile.identity == IlluminatorProperties.identity:
+        identity = replace(identity, serial_number=f'SIM-{address.system}-{address.component}')
+    identity = replace(identity, **given(field.name for field in fields(Identity)))
+    if several and 'serial_number' in settings:
+        identity = replace(
+            identity, serial_number=f'{identity.serial_number}-{address.component}')
+    return replace(
+        profile, address=address, identity=identity, limits=limits, behaviour=behaviour,
+        thermal=ThermalProperties(**{**given(['ambient']), **settings.get('thermal', {})}),
+        **given(['modes', 'mode_bitmask', 'status_interval', 'time_scale']))
 
 
 SIMULATED = SimulatedType(
     'light', 'lights', SimulatedIlluminator,
-    make=lambda settings, address, several: SimulatedIlluminator(
-        properties(settings, address, several)),
+    make=lambda *settings: SimulatedIlluminator(properties(*settings)),
     address=lambda settings: _profile(settings).address,
     settings=SETTINGS,
     profiles={name: profile.description for name, profile in PROFILES.items()},

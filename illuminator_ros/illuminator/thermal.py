@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a light gets hot, and what it does about it."""
+"""The temperature of a simulated light, and its effect on brightness and error flags."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ import math
 
 from .model import ErrorFlag
 
-# degC; what an open thermistor reads like, and what receivers take for "not measured".
+# degC; the reading of an open thermistor, which receivers take for "not measured".
 BROKEN_READING = 0.0
 
 
@@ -35,7 +35,7 @@ class ThermalProperties:
     :param time_constant: s.
     :param throttle_at: degC at which brightness is cut to ``throttle_to`` (a share, 0..1) ...
     :param throttle_until: ... until it is cooler than this, degC.
-    :param shutdown_at: degC at which the light goes dark ...
+    :param shutdown_at: degC at which the light switches itself off ...
     :param shutdown_until: ... until it is cooler than this, degC.
     """
 
@@ -63,48 +63,37 @@ class ThermalModel:
 
     :ivar temperature: degC.
     :ivar ambient: degC.
-    :ivar flags: what it makes the light report.
+    :ivar sensor_failed: whether the light cannot measure its temperature.
     """
 
     def __init__(self, properties: ThermalProperties) -> None:
         self.properties = properties
         self.ambient = self.temperature = properties.ambient
-        self.flags = ErrorFlag(0)
-        self._sensor_failed = False
+        self.sensor_failed = False
+        self._flags = ErrorFlag(0)
 
     @property
-    def sensor_failed(self) -> bool:
-        """Whether the light cannot tell its temperature: it then knows no heat but that flag."""
-        return self._sensor_failed
-
-    @sensor_failed.setter
-    def sensor_failed(self, failed: bool) -> None:
-        if failed == self._sensor_failed:
-            return
-        self._sensor_failed = failed
-        self.flags = ErrorFlag.THERMISTOR_FAILURE if failed else ErrorFlag(0)
+    def flags(self) -> ErrorFlag:
+        """The error flags that it makes the light report: without a sensor it knows no heat."""
+        return ErrorFlag.THERMISTOR_FAILURE if self.sensor_failed else self._flags
 
     @property
     def reading(self) -> float:
-        """Return the temperature as the light reports it, degC."""
-        return BROKEN_READING if self._sensor_failed else self.temperature
+        """The temperature as the light reports it, degC."""
+        return BROKEN_READING if self.sensor_failed else self.temperature
 
     @property
     def output(self) -> float:
-        """Return the share (0..1) of the brightness asked for that the light gives."""
-        if not self.flags:
-            return 1.0
+        """The share (0..1) of the commanded brightness that the light gives."""
         if self.flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN:
             return 0.0
-        if self.flags & ErrorFlag.THERMAL_THROTTLING:
-            return self.properties.throttle_to
-        return 1.0
+        return self.properties.throttle_to if self.flags & ErrorFlag.THERMAL_THROTTLING else 1.0
 
     def advance(self, seconds: float, power: float) -> None:
         """
         Let time pass.
 
-        :param power: what the light is asked to give, as a share of full power (0..1).
+        :param power: the commanded share of full power (0..1).
         """
         longest = self.properties.time_constant / 50
         steps = max(math.ceil(seconds / longest), 1)
@@ -118,7 +107,9 @@ class ThermalModel:
         final = self.ambient + properties.rise * power * self.output
         decay = math.exp(-seconds / properties.time_constant)
         self.temperature = final + (self.temperature - final) * decay
-        if not self._sensor_failed:
+        if self.sensor_failed:
+            self._flags = ErrorFlag(0)
+        else:
             self._switch(ErrorFlag.THERMAL_THROTTLING, properties.throttle_at,
                          properties.throttle_until)
             self._switch(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN, properties.shutdown_at,
@@ -127,6 +118,6 @@ class ThermalModel:
 
     def _switch(self, flag: ErrorFlag, on_at: float, off_below: float) -> None:
         if self.temperature >= on_at:
-            self.flags |= flag
-        elif self.flags and self.temperature < off_below:
-            self.flags &= ~flag
+            self._flags |= flag
+        elif self.temperature < off_below:
+            self._flags &= ~flag

@@ -22,12 +22,13 @@ its descriptions are what ``--help`` and doc/simulator.md show.
 from __future__ import annotations
 
 from collections.abc import Callable
+import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 import math
+import random
 from typing import Any, TypeVar
 
-from .settings import integer
+from .settings import integer, number
 from ..mavlink.messages import (
     MAV_AUTOPILOT_INVALID,
     MAV_STATE_ACTIVE,
@@ -101,11 +102,6 @@ class Behaviour:
     delay: float = 0.0
     corrupt: float = 0.0
 
-    @cached_property
-    def link_faults(self) -> bool:
-        """Whether messages are dropped, duplicated, delayed or corrupted."""
-        return bool(self.drop or self.duplicate or self.delay or self.corrupt)
-
 
 B = TypeVar('B', bound=Behaviour)
 
@@ -114,20 +110,10 @@ class FaultError(ValueError):
     """A fault that does not exist, or a value that it cannot have; the message says which."""
 
 
-def above_zero(limit: float) -> Callable[[str], float]:
-    """Return a reader of numbers above 0, up to a limit."""
-    def read(text: str) -> float:
-        value = float(text)
-        if not 0 < value <= limit:
-            raise ValueError(f'not within 0 to {limit:g}')
-        return value
-    return read
-
-
 def _result(text: str) -> MavResult:
     name = text.upper().removeprefix('MAV_RESULT_')
     if name not in MavResult.__members__:
-        raise ValueError('not a MAV_RESULT')
+        raise ValueError(f'{text!r} is not a MAV_RESULT')
     return MavResult[name]
 
 
@@ -139,7 +125,7 @@ class Fault:
     :param field: the field of the behaviour that it sets.
     :param description: its effect, for people.
     :param metavar: its unit or type, '' if it has no value.
-    :param read: makes a value from text.
+    :param read: makes a value from text; None if it has no value.
     :param default: the value if none is given; for a fault without values, the value it sets.
     """
 
@@ -151,63 +137,53 @@ class Fault:
 
     @property
     def default_text(self) -> str:
-        """The default value as people write it, '' if the fault has no value."""
-        if self.read is None:
-            return ''
-        if isinstance(self.default, MavResult):
-            return self.default.name.lower()
-        return 'for ever' if self.default == math.inf else f'{self.default:g}'
+        """The default value for people, '' if the fault has no value."""
+        return (self.text(self.default) or 'for ever') if self.read else ''
 
-    def value_text(self, value: Any) -> str:
+    def text(self, value: Any) -> str:
         """Return a value as it is typed, '' if there is none to type."""
         if self.read is None or value == math.inf:
             return ''
-        return value.name.lower() if isinstance(value, MavResult) else f'{value}'
+        return value.name.lower() if isinstance(value, MavResult) else f'{value:.10g}'
 
 
 class FaultTable(dict[str, Fault]):
     """The faults of one payload, by name."""
 
     def find(self, name: str) -> Fault:
-        """
-        Return a fault.
-
-        :raises FaultError: if there is none of this name.
-        """
+        """Return a fault; FaultError if there is none of this name."""
         if name not in self:
             raise FaultError(f'no fault {name!r}; there are {", ".join(self)}')
         return self[name]
 
-    def value(self, text: str) -> Any:
+    def parse(self, text: str) -> dict[str, Any]:
         """
-        Return the value that a fault sets.
+        Return the field of the behaviour that a fault sets, with its value.
 
         :param text: ``NAME`` or ``NAME=VALUE``.
         :raises FaultError: if there is no such fault, or it cannot have that value.
         """
-        name, equals, value = text.strip().partition('=')
+        name, equals, typed = text.strip().partition('=')
         fault = self.find(name)
-        if not equals:
-            return fault.default
-        if fault.read is None:
-            raise FaultError(f'fault {text!r}: {name} takes no value')
-        try:
-            return fault.read(value.strip())
-        except ValueError as error:
-            raise FaultError(
-                f'fault {text!r}: {value!r} is not a {fault.metavar}: {error}') from error
+        value = fault.default
+        if equals:
+            if fault.read is None:
+                raise FaultError(f'fault {text!r}: {name} takes no value')
+            try:
+                value = fault.read(typed.strip())
+            except ValueError as error:
+                raise FaultError(f'fault {text!r}: {error}') from error
+        return {fault.field: value}
 
     def add(self, behaviour: B, text: str) -> B:
-        """Return a behaviour with one more fault, see :meth:`value`."""
-        value = self.value(text)
-        return replace(behaviour, **{self.find(text.strip().partition('=')[0]).field: value})
+        """Return a behaviour with one more fault, see :meth:`parse`."""
+        return replace(behaviour, **self.parse(text))
 
     def remove(self, behaviour: B, normal: B, name: str) -> B:
         """
-        Return a behaviour without one fault.
+        Return a behaviour without one fault; FaultError if there is none of this name.
 
         :param normal: the behaviour without faults.
-        :raises FaultError: if there is no such fault.
         """
         field = self.find(name).field
         return replace(behaviour, **{field: getattr(normal, field)})
@@ -219,7 +195,7 @@ class FaultTable(dict[str, Fault]):
 
     def as_typed(self, behaviour: B, normal: B) -> list[str]:
         """Return the faults of a behaviour as :meth:`add` takes them, with values."""
-        values = [(name, self[name].value_text(getattr(behaviour, self[name].field)))
+        values = [(name, self[name].text(getattr(behaviour, self[name].field)))
                   for name in self.active(behaviour, normal)]
         return [f'{name}={value}' if value else name for name, value in values]
 
@@ -233,7 +209,7 @@ class FaultTable(dict[str, Fault]):
         return '\n'.join(lines)
 
 
-_seconds, _share, _uint8 = above_zero(3600), above_zero(1), integer(0, 255)
+_seconds, _share, _uint8 = number(0.001, 3600), number(0.001, 1), integer(0, 255)
 
 FAULTS = FaultTable({
     'silence': Fault('silence', 'neither receives nor sends for S seconds', 'S', _seconds,
@@ -273,3 +249,29 @@ FAULTS = FaultTable({
     'no-resume': Fault('resumes', 'does not start its status stream again', default=False),
     'misaddress': Fault('acks_wrong_target', 'sends acknowledgements to another component'),
 })
+
+
+class FaultInjector:
+    """
+    Drops, corrupts, duplicates and delays the messages of one component.
+
+    :param seed: the same seed gives the same faults again.
+    """
+
+    def __init__(self, seed: str) -> None:
+        self._random = random.Random(seed)
+
+    def inject(self, message: Any, behaviour: Behaviour) -> list[tuple[float, Any]]:
+        """Return the messages to send in place of one, each with its delay, s."""
+        if self._occurs(behaviour.drop):
+            return []
+        if self._occurs(behaviour.corrupt):
+            message = copy.copy(message)
+            # A receiver cannot tell which byte of a frame with a wrong checksum was changed.
+            message.crc_extra = type(message).crc_extra ^ 0xFF
+        count = 2 if self._occurs(behaviour.duplicate) else 1
+        return [(self._random.uniform(0.0, behaviour.delay) if behaviour.delay else 0.0, message)
+                for _ in range(count)]
+
+    def _occurs(self, share: float) -> bool:
+        return share > 0 and self._random.random() < share

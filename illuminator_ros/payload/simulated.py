@@ -18,16 +18,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import functools
 from functools import cached_property
+import heapq
+import itertools
 import math
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .events import Listeners
-from .fault_injector import FaultInjector, Schedule
-from .faults import Behaviour, FAULTS, FaultTable
+from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
 from .settings import integer, Setting
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
@@ -40,6 +41,7 @@ from ..mavlink.messages import (
     MavCmd,
     MAVLINK_VERSION,
     MavResult,
+    Message,
 )
 
 # s; the shortest interval of a stream, which also serves requests for shorter ones.
@@ -96,6 +98,11 @@ class ConsoleCommand(Generic[T_contra, R_co]):
     do: Callable[[T_contra, list[str], float], R_co]
     counts: tuple[int, ...] = (0,)
 
+    @property
+    def name(self) -> str:
+        """The word that a line begins with."""
+        return self.usage.partition(' ')[0]
+
 
 class SimulatedDevice(ABC):
     """
@@ -111,7 +118,7 @@ class SimulatedDevice(ABC):
 
     changes: ClassVar[frozenset[int]]
     faults: ClassVar[FaultTable] = FAULTS
-    commands: ClassVar[Mapping[str, ConsoleCommand[Any, Change]]] = {}
+    commands: ClassVar[Sequence[ConsoleCommand[Any, Change]]] = ()
 
     def __init__(self, behaviour: Behaviour) -> None:
         self.behaviour = self.normal = behaviour
@@ -129,7 +136,7 @@ class SimulatedDevice(ABC):
         """Return the default interval (s, 0 for none) of each streamed message, by message id."""
 
     @abstractmethod
-    def message(self, message_id: int, now: float) -> Any:
+    def message(self, message_id: int, now: float) -> Message | None:
         """Return a message of this moment, None if the device does not have it."""
 
     @abstractmethod
@@ -181,7 +188,7 @@ class SimulatedType(Generic[D]):
     def _read_faults(self, text: str) -> tuple[str, ...]:
         names = tuple(part.strip() for part in text.split(',') if part.strip())
         for name in names:
-            self.device.faults.value(name)
+            self.device.faults.parse(name)
         return names
 
 
@@ -198,6 +205,24 @@ class Description(Generic[D]):
     device: D
     name: str = ''
     seed: int = 0
+
+
+class _Schedule:
+    """Actions that are due later, in the order of their times."""
+
+    def __init__(self) -> None:
+        self._entries: list[tuple[float, int, Callable[[float], None]]] = []
+        self._order = itertools.count()
+
+    def add(self, due: float, action: Callable[[float], None]) -> None:
+        heapq.heappush(self._entries, (due, next(self._order), action))
+
+    def poll(self, now: float) -> None:
+        while self._entries and self._entries[0][0] <= now:
+            heapq.heappop(self._entries)[2](now)
+
+    def next_deadline(self) -> float:
+        return self._entries[0][0] if self._entries else math.inf
 
 
 class _Stream:
@@ -236,9 +261,7 @@ class SimulatedComponent(Generic[D]):
         self.device = described.device
         self.outgoing = deque() if outgoing is None else outgoing
         self._changed = changed
-        self._schedule = Schedule()
-        self._injector = FaultInjector(
-            self.address, self.outgoing, self._schedule, described.seed)
+        self._injector = FaultInjector(f'{described.seed} {self.address}')
         self.power_on(now)
 
     @property
@@ -258,7 +281,7 @@ class SimulatedComponent(Generic[D]):
                          for message_id, interval in self.device.streams().items()}
         self._in_progress: set[int] = set()
         self._heartbeat_due = now if self.behaviour.heartbeat_interval else math.inf
-        self._schedule.clear()
+        self._schedule = _Schedule()
         self._reboot_due = now + (self.behaviour.reboot_interval or math.inf)
         self._changed()
 
@@ -406,9 +429,17 @@ class SimulatedComponent(Generic[D]):
             return MavResult.DENIED
         return MavResult.ACCEPTED
 
-    def _send(self, message: Any, now: float) -> None:
-        if not self.silent(now):
-            self._injector.send(message, self.behaviour, now)
+    def _send(self, message: Message | None, now: float) -> None:
+        if message is None or self.silent(now):
+            return
+        for delay, sent in self._injector.inject(message, self.behaviour):
+            if delay:
+                self._schedule.add(now + delay, functools.partial(self._transmit, sent))
+            else:
+                self._transmit(sent, now)
+
+    def _transmit(self, message: Message, now: float) -> None:
+        self.outgoing.append((self.address, message))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""

@@ -17,9 +17,12 @@
 from dataclasses import replace
 
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Configuration, Mode
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
+from illuminator_ros.illuminator.simulated_properties import (
+    FAULTS,
+    IlluminatorProperties,
+    PROFILES,
+)
 from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload.checks.requirement import Verdict
@@ -30,7 +33,7 @@ from support.conformance_run import Run
 LIGHTS = {
     'switch': IlluminatorProperties(),
     'brightness is the switch': replace(
-        properties({'profile': 'ardusub'}, PROFILES['ardusub'].address),
+        properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.address),
         modes=(Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)),
 }
 BRIGHT = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)

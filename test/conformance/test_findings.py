@@ -18,9 +18,12 @@ from dataclasses import replace
 import math
 
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.model import Limits, Mode
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
+from illuminator_ros.illuminator.simulated_properties import (
+    FAULTS,
+    IlluminatorProperties,
+    PROFILES,
+)
 from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
@@ -112,7 +115,7 @@ def test_properties_out_of_order_fail_their_requirement(name: str) -> None:
 
 @pytest.mark.parametrize('profile', PROFILES)
 def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile: str) -> None:
-    run = Run(properties({'profile': profile}, PROFILES[profile].address)).finish()
+    run = Run(properties({'profile': profile}, PROFILES[profile].properties.address)).finish()
     assert run.failed == DEVIATIONS[profile]
     assert run.suite.restored == 'the light is as it was'
 
@@ -221,6 +224,6 @@ def test_a_change_in_progress_for_ever_does_not_delay_the_run() -> None:
 
 
 def test_a_light_without_strobe_limits_is_not_made_to_strobe() -> None:
-    run = Run(properties({'profile': 'ardusub'}, PROFILES['ardusub'].address)).finish()
+    run = Run(properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.address)).finish()
     assert {'strobe', 'strobe-values', 'duty-cycle'} < run.names(Verdict.SKIPPED)
     assert 'reports no strobe limits' in run.result('strobe').detail

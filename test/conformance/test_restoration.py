@@ -20,10 +20,9 @@ from typing import Any
 
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.checks.tester import LightTester
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration, Mode
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.payload.checks.requirement import Requirement, Verdict
 import pytest
 from support.conformance_run import Run

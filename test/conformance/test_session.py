@@ -18,10 +18,10 @@ from collections.abc import Sequence
 import tracemalloc
 
 from illuminator_ros.illuminator.checks.catalogue import CHECKS
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (
+    FAULTS,
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
@@ -37,8 +37,8 @@ BAD = IlluminatorProperties(address=SECOND.address, behaviour=FAULTS.add(
 
 def test_the_first_light_is_checked_and_another_one_neither_changed_nor_judged() -> None:
     run = Run(FIRST, BAD)
-    other = run.lights.components[1].device.lamp
-    other.switch(True, brightness_is_switch=False)
+    other = run.lights.components[1].device
+    other.enabled = True
     run.finish()
     assert run.session.found == FIRST.address
     assert run.session.devices == {FIRST.address, SECOND.address}

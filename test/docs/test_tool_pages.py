@@ -19,9 +19,8 @@ from pathlib import Path
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
 from illuminator_ros.cli.simulator.scenario import scenario
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
-from illuminator_ros.illuminator.simulated_properties import PROFILES
+from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
 from illuminator_ros.illuminator.simulated_settings import SIMULATED
 import pytest
 from support.tables import table
@@ -50,9 +49,9 @@ def test_the_requirements_are_counted() -> None:
     ('profile', [[f'`{name}`', profile.description] for name, profile in PROFILES.items()]),
     ('setting', [[f'`{name}`', setting.metavar, setting.help]
                  for name, setting in SIMULATED.all_settings.items()]),
-    ('command', [*([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS.values()),
-                 *([f'`{one.usage}`', one.help] for one in COMMANDS.values()),
-                 *([f'`{name}`', text] for name, text in OTHERS.items())]),
+    ('command', [*([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),
+                 *([f'`{one.usage}`', one.help] for one in COMMANDS),
+                 *([f'`{name}`', text] for name, text in OTHERS)]),
 ])
 def test_a_table_of_the_simulator_has_every_row(heading: str, rows: list[list[str]]) -> None:
     assert table(SIMULATOR, heading) == rows

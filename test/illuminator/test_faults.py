@@ -14,9 +14,8 @@
 
 """The faults of simulated lights: their effects, their values, and their ends."""
 
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
-from illuminator_ros.illuminator.simulated_properties import IlluminatorBehaviour
+from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
 from illuminator_ros.payload.faults import FaultError
 import pytest
@@ -38,7 +37,7 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over():
     bench = LightBench('silence=3')
     bench.run(2.0)
     bench.command(*ON)
-    assert (bench.sent, bench.lamp.enabled, active(bench)) == ([], False, ['silence=3.0'])
+    assert (bench.sent, bench.lamp.enabled, active(bench)) == ([], False, ['silence=3'])
     bench.run(3.5)
     assert [at for at, _ in bench.of(Heartbeat)] == [3.0, 4.0, 5.0]
     assert active(bench) == []
@@ -171,11 +170,11 @@ def test_each_fault_changes_the_behaviour_and_is_listed_until_it_is_removed(name
 
 @pytest.mark.parametrize(('text', 'reason'), [
     ('nope', "no fault 'nope'; there are silence, reboot"), ('', "no fault ''"),
-    ('lie=1', 'lie takes no value'), ('drop=2', "'2' is not a SHARE: not within 0 to 1"),
-    ('drop=0', 'not a SHARE'), ('drop=nan', 'not a SHARE'), ('drop=', 'not a SHARE'),
-    ('slow=-1', 'not a S: not within 0 to 3600'), ('slow=inf', 'not a S'),
-    ('busy=0', 'not a N'), ('refuse=maybe', 'not a RESULT'), ('flags=0', 'not a FLAGS'),
-    ('type=256', 'not a N')])
+    ('lie=1', 'lie takes no value'), ('drop=2', "'drop=2': 2 is outside 0.001 to 1"),
+    ('drop=0', '0 is outside'), ('drop=nan', 'nan is outside'), ('drop=', "'' is not a number"),
+    ('slow=-1', '-1 is outside 0.001 to 3600'), ('slow=inf', 'inf is outside'),
+    ('busy=0', '0 is outside'), ('refuse=maybe', "'maybe' is not a MAV_RESULT"),
+    ('flags=0', '0 is outside'), ('type=256', '256 is outside 0 to 255')])
 def test_a_wrong_fault_is_refused_with_the_reason(text, reason):
     with pytest.raises(FaultError) as caught:
         FAULTS.add(NORMAL, text)

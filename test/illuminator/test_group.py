@@ -46,7 +46,7 @@ def silence(fleet, index):
 def test_all_lights_are_switched_and_each_is_named(fleet):
     result = fleet.wait_for(ask(fleet))
     assert result.success
-    assert [light.device.lamp.enabled for light in fleet.other.components] == [True] * 3
+    assert [light.device.enabled for light in fleet.other.components] == [True] * 3
     summary, *outcomes = result.message.split('; ')
     assert summary == '3 of 3 on'
     assert [outcome.partition(': ')[0] for outcome in outcomes] == [
@@ -60,7 +60,7 @@ def test_one_light_that_fails_makes_it_no_success_and_the_others_are_switched(fl
     assert not result.success
     assert result.message.startswith('2 of 3 on; lamp 1/243: on, confirmed')
     assert 'lamp 1/244: no acknowledgement (4 tries' in result.message
-    assert [light.device.lamp.enabled for light in fleet.other.components] == [True, False, True]
+    assert [light.device.enabled for light in fleet.other.components] == [True, False, True]
 
 
 def test_the_commands_go_out_together_and_the_answer_comes_with_the_slowest(fleet):

@@ -172,8 +172,8 @@ def test_every_command_has_one_outcome_and_it_is_true(line, share, request):
     pair.run(QUIET)
     for simulated in pair.other.components:
         light = pair.controller.lights[simulated.address]
-        assert light.snapshot(pair.now).configuration == simulated.device.lamp.configuration
-        assert light.status.enabled == simulated.device.lamp.enabled
+        assert light.snapshot(pair.now).configuration == simulated.device.configuration
+        assert light.status.enabled == simulated.device.enabled
         assert 'restarted' not in pair.recorders[simulated.address].events
 
 

@@ -37,8 +37,8 @@ ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
 
 
 def light(profile, **settings):
-    return LightBench(
-        properties=properties({**settings, 'profile': profile}, PROFILES[profile].address))
+    address = PROFILES[profile].properties.address
+    return LightBench(properties=properties({**settings, 'profile': profile}, address))
 
 
 @pytest.mark.parametrize(('profile', 'address', 'heartbeat'), [

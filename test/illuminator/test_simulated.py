@@ -138,7 +138,7 @@ def test_lights_on_one_link_obey_only_their_own_commands(target, enabled):
     lights = simulated_lights(
         [IlluminatorProperties(address=Address(1, one)) for one in (243, 244)], 0.0)
     lights.receive(GROUND, CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
-    assert [light.device.lamp.enabled for light in lights.components] == enabled
+    assert [light.device.enabled for light in lights.components] == enabled
     assert len({source for source, _ in lights.outgoing}) == sum(enabled)
 
 

@@ -101,7 +101,7 @@ class Chaos:
 
     def strange(self) -> None:
         """Let a stranger change a light."""
-        lamp = self.draw.choice(self.lights).device.lamp
+        lamp = self.draw.choice(self.lights).device
         lamp.enabled = self.draw.random() < 0.5
         lamp.configuration = replace(
             lamp.configuration, mode=self.draw.choice(list(Mode)[1:]),
@@ -133,7 +133,7 @@ def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed):
     for simulated in chaos.lights:
         light = pair.controller.lights[simulated.address]
         assert light.connected
-        assert light.snapshot(pair.now).configuration == simulated.device.lamp.configuration
-        assert light.status.enabled == simulated.device.lamp.enabled
+        assert light.snapshot(pair.now).configuration == simulated.device.configuration
+        assert light.status.enabled == simulated.device.enabled
         assert light.next_deadline() > pair.now
     assert pair.controller.sender.next_deadline() == float('inf')

@@ -146,7 +146,7 @@ class SimulatedWinch(simulated.SimulatedDevice):
     def _release(self, words: list[str], now: float) -> simulated.Change:
         return partial(self.set_length, self.line_length + float(words[0]))
 
-    commands = {'release': simulated.ConsoleCommand('release M', 'release line', _release, (1,))}
+    commands = (simulated.ConsoleCommand('release M', 'release line', _release, (1,)),)
 
 
 SIMULATED = simulated.SimulatedType(

@@ -15,12 +15,11 @@
 """The console: commands to simulated lights while they run."""
 
 from illuminator_ros.cli.simulator.console import COMMANDS, execute
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import simulated_lights
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 import pytest
 
@@ -32,7 +31,7 @@ class Console:
         self.lights = simulated_lights([
             IlluminatorProperties(address=Address(1, 243), name='bow'),
             IlluminatorProperties(address=Address(1, 244))], 0.0)
-        self.bow, self.other = (one.device.lamp for one in self.lights.components)
+        self.bow, self.other = (one.device for one in self.lights.components)
         self.lights.poll(0.0)
         self.lights.outgoing.clear()
 
@@ -83,7 +82,7 @@ def test_each_line_changes_its_part_of_the_configuration_only(console):
     ('mode disco', "'disco' is "), ('brightness', 'usage: brightness PERCENT'),
     ('on now', 'usage: on'), ('jump', "no command or component 'jump'"),
     ('stern on', "no command or component 'stern'"),
-    ('fault nope', "no fault 'nope'"), ('fault drop=9', 'not a SHARE'),
+    ('fault nope', "no fault 'nope'"), ('fault drop=9', '9 is outside 0.001 to 1'),
     ('clear nope', "no fault 'nope'"), ('ambient nan', 'nan is outside -273.15 to 1000'),
     ('temperature 9999', '9999 is outside -273.15 to 1000'), ('  \n', ''),
     ('fault bow:drop=0.2', 'for one component: bow fault drop=0.2'),
@@ -139,6 +138,6 @@ def test_the_state_of_each_light_is_shown(console):
 
 def test_help_has_each_command_and_each_fault(console):
     text = console.enter('help')
-    assert [one.usage for one in {**COMMANDS, **LIGHT_COMMANDS}.values()
+    assert [one.usage for one in (*COMMANDS, *LIGHT_COMMANDS)
             if f'  {one.usage}' not in text] == []
     assert [name for name in FAULTS if f'  {name}' not in text] == []

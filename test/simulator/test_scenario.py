@@ -17,10 +17,16 @@
 import sys
 
 from illuminator_ros.cli.simulator.options import parser
-from illuminator_ros.cli.simulator.scenario import components, Listed, load, Scenario, scenario
-from illuminator_ros.cli.simulator.settings import SettingError
-from illuminator_ros.illuminator.faults import FAULTS
+from illuminator_ros.cli.simulator.scenario import (
+    components,
+    Listed,
+    load,
+    Scenario,
+    scenario,
+    SettingError,
+)
 from illuminator_ros.illuminator.model import Limits, Mode
+from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.illuminator.simulated_settings import SIMULATED
 from illuminator_ros.mavlink.messages import Address
 import pytest
@@ -61,7 +67,7 @@ def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(argum
 
 def test_without_arguments_a_light_follows_the_protocol():
     (light,), (one,) = described(), properties()
-    assert (one.limits, one.mode_bitmask, one.identity.serial_number) == (
+    assert (one.limits, one.reported_bitmask, one.identity.serial_number) == (
         Limits(0.05, 10.0), 3, 'SIM-1-243')
     assert faults(light) == []
 
@@ -76,7 +82,7 @@ def test_each_option_sets_its_property():
     assert (identity.vendor, identity.model, identity.serial_number) == ('ACME', 'Sun', '0815')
     assert (identity.software_version, identity.hardware_version) == ('2.0', 'B')
     assert light.limits == Limits(0.2, 5.0)
-    assert (light.modes, light.mode_bitmask) == ((Mode.INTERNAL_CONTROL,), 1)
+    assert (light.modes, light.reported_bitmask) == ((Mode.INTERNAL_CONTROL,), 1)
     assert (light.status_interval, light.time_scale) == (0.5, 10.0)
     assert (thermal.ambient, thermal.rise, thermal.time_constant) == (40, 80, 30)
     assert [one.mode_bitmask for one in properties('--mode-bitmask', '0x6')] == [6]
@@ -144,7 +150,11 @@ def test_an_error_in_a_file_names_its_place_and_the_reason(content, reason):
     (['--fault', 'nope'], "no fault 'nope'"),
     (['--min-strobe-period', '5', '--max-strobe-period', '1'],
      'min_strobe_period is above max_strobe_period'),
-    (['--thermal', 'throttle_until=90'], 'throttling thresholds are not in order')])
+    (['--thermal', 'throttle_until=90'], 'throttling thresholds are not in order'),
+    (['--modes', 'a'], "--modes: 'a' is not one of internal_control, external_sync"),
+    (['--thermal', 'rise'], "--thermal: 'rise' is not one of ambient=VALUE"),
+    (['--profile', 'x'], "--profile: 'x' is not one of default"),
+    (['--ambient', 'x'], "--ambient: 'x' is not a number")])
 def test_options_that_contradict_each_other_are_refused_with_the_reason(arguments, reason):
     with pytest.raises(SettingError) as caught:
         described(*arguments)
@@ -152,10 +162,6 @@ def test_options_that_contradict_each_other_are_refused_with_the_reason(argument
 
 
 @pytest.mark.parametrize(('arguments', 'reason'), [
-    (['--modes', 'a'], "argument --modes: 'a' is not one of internal_control, external_sync"),
-    (['--thermal', 'rise'], "argument --thermal: 'rise' is not one of ambient=VALUE"),
-    (['--profile', 'x'], "argument --profile: 'x' is not one of default"),
-    (['--ambient', 'x'], "argument --ambient: 'x' is not a number"),
     (['--count', '0'], '0 is outside 1 to 200'),
     (['--nope'], 'unrecognized arguments')])
 def test_a_wrong_option_is_one_line_with_exit_status_2(arguments, reason, capsys):

@@ -20,9 +20,9 @@ import re
 import shutil
 
 from illuminator_ros.cli.simulator.view import LiveView, look, PlainView
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.simulated import describe
 from illuminator_ros.illuminator.simulated_properties import (
+    FAULTS,
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
@@ -88,7 +88,7 @@ def live(terminal, device):
 def test_a_line_has_the_actual_state_the_flags_and_the_faults(device):
     press(device, 0.0, enabled=True, brightness=60.0, strobe_period=0.5, strobe_duty_cycle=25.0,
           mode='external_sync')
-    device.device.lamp.heat_to(85.0, 0.0)
+    device.device.heat_to(85.0, 0.0)
     device.behave(FAULTS.add(device.behaviour, 'drop'), 0.0)
     assert re.split(r'  +', str(look(device, 0.1))) == [
         '1/243 bow', 'ON', '30 %', 'strobe 0.5 s, 25 %', '85.0 degC', 'external_sync',
@@ -112,7 +112,7 @@ def test_a_plain_line_is_written_when_the_temperature_changes_by_5_kelvins(devic
     stream = io.StringIO()
     view = PlainView(stream)
     for temperature in range(30, 51):
-        device.device.lamp.heat_to(float(temperature), 0.0)
+        device.device.heat_to(float(temperature), 0.0)
         view.show([look(device, 0.0)])
     assert len(stream.getvalue().splitlines()) == 5
 
@@ -126,7 +126,7 @@ def test_a_fault_that_is_over_is_no_longer_shown(device):
 
 def test_the_live_view_updates_the_line_and_keeps_what_is_typed(device, terminal, live):
     terminal.write('brightn')
-    device.device.lamp.heat_to(50.0, 0.0)
+    device.device.heat_to(50.0, 0.0)
     live.show([look(device, 0.0)])
     terminal.write('ess')
     line, prompt = terminal.screen()
@@ -149,7 +149,7 @@ def test_the_live_view_has_an_answer_below_its_line_and_an_event_above_the_light
 
 def test_the_live_view_fits_the_terminal(device, terminal):
     press(device, 0.0, enabled=True)
-    device.device.lamp.heat_to(85.0, 0.0)
+    device.device.heat_to(85.0, 0.0)
     lights = [device, *(simulated(address=Address(1, n)) for n in range(1, 20))]
     LiveView(terminal).show([look(one, 0.0) for one in lights])
     screen = terminal.screen()

@@ -23,7 +23,6 @@ from typing import Any
 from illuminator_ros.illuminator.events import AnyLightEvent, LightFound, LightSnapshot
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
-from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
@@ -149,9 +148,9 @@ class Pair:
         return self.other.components[0]
 
     @property
-    def lamp(self) -> SimulatedLamp:
+    def lamp(self) -> SimulatedIlluminator:
         """Return the state of the first simulated light."""
-        return self.device.device.lamp
+        return self.device.device
 
     # Time
 

@@ -24,12 +24,10 @@ from typing import Any
 from illuminator_ros.cli.conformance.run import LISTEN_TIME
 from illuminator_ros.illuminator.checks.catalogue import CHECKS, REQUIREMENTS
 from illuminator_ros.illuminator.checks.tester import LightTester
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
-from illuminator_ros.illuminator.simulated import simulated_lights
-from illuminator_ros.illuminator.simulated_lamp import SimulatedLamp
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
 from illuminator_ros.payload.checks.coroutine import Interrupted
 from illuminator_ros.payload.checks.requirement import Conditions, Requirement, Result, Verdict
@@ -81,9 +79,9 @@ class Run:
         await self.suite.run()
 
     @property
-    def lamp(self) -> SimulatedLamp:
+    def lamp(self) -> SimulatedIlluminator:
         """Return the state of the light."""
-        return self.light.device.lamp
+        return self.light.device
 
     def press(self, **changes: Any) -> None:
         """Switch or configure the light by hand."""

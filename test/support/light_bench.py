@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.illuminator.faults import FAULTS
 from illuminator_ros.illuminator.simulated import describe, SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
+    FAULTS,
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
@@ -46,7 +46,7 @@ class LightBench:
             behaviour = FAULTS.add(behaviour, fault)
         self.component: SimulatedComponent[SimulatedIlluminator] = SimulatedComponent(
             describe(properties or IlluminatorProperties(behaviour=behaviour, **fields)), 0.0)
-        self.lamp = self.component.device.lamp
+        self.lamp = self.component.device
         self.now = 0.0
         self.sent: list[tuple[float, Any]] = []
 

@@ -218,7 +218,7 @@ class BridgeSiege(Siege):
             self.link.ask(ask)
             self._genuine(2.0)
             assert [result.success for result in results] == [True, True], results
-            lamp = self._light.device.lamp
+            lamp = self._light.device
             assert (lamp.enabled, lamp.configuration.brightness) == (on, brightness)
 
 
@@ -250,8 +250,8 @@ class LightSiege(Siege):
     def check_bounds(self) -> None:
         super().check_bounds()
         for light in self.link.endpoint.components:
-            assert math.isfinite(light.device.lamp.thermal.temperature)
-            configuration = light.device.lamp.configuration
+            assert math.isfinite(light.device.thermal.temperature)
+            configuration = light.device.configuration
             assert 0 <= configuration.brightness <= 100, configuration
             assert 0 <= configuration.strobe_period <= 10, configuration
             assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
@@ -263,7 +263,7 @@ class LightSiege(Siege):
             self._acks.clear()
             self._command(405, on)
             assert [ack.result for ack in self._acks] == [MavResult.ACCEPTED]
-            assert self.link.endpoint.components[0].device.lamp.enabled is bool(on)
+            assert self.link.endpoint.components[0].device.enabled is bool(on)
 
 
 def _longest(queues: Iterable[Any]) -> int:

@@ -63,7 +63,7 @@ class Witness:
     """Keeps the states that one simulated light has been in."""
 
     def __init__(self, light: SimulatedComponent[SimulatedIlluminator], now: float) -> None:
-        self.lamp = light.device.lamp
+        self.lamp = light.device
         self._receive = light.receive
         light.receive = self._watched  # type: ignore[method-assign]
         self._states = [State(now, now, self._fields())]

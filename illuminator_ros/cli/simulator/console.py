@@ -16,13 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 from .view import look
-from ...payload.simulated import ConsoleCommand, SimulatedComponent
+from ...payload.simulated import Change, ConsoleCommand, SimulatedComponent, SimulatedDevice
 
 Component = SimulatedComponent[Any]
+# Executes a command with its arguments at a time, and returns the answer.
+Execute = Callable[[list[str], float], str | None]
 
 
 def _fault(component: Component, words: list[str], now: float) -> None:
@@ -47,23 +50,33 @@ def _faults(component: Component, words: list[str], now: float) -> str:
 
 
 # The commands of every component.
-COMMANDS: Mapping[str, ConsoleCommand[Component, str | None]] = {
-    'reboot': ConsoleCommand('reboot', 'restart, as after a power cycle',
-                       lambda component, words, now: component.restart(now)),
-    'fault': ConsoleCommand('fault NAME[=VALUE]', 'start a fault', _fault, (1,)),
-    'clear': ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
-    'faults': ConsoleCommand('faults', 'show the present faults', _faults),
-    'status': ConsoleCommand('status', 'show the state of each component',
-                       lambda component, words, now: str(look(component, now))),
-}
-OTHERS = {'help': 'show this', 'quit': 'end'}
+COMMANDS: Sequence[ConsoleCommand[Component, str | None]] = (
+    ConsoleCommand('reboot', 'restart, as after a power cycle',
+                   lambda component, words, now: component.restart(now)),
+    ConsoleCommand('fault NAME[=VALUE]', 'start a fault', _fault, (1,)),
+    ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
+    ConsoleCommand('faults', 'show the present faults', _faults),
+    ConsoleCommand('status', 'show the state of each component',
+                   lambda component, words, now: str(look(component, now))),
+)
+OTHERS = (('help', 'show this'), ('quit', 'end'))
 
 
-def describe_commands(tables: Iterable[Mapping[str, ConsoleCommand[Any, Any]]]) -> str:
-    """Return the commands of the console, a line each; those of every component come last."""
-    common, *own = tables
-    rows = {one.usage: one.help for table in (*own, common) for one in table.values()}
-    return '\n'.join(f'  {usage:20} {text}' for usage, text in {**rows, **OTHERS}.items())
+def describe_commands(devices: Iterable[type[SimulatedDevice]]) -> str:
+    """Return the commands of the console for some devices, a line each."""
+    own = [command for device in devices for command in device.commands]
+    rows = dict([*((one.usage, one.help) for one in [*own, *COMMANDS]), *OTHERS])
+    return '\n'.join(f'  {usage:20} {text}' for usage, text in rows.items())
+
+
+def _bound(component: Component) -> dict[str, tuple[ConsoleCommand[Any, Any], Execute]]:
+    """Return the commands of a component by name, each with the function that executes it."""
+    def apply(command: ConsoleCommand[Any, Change], words: list[str], now: float) -> None:
+        component.apply(command.do(component.device, words, now), now)
+
+    return {
+        **{one.name: (one, partial(apply, one)) for one in component.device.commands},
+        **{one.name: (one, partial(one.do, component)) for one in COMMANDS}}
 
 
 def execute(line: str, components: Sequence[Component], now: float) -> str:
@@ -75,42 +88,33 @@ def execute(line: str, components: Sequence[Component], now: float) -> str:
     words = line.split()
     if not words:
         return ''
-    devices = {type(one.device): one.device for one in components}.values()
-    own = {name: command for device in devices for name, command in device.commands.items()}
-    selected = [one for one in components if words[0] in (str(one.address), one.name)]
-    if words[0] in ('all', '*') or (selected and words[0] not in {**own, **COMMANDS}):
+    devices = dict.fromkeys(type(one.device) for one in components)
+    bound = [_bound(one) for one in components]
+    known = {name for commands in bound for name in commands}
+    selected = [commands for one, commands in zip(components, bound, strict=True)
+                if words[0] in (str(one.address), one.name)]
+    if words[0] in ('all', '*') or (selected and words[0] not in known):
         words = words[1:] or ['status']
     else:
         selected = []
     name, *rest = words
     if name == 'help':
-        commands = describe_commands([COMMANDS, *(device.commands for device in devices)])
         faults = '\n'.join(device.faults.describe() for device in devices)
-        return f'{commands}\nfaults:\n{faults}'
+        return f'{describe_commands(devices)}\nfaults:\n{faults}'
     # The option --fault names a component in another way than the console.
     component, colon, fault = words[-1].rpartition(':')
     if colon and words[:-1] in ([], ['fault'], ['--fault']):
         return f'for one component: {component} fault {fault}'
     # A fault works as --help shows it, too.
-    if name not in own and any(name.partition('=')[0] in device.faults for device in devices
-                               ) and name not in COMMANDS:
+    if name not in known and any(name.partition('=')[0] in one.faults for one in devices):
         name, rest = 'fault', [name, *rest]
-    command = COMMANDS.get(name) or own.get(name)
-    targets = [one for one in selected or components
-               if name in COMMANDS or name in one.device.commands]
-    if command is None or not targets:
+    targets = [commands[name] for commands in selected or bound if name in commands]
+    if not targets:
         return f'no command or component {name!r}; help lists the commands'
-    if len(rest) not in command.counts:
-        return f'usage: {command.usage}'
+    if len(rest) not in targets[0][0].counts:
+        return f'usage: {targets[0][0].usage}'
     try:
-        answers = [_execute(name, one, rest, now) for one in targets]
+        answers = [do(rest, now) for _, do in targets]
     except ValueError as error:
         return str(error)
     return '\n'.join(filter(None, answers)) or 'done'
-
-
-def _execute(name: str, component: Component, words: list[str], now: float) -> str | None:
-    if name in COMMANDS:
-        return COMMANDS[name].do(component, words, now)
-    component.apply(component.device.commands[name].do(component.device, words, now), now)
-    return None

@@ -18,11 +18,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Mapping
-from typing import Any
 
-from .console import COMMANDS, describe_commands
-from .scenario import Types
-from .settings import read, SettingError
+from .console import describe_commands
+from .scenario import SettingError, Types
 from ..options import add_signing, integer, Parser
 from ..payloads import PAYLOADS
 from ... import __version__
@@ -63,7 +61,7 @@ examples:
 {details}
 
 console: lines on standard input, for all components or, after its id or name, for one
-{describe_commands([COMMANDS, *(one.device.commands for one in types)])}
+{describe_commands(one.device for one in types)}
 
 exit status: 0 after a signal (SIGINT, SIGTERM, SIGHUP) or quit, 1 if a package is missing, 2 if an
 argument is wrong."""
@@ -102,29 +100,9 @@ def parser(
                             help=f'a {noun}, instead of --count; may be repeated')
     for name, setting in {name: setting for one in types
                           for name, setting in one.all_settings.items()}.items():
-        option = f'--{name.replace("_", "-")}'
-        if name == 'fault':
-            result.add_argument(option, action='append', metavar=setting.metavar,
-                                help=setting.help)
-        else:
-            result.add_argument(option, type=_Reader(name, types), metavar=setting.metavar,
-                                help=setting.help)
+        result.add_argument(f'--{name.replace("_", "-")}', metavar=setting.metavar,
+                            action='append' if name == 'fault' else 'store', help=setting.help)
     result.add_argument('--plain', action='store_true',
                         help='plain lines on a terminal, too, instead of the live view')
     add_signing(result)
     return result
-
-
-class _Reader:
-    """Reads a setting for each type that has it; argparse's own messages lack the reason."""
-
-    def __init__(self, name: str, types: Types) -> None:
-        self._name = name
-        self._types = [one for one in types if name in one.all_settings]
-
-    def __call__(self, text: str) -> dict[str, Any]:
-        try:
-            return {one.noun: read(one.all_settings, self._name, text, text)
-                    for one in self._types}
-        except SettingError as error:
-            raise argparse.ArgumentTypeError(str(error).partition(': ')[2]) from error

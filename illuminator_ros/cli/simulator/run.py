@@ -30,8 +30,7 @@ from typing import Any
 
 from .console import execute
 from .options import DEFAULT_URL, parser, payload_types
-from .scenario import components, load, Scenario, Types
-from .settings import SettingError
+from .scenario import components, load, Scenario, SettingError, Types
 from .view import LiveView, Look, look, PlainView
 from ..options import signing
 from ..termination import Termination

@@ -18,18 +18,32 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .settings import merged, read, SettingError
 from ..options import address
 from ...mavlink.messages import Address
+from ...payload.settings import Setting
 from ...payload.simulated import Description, SimulatedType
 
 MAX_COMPONENTS = 200
 
 Types = Sequence[SimulatedType[Any]]
+
+
+class SettingError(ValueError):
+    """A setting that does not exist or has a wrong value; the message names it."""
+
+
+@contextlib.contextmanager
+def _place(place: str) -> Iterator[None]:
+    """Begin the message of a ValueError with the place of the wrong value."""
+    try:
+        yield
+    except ValueError as error:
+        raise SettingError(f'{place}: {error}') from error
 
 
 @dataclass(frozen=True)
@@ -80,8 +94,7 @@ def scenario(content: Any, path: str, types: Types) -> Scenario:
     """Return the content of a file, checked; SettingError if a setting in it is wrong."""
     if not isinstance(content, Mapping):
         raise SettingError(f'{path}: it has no keys such as {types[0].plural}')
-    others = ('url', *(one.plural for one in types))
-    common = _settings(content, others, path, types)
+    common = _read(content, ('url', *(one.plural for one in types)), path, types)
     listed = {one.noun: list(_listed(content.get(one.plural) or [], path, one))
               for one in types}
     return Scenario(str(content.get('url') or ''), common, listed)
@@ -92,16 +105,14 @@ def _listed(entries: Any, path: str, kind: SimulatedType[Any]) -> Iterator[Liste
         raise SettingError(f'{path}: {kind.plural} is not a list of {kind.plural}')
     for number, one in enumerate(entries, 1):
         place = f'{path}: {kind.noun} {number}'
-        try:
+        with _place(f'{place}: id'):
             where = address(str(one.get('id', '')))
-        except ValueError as error:
-            raise SettingError(f'{place}: id: {error}') from error
-        settings = _settings(one, ('id', 'name'), place, [kind])
+        settings = _read(one, ('id', 'name'), place, [kind])
         yield Listed(where, str(one.get('name', '')), settings[kind.noun])
 
 
-def _settings(
-    content: Mapping[Any, Any], others: tuple[str, ...], place: str, types: Types,
+def _read(
+    content: Mapping[Any, Any], others: tuple[str, ...], path: str, types: Types,
 ) -> dict[str, dict[str, Any]]:
     """Return the settings for each type that has them; the key ``faults`` is a setting, too."""
     result: dict[str, dict[str, Any]] = {one.noun: {} for one in types}
@@ -110,11 +121,21 @@ def _settings(
         having = [one for one in types if name in one.all_settings and key != 'fault']
         if not having and key not in others:
             known = dict.fromkeys(name for one in types for name in one.all_settings)
-            raise SettingError(f'{place}: no setting {key!r}; there are '
+            raise SettingError(f'{path}: no setting {key!r}; there are '
                                + ', '.join([*others, *known]))
         for one in having:
-            result[one.noun][name] = read(one.all_settings, name, value, f'{place}: {key}')
+            with _place(f'{path}: {key}'):
+                result[one.noun][name] = one.all_settings[name].read(_as_text(value))
     return result
+
+
+def _as_text(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ','.join(str(key) if one is True or one is None else f'{key}={one}'
+                        for key, one in value.items())
+    if isinstance(value, list | tuple):
+        return ','.join(map(_as_text, value))
+    return '' if value is None else str(value)
 
 
 def components(
@@ -123,9 +144,10 @@ def components(
     """
     Return the components that command line and file describe.
 
-    :raises SettingError: if they contradict each other.
+    :raises SettingError: if they contradict each other, or an option is wrong.
     """
-    listed = {one.noun: _of_type(options, file, one) for one in types}
+    given = {one.noun: _given(options, one) for one in types}
+    listed = {one.noun: _of_type(options, file, one, given[one.noun]) for one in types}
     everyone = [one for some in listed.values() for one in some]
     if len(everyone) > MAX_COMPONENTS:
         raise SettingError(f'{len(everyone)} {types[0].plural} are more than {MAX_COMPONENTS}')
@@ -134,25 +156,41 @@ def components(
         raise SettingError(
             f'two {types[0].plural} have the address {", ".join(sorted(twice))}')
     faults = _faults(options.fault or (), everyone, types)
-    return [_described(one, kind, _common(options, file, kind), faults[one.address],
-                       several=len(listed[kind.noun]) > 1)
-            for kind in types for one in listed[kind.noun]]
+    result = []
+    for kind in types:
+        for one in listed[kind.noun]:
+            with _place('--fault'):
+                of_options = [{'fault': kind.all_settings['fault'].read(fault)}
+                              for fault in faults[one.address]]
+            settings = _merged(
+                kind.all_settings, file.common.get(kind.noun, {}), one.settings,
+                given[kind.noun], *of_options)
+            several = len(listed[kind.noun]) > 1 and 'serial_number' not in one.settings
+            with _place(f'{kind.noun} {one.address}'):
+                device = kind.make(settings, one.address, several)
+            for fault in settings.get('fault', ()):
+                device.behave(device.faults.add(device.behaviour, fault), 0.0)
+            result.append(Description(one.address, device, one.name, settings.get('seed', 0)))
+    return result
 
 
-def _common(
-    options: argparse.Namespace, file: Scenario, kind: SimulatedType[Any],
-) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """Return the settings of all components of a type: those of the file, those of the options."""
-    given = {name: value[kind.noun] for name in kind.all_settings
-             if name != 'fault' and (value := getattr(options, name)) is not None}
-    return file.common.get(kind.noun, {}), given
+def _given(options: argparse.Namespace, kind: SimulatedType[Any]) -> dict[str, Any]:
+    """Return the settings that the command line has for all components of a type."""
+    result = {}
+    for name, setting in kind.all_settings.items():
+        if name != 'fault' and (text := getattr(options, name)) is not None:
+            with _place(f'--{name.replace("_", "-")}'):
+                result[name] = setting.read(text)
+    return result
 
 
 def _of_type(
     options: argparse.Namespace, file: Scenario, kind: SimulatedType[Any],
+    given: Mapping[str, Any],
 ) -> list[Listed]:
-    listed = ([_named(kind, text) for text in getattr(options, kind.noun) or ()]
-              or file.listed.get(kind.noun, []))
+    listed = file.listed.get(kind.noun, [])
+    if named := getattr(options, kind.noun):
+        listed = [_named(kind, text) for text in named]
     counted = [f'--{name.replace("_", "-")}' for name in ('count', 'system_id', 'component_id')
                if getattr(options, name) is not None]
     if listed and counted:
@@ -160,7 +198,7 @@ def _of_type(
                            'file lists')
     if listed:
         return listed
-    default = kind.address(merged(kind.all_settings, *_common(options, file, kind)))
+    default = kind.address({**file.common.get(kind.noun, {}), **given})
     system = options.system_id or default.system
     first = default.component if options.component_id is None else options.component_id
     count = options.count or 1
@@ -173,10 +211,8 @@ def _of_type(
 
 def _named(kind: SimulatedType[Any], text: str) -> Listed:
     where, _, name = text.partition('=')
-    try:
+    with _place(f'--{kind.noun} {text}'):
         return Listed(address(where), name)
-    except ValueError as error:
-        raise SettingError(f'--{kind.noun} {text}: {error}') from error
 
 
 def _faults(
@@ -195,17 +231,13 @@ def _faults(
     return result
 
 
-def _described(
-    one: Listed, kind: SimulatedType[Any],
-    common: tuple[Mapping[str, Any], Mapping[str, Any]], faults: Sequence[str], *, several: bool,
-) -> Description[Any]:
-    of_file, given = common
-    settings = merged(kind.all_settings, of_file, one.settings, given, *(
-        {'fault': read(kind.all_settings, 'fault', fault, '--fault')} for fault in faults))
-    try:
-        device = kind.make(settings, one.address, several and 'serial_number' not in one.settings)
-    except ValueError as error:
-        raise SettingError(f'{kind.noun} {one.address}: {error}') from error
-    for fault in settings.get('fault', ()):
-        device.behave(device.faults.add(device.behaviour, fault), 0.0)
-    return Description(one.address, device, one.name, settings.get('seed', 0))
+def _merged(settings: Mapping[str, Setting], *layers: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of several layers; later layers take precedence."""
+    result: dict[str, Any] = {}
+    for layer in layers:
+        for name, value in layer.items():
+            if settings[name].adds and name in result:
+                before = result[name]
+                value = {**before, **value} if isinstance(value, dict) else before + value
+            result[name] = value
+    return result
