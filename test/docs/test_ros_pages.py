@@ -21,7 +21,7 @@ from typing import Any
 
 from bench.subjects import SUBJECTS
 from illuminator_ros.cli.bridge import usage
-from illuminator_ros.cli.monitor import graph, key_bindings, model, requests
+from illuminator_ros.cli.monitor import graph, key_bindings, model
 from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag
@@ -175,7 +175,7 @@ def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:
     assert [cells[0] for cells in table(MONITOR, 'state')] == [
         f'`{state.value}`' for state in model.State]
     assert all(f'`{topic}`' in MONITOR for topic in graph.SIGNATURE)
-    for text in (f'for {model.SILENCE:g} s', f'within {requests.ANSWER_LIMIT:g} s',
+    for text in (f'for {model.SILENCE:g} s', f'within {graph.ANSWER_LIMIT:g} s',
                  f'`--wait` {parser().get_default("wait"):g} s'):
         assert text in MONITOR
 

@@ -18,10 +18,9 @@ import io
 import re
 from typing import Literal
 
-from illuminator_ros.cli.monitor.formatting import bar, sparkline
 from illuminator_ros.cli.monitor.key_bindings import BINDINGS
 from illuminator_ros.cli.monitor.model import Diagnosis, Fleet, Outcome
-from illuminator_ros.cli.monitor.view import columns_for, plain, screen, ViewState
+from illuminator_ros.cli.monitor.view import bar, columns_for, plain, screen, sparkline, ViewState
 import pytest
 from rich.console import Console
 from rich.screen import Screen

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import auto, Enum
 import functools
+import re
 from typing import Any, Protocol
 
 from .model import Light, State
@@ -28,15 +29,16 @@ from .model import Light, State
 STEP, FINE_STEP = 10.0, 1.0
 STROBE_PERIOD, STROBE_DUTY_CYCLE = 1.0, 50.0
 PAGE = 10
-# ECMA-48 and xterm: the bytes of cursor and editing keys behind the escape.
-_SEQUENCES = {
-    '[A': 'up', '[B': 'down', '[C': 'right', '[D': 'left', 'OA': 'up', 'OB': 'down',
-    'OC': 'right', 'OD': 'left', '[H': 'home', '[F': 'end', 'OH': 'home', 'OF': 'end',
-    '[1~': 'home', '[4~': 'end', '[7~': 'home', '[8~': 'end', '[5~': 'page up',
-    '[6~': 'page down',
+# A character, or cursor and editing keys (ECMA-48, xterm); an escape alone is a key, too.
+_KEY = re.compile('\x1b(?:O.|\\[[^@-~]*[@-~]|(?=[^O[]))|[^\x1b]', re.DOTALL)
+_NAMES = {
+    '\r': 'enter', '\n': 'enter', ' ': 'space', '\x03': 'ctrl-c', '\x04': 'ctrl-d',
+    '\x1a': 'ctrl-z', '\x1c': 'ctrl-\\',
+    **{f'\x1b{prefix}{end}': name for prefix in '[O' for end, name in {
+        'A': 'up', 'B': 'down', 'C': 'right', 'D': 'left', 'H': 'home', 'F': 'end'}.items()},
+    **{f'\x1b[{number}~': name for number, name in {
+        1: 'home', 4: 'end', 7: 'home', 8: 'end', 5: 'page up', 6: 'page down'}.items()},
 }
-_CHARACTERS = {'\r': 'enter', '\n': 'enter', ' ': 'space', '\x03': 'ctrl-c', '\x04': 'ctrl-d',
-               '\x1a': 'ctrl-z', '\x1c': 'ctrl-\\'}
 
 
 class KeyDecoder:
@@ -55,29 +57,15 @@ class KeyDecoder:
         text = (self._rest + data).decode('utf-8', errors='replace')
         self._rest = b''
         keys = []
-        while text:
-            if text[0] != '\x1b':
-                keys.append(_CHARACTERS.get(text[0], text[0]))
-                text = text[1:]
-                continue
-            length = _sequence_length(text)
-            if length == 0 and data:
-                self._rest = text.encode()
-                break
-            keys.append(_SEQUENCES.get(text[1:length], 'escape') if length else 'escape')
-            text = text[length or len(text):]
+        while match := _KEY.match(text):
+            key = match.group()
+            keys.append(_NAMES.get(key, 'escape' if key[0] == '\x1b' else key))
+            text = text[len(key):]
+        if text and data:
+            self._rest = text.encode()
+        elif text:
+            keys.append('escape')
         return keys
-
-
-def _sequence_length(text: str) -> int:
-    """Return the length of the escape sequence that begins a text, 0 if it is incomplete."""
-    if len(text) < 2:
-        return 0
-    if text[1] == 'O':
-        return 3 if len(text) >= 3 else 0
-    if text[1] != '[':
-        return 1
-    return next((at + 1 for at, character in enumerate(text[2:], 2) if '@' <= character <= '~'), 0)
 
 
 class Service(Enum):
