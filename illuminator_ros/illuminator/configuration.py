@@ -26,6 +26,7 @@ from .changes import Configure
 from .events import (
     AnyLightEvent,
     Cause,
+    ChangedByOther,
     ConfigurationChanged,
     ConfigurationRestored,
     LimitExceeded,
@@ -59,7 +60,8 @@ DEFAULT_DUTY_CYCLE = 50.0
 # s after a command of ours in which a light may show what it asks for, and what it implies.
 LATE_TIME = 30.0
 IMPLIED_TIME = 2.0
-# s between two commands that undo a change by another sender.
+# How often in a row a change by another sender is undone, and s between two of these commands.
+REPEATS = 3
 REPEAT_INTERVAL = 2.0
 # s between two log lines on setpoints beyond a limit.
 CLIP_INTERVAL = 5.0
@@ -73,6 +75,11 @@ class Origin(Enum):
     OVERRIDE = 'override'
     RESTART = 'restart'
     LIMIT = 'limit'
+    OTHER_SENDER = 'other sender'
+
+
+# Their further repeats are limited by a RepeatLimit.
+_SENT_ONCE = (Origin.LIMIT, Origin.OTHER_SENDER)
 
 
 @dataclass
@@ -107,6 +114,7 @@ class ConfigurationManager:
 
     :param emit: takes the events.
     :param limits: hold for each command that is sent.
+    :param reassert: whether changes by other senders are undone.
     :ivar confirmed: the configuration that was last accepted from us or, where another sender
         has changed it since, reported; None before the first status.
     :ivar discrepancy: how the light differs from a configuration that it has accepted, ''
@@ -116,7 +124,7 @@ class ConfigurationManager:
 
     def __init__(
         self, target: Target, emit: Callable[[AnyLightEvent], None], *,
-        limits: SafetyLimits, instance: int = 0, restore: bool = True,
+        limits: SafetyLimits, instance: int = 0, restore: bool = True, reassert: bool = False,
     ) -> None:
         self.confirmed: Configuration | None = None
         self.discrepancy = ''
@@ -129,6 +137,8 @@ class ConfigurationManager:
         self._is_limited = limits != SafetyLimits()
         self.limit_exceeded = LimitExceeded(target.address, (), '')
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
+        self._reassert = reassert
+        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
         self._clipping = RateLimit(CLIP_INTERVAL)
         self._queue: RequestQueue[Status] = RequestQueue(target)
         self._status: Status | None = None
@@ -424,8 +434,27 @@ class ConfigurationManager:
         if far:
             own = all(self._is_own(name, reported, switched_at, now) for name in far)
             cause = Cause.REQUEST if own else Cause.LIGHT
+        if self._reassert and cause is Cause.LIGHT and self._undo_change(
+                status, confirmed, reported, now):
+            return
         self._adopt(confirmed.with_changes({name: getattr(reported, name) for name in names}),
                     cause, now)
+
+    def _undo_change(
+        self, status: Status, confirmed: Configuration, reported: Configuration, now: float,
+    ) -> bool:
+        """Undo what another sender has changed, unless that was done often enough."""
+        names = unexpected_differences(confirmed, reported, status.error_flags, step=True)
+        if not names:
+            return False
+        due = self._undoing.take(now)
+        if due is not None:
+            self._undo({name: getattr(confirmed, name) for name in names},
+                       Origin.OTHER_SENDER, due)
+        left_out = self._rate.take(now) if due is not None else 0
+        self._emit(ChangedByOther(
+            self._address, reported.describe(names), due is not None, left_out))
+        return due is not None
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it, once."""
@@ -523,7 +552,8 @@ class ConfigurationManager:
         def finished(result: Result, now: float) -> None:
             pending.attempts += result.contradicted
             if (result.success or result.permanent
-                    or pending.attempts >= MAX_CONTRADICTIONS):
+                    or pending.attempts >= MAX_CONTRADICTIONS
+                    or pending.attempts and pending.origin in _SENT_ONCE):
                 self._drop_pending(pending.values)
                 self._restored(result.success, result.message)
             if not result.success:

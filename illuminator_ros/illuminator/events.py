@@ -164,6 +164,35 @@ class LimitExceeded(LightEvent):
 
 
 @dataclass(frozen=True)
+class ChangedByOther(LightEvent):
+    """
+    Another sender has changed a light that must stay as it was.
+
+    :param change: the new values, for people.
+    :param undone: whether it is undone; otherwise that was done often enough.
+    :param left_out: as for :class:`ConfigurationChanged`.
+    """
+
+    change: str
+    undone: bool
+    left_out: int | None = 0
+
+
+@dataclass(frozen=True)
+class AutomaticSwitch(LightEvent):
+    """
+    A light is switched without a request.
+
+    :param reason: for people.
+    :param failure: why it was not confirmed, '' when it begins. It is repeated.
+    """
+
+    on: bool
+    reason: str
+    failure: str = ''
+
+
+@dataclass(frozen=True)
 class LightSwitched(LightEvent):
     """
     A light was switched on or off.

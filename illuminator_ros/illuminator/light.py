@@ -22,9 +22,18 @@ import math
 from typing import Any
 
 from .changes import Switch
-from .configuration import ConfigurationManager, IMPLIED_TIME, LATE_TIME, REPORT_INTERVAL
+from .configuration import (
+    ConfigurationManager,
+    IMPLIED_TIME,
+    LATE_TIME,
+    REPEAT_INTERVAL,
+    REPEATS,
+    REPORT_INTERVAL,
+)
 from .events import (
     AnyLightEvent,
+    AutomaticSwitch,
+    ChangedByOther,
     LightConnected,
     LightIdentified,
     LightLost,
@@ -40,7 +49,7 @@ from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
 from .status import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
-from ..payload.events import RateLimit
+from ..payload.events import RateLimit, RepeatLimit
 from ..payload.identity import Identity, IdentityQuery
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
@@ -62,12 +71,33 @@ class Settings:
     :param restore_configuration: whether a light that has restarted gets its confirmed
         configuration again.
     :param limits: hold for everything that is sent.
+    :param off_after_silence: s without a request after which a light that is on is switched off;
+        0 for never.
+    :param reassert: whether changes by other senders are undone.
     """
 
     heartbeat_timeout: float = 3.0
     status_interval: float = 0.0
     restore_configuration: bool = True
     limits: SafetyLimits = SafetyLimits()
+    off_after_silence: float = 0.0
+    reassert: bool = False
+
+
+@dataclass
+class _AutomaticSwitch:
+    """
+    A switch without a request, which is repeated until the light shows it.
+
+    :param due: when it is sent next, s.
+    :param reason: for people.
+    :param limit: of the repeats, None for no limit.
+    """
+
+    on: bool
+    reason: str
+    due: float
+    limit: RepeatLimit | None = None
 
 
 class Light:
@@ -112,7 +142,7 @@ class Light:
         self._identity_query = IdentityQuery(self._target)
         self._configuration = ConfigurationManager(
             self._target, emit, limits=settings.limits, instance=instance,
-            restore=settings.restore_configuration)
+            restore=settings.restore_configuration, reassert=settings.reassert)
         self._switching: RequestQueue[Status] = RequestQueue(self._target)
         self._tracker = StatusTracker()
         self._measures_temperature = False
@@ -123,6 +153,10 @@ class Light:
         self._enabled: bool | None = None
         self._last_switch: tuple[bool, float] = False, -math.inf
         self._rate = RateLimit(REPORT_INTERVAL)
+        # When the last request came, or the light was seen to be switched on, s.
+        self._requested_at = -math.inf
+        self._automatic: _AutomaticSwitch | None = None
+        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
         self._refreshes: list[_Refresh] = []
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
@@ -172,10 +206,17 @@ class Light:
             self._emit(event)
 
     def _take_report(self, report: Report[Status], now: float, *, restarted: bool) -> None:
+        enabled = report.status.enabled
+        # Several lights at one address seem to switch again and again.
+        if enabled and not self._enabled and (
+                not report.shared_address or self._requested_at == -math.inf):
+            self._requested_at = now
         if self._switching.current:
-            self._enabled = report.status.enabled
+            self._enabled = enabled
             self._switching.take(report, now)
         else:
+            if self._automatic and enabled is self._automatic.on:
+                self._automatic = None
             self._switching.take(report, now)
             self._follow_switch(report, now, restarted=restarted)
         self._configuration.take(
@@ -199,6 +240,23 @@ class Light:
         self._emit(LightSwitched(
             self.address, status.enabled, Origin.REQUEST if is_own else Origin.OTHER_SENDER,
             left_out=self._rate.take(now)))
+        # A light is switched on again only where a request has switched it on.
+        if self.settings.reassert and not is_own and (on or not before):
+            self._undo_switch(before, now)
+
+    def _undo_switch(self, before: bool, now: float) -> None:
+        due = self._undoing.take(now)
+        if due is None:
+            self._emit(ChangedByOther(self.address, 'off' if before else 'on', undone=False))
+        else:
+            change = 'off' if before else 'on'
+            self._switch_automatically(_AutomaticSwitch(
+                before, f'external_changes: another sender switched it {change}', due,
+                self._undoing))
+
+    def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
+        self._automatic = switch
+        self._emit(AutomaticSwitch(self.address, switch.on, switch.reason))
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
@@ -231,6 +289,7 @@ class Light:
     def _restarted(self, now: float) -> None:
         was_on, is_on = self._enabled, self.status.enabled if self.status else None
         self.restarts += 1
+        self._automatic = None
         self._emit(LightRestarted(self.address, was_on, is_on))
         self._set_up(now)
         self._configuration.restarted(now)
@@ -289,10 +348,19 @@ class Light:
 
         :param detail: how it was asked for, which :class:`LightSwitched` repeats.
         """
-        self.was_commanded = True
+        self.note_request(now)
         if unreachable := self.unreachable(now):
             done(Result(False, unreachable), now)
             return
+        self._automatic = None
+        self._switch(on, now, done, detail)
+
+    def note_request(self, now: float) -> None:
+        """Note that a user has commanded the light."""
+        self.was_commanded = True
+        self._requested_at = now
+
+    def _switch(self, on: bool, now: float, done: Done, detail: str) -> None:
         change = Switch(on, self.instance)
 
         def prepare(now: float) -> Change[Status]:
@@ -322,7 +390,7 @@ class Light:
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
-        self.was_commanded = True
+        self.note_request(now)
         if unreachable := self.unreachable(now):
             done(Result(False, unreachable), now)
         else:
@@ -335,7 +403,7 @@ class Light:
 
         :param brightness: %, checked.
         """
-        self.was_commanded = True
+        self.note_request(now)
         if unreachable := self.unreachable(now):
             self._configuration.lost(unreachable, now)
             self._emit(SetpointFailed(self.address, unreachable))
@@ -354,6 +422,7 @@ class Light:
 
     def cancel(self, now: float) -> None:
         """End all requests, so that the next one is sent at once: a node's last to its light."""
+        self._automatic = None
         self._switching.cancel('cancelled', now)
         self._configuration.cancel(now)
         self._commands.end_all(now, CommandStatus.CANCELLED, self.address)
@@ -401,6 +470,12 @@ class Light:
             self._asked_at, self._status_due = now, now + STATUS_TIMEOUT
             self._target.request_status(now)
         self._identity_query.poll(now)
+        if now >= self._silence_due:
+            limit = self.settings.off_after_silence
+            self._switch_automatically(_AutomaticSwitch(
+                False, f'off_after_silence: no request for {format_seconds(limit)}', now))
+        if self._automatic and now >= self._automatic_due:
+            self._send_automatic(self._automatic, now)
         self._switching.poll(now)
         self._configuration.poll(now, connected=self.connected)
         for refresh in self._refreshes:
@@ -420,11 +495,49 @@ class Light:
         wait = min(STATUS_TIMEOUT, self.settings.heartbeat_timeout / 1.2)
         return min(self._status_due, silent_since + wait)
 
+    @property
+    def _silence_due(self) -> float:
+        """When the light is switched off since nothing was requested, s."""
+        # A light that sends no status may be on if it was switched on.
+        may_be_on = self._last_switch[0] if self._enabled is None else self._enabled
+        if (not self.settings.off_after_silence or not may_be_on or not self.connected
+                or self._automatic and not self._automatic.on):
+            return math.inf
+        return self._requested_at + self.settings.off_after_silence
+
+    @property
+    def _automatic_due(self) -> float:
+        if self._automatic is None or not self.connected:
+            return math.inf
+        # Off overtakes a request; on waits for it.
+        is_free = not self._automatic.on or self._switching.current is None
+        return self._automatic.due if is_free else math.inf
+
+    def _send_automatic(self, switch: _AutomaticSwitch, now: float) -> None:
+        def done(result: Result, now: float) -> None:
+            if self._automatic is not switch:
+                return
+            if result.success:
+                self._automatic = None
+                return
+            self._emit(AutomaticSwitch(self.address, switch.on, switch.reason, result.message))
+            due = switch.limit.take(now) if switch.limit else now + REPEAT_INTERVAL
+            if due is None:
+                self._automatic = None
+                self._emit(ChangedByOther(
+                    self.address, 'off' if switch.on else 'on', undone=False))
+            else:
+                switch.due = due
+
+        switch.due = math.inf
+        self._switch(switch.on, now, done, switch.reason)
+
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
         lost = self.heard_at + self.settings.heartbeat_timeout if self.connected else math.inf
         refresh = min((refresh.until for refresh in self._refreshes), default=math.inf)
-        return min(lost, self._question_due, refresh, self._identity_query.next_deadline(),
+        return min(lost, self._question_due, refresh, self._silence_due, self._automatic_due,
+                   self._identity_query.next_deadline(),
                    self._switching.next_deadline(),
                    self._configuration.next_deadline(connected=self.connected))
 

@@ -14,11 +14,15 @@
 
 """Limits, sources, the dead man's switch and changes by other senders, in the node."""
 
+import threading
+
 import pytest
 from std_msgs.msg import Float32
-from support.embedded import refusal
-from support.light import CONFIGURE, free_port, ServedLight
+from support.embedded import embedded_bridge, refusal
+from support.light import CONFIGURE, eventually, free_port, ServedLight
 from support.ros import Parameters, Ros, running_bridge
+from support.slow import pass_time_until
+from support.waiting import PATIENCE
 
 
 @pytest.mark.parametrize(('given', 'reason'), [
@@ -51,3 +55,34 @@ def test_limits_are_shown_by_descriptors_refuse_parameters_and_clip_streams(own_
         bridge.wait_for('brightness 90 % is above max_brightness 60 %: the limit is sent')
         parameters.wait(brightness=60.0)
         assert max(command.param2 for command in light.commands(CONFIGURE)) == 60.0
+
+
+@pytest.mark.parametrize('change', ['follow', 'reassert'])
+def test_on_and_off_by_another_sender_are_logged_in_both_settings(
+    own_ros: Ros, change: str,
+) -> None:
+    port = free_port()
+    with (running_bridge(own_ros.domain, port, external_changes=change) as bridge,
+          ServedLight(port) as light):
+        Parameters(own_ros).wait(mode='internal_control')
+        light.report(enable=1)
+
+        bridge.wait_for('light 1/243 was switched on by another sender')
+        if change == 'reassert':
+            bridge.wait_for('is switched off by external_changes: another sender switched it on')
+            eventually(lambda: light.fake.fields['enable'] == 0)
+
+
+def test_light_goes_off_after_silence_while_the_executor_is_blocked(own_ros: Ros) -> None:
+    port, released = free_port(), threading.Event()
+    with (embedded_bridge(own_ros.domain, port, off_after_silence=5.0) as process,
+          ServedLight(port) as light):
+        Parameters(own_ros).wait(mode='internal_control')
+        assert own_ros.enable(True).success
+        blocked = threading.Event()
+        process.node.create_timer(0.001, lambda: (blocked.set(), released.wait()))
+        assert blocked.wait(PATIENCE)
+
+        pass_time_until(lambda: light.fake.fields['enable'] == 0)
+
+        released.set()

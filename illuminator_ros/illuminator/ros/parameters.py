@@ -53,6 +53,11 @@ LIGHT_PARAMETERS = (
     ParameterSpec('min_strobe_period', 0.0,
                   'limit of the strobe period that is sent; 0 = none', 's', 0.0,
                   MAX_STROBE_PERIOD),
+    ParameterSpec('off_after_silence', 0.0,
+                  'silence of all sources after which a light is switched off; 0 = never', 's',
+                  0.0, 3600.0),
+    ParameterSpec('external_changes', 'follow', 'answer to changes by other senders',
+                  choices=('follow', 'reassert')),
 )
 
 DEVICE_PARAMETERS = (
@@ -108,7 +113,8 @@ def settings(values: Mapping[str, Any]) -> Settings:
     """Return how lights are treated."""
     return Settings(values['heartbeat_timeout'], values['status_interval'],
                     values['restore_configuration'],
-                    SafetyLimits(values['max_brightness'], values['min_strobe_period']))
+                    SafetyLimits(values['max_brightness'], values['min_strobe_period']),
+                    values['off_after_silence'], values['external_changes'] == 'reassert')
 
 
 def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:

@@ -27,7 +27,9 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from .flag_log import FlagLog
 from ..events import (
     AnyLightEvent,
+    AutomaticSwitch,
     Cause,
+    ChangedByOther,
     ConfigurationChanged,
     ConfigurationRestored,
     LightConnected,
@@ -111,6 +113,8 @@ class LightPublishers:
             SetpointFailed: self._setpoint_failed,
             SetpointClipped: self._setpoint_clipped,
             LimitExceeded: self._limit_exceeded,
+            AutomaticSwitch: self._automatic_switch,
+            ChangedByOther: self._changed_by_other,
         }
         interface.publish('connected', False)
 
@@ -179,6 +183,25 @@ class LightPublishers:
             way = event.detail if event.origin is Origin.REQUEST else event.origin.value
             self._log.info(f'light {event.address} was switched {"on" if event.on else "off"} by '
                            f'{way or "a request"}{_left_out(event.left_out)}', 'switched')
+
+    def _automatic_switch(self, event: AutomaticSwitch) -> None:
+        on = 'on' if event.on else 'off'
+        if event.failure:
+            self._log.error(f'light {event.address} is not confirmed to be {on}, which is '
+                            f'repeated: {event.failure}', 'automatic')
+        else:
+            self._log.warning(f'light {event.address} is switched {on} by {event.reason}',
+                              'automatic')
+
+    def _changed_by_other(self, event: ChangedByOther) -> None:
+        if not event.undone:
+            self._log.error(
+                f'light {event.address}: another sender insists on {event.change}, which stays '
+                'from now on: only one of the two programs must control the light', 'insists')
+        elif event.left_out is not None:
+            self._log.warning(
+                f'light {event.address} was changed by another sender, which is undone: '
+                f'{event.change}{_left_out(event.left_out)}', 'changed')
 
     def _configuration_changed(self, event: ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names

@@ -1,0 +1,163 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a light does without a request: off after silence, and back after other senders."""
+
+from collections.abc import Callable
+import math
+
+from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.mavlink.messages import MavCmd, MavResult
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
+from support.faulty_wire import Faults
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+SILENCE = 5.0
+
+
+def silenced(light: FakeLight | None = None, **faults: float) -> Pair:
+    return Pair(light or FakeLight(), settings=Settings(off_after_silence=SILENCE),
+                there=Faults(**faults)).settle()
+
+
+def reasserting(**fields: object) -> tuple[FakeLight, Pair]:
+    light = FakeLight(brightness=50.0, **fields)
+    return light, Pair(light, settings=Settings(reassert=True)).settle()
+
+
+def insist(light: FakeLight, pair: Pair, seconds: float, **fields: object) -> None:
+    """Be a sender that changes the light again whenever it differs, ten times a second."""
+    for _ in range(round(seconds * 10)):
+        light.fields |= fields
+        pair.run(0.1)
+
+
+@pytest.mark.parametrize(('act', 'on'), [
+    (lambda pair: pair.ask_enable(True), True),
+    (lambda pair: pair.ask_configure(brightness=20.0), True),
+    (lambda pair: pair.light.set_brightness(20.0, pair.now), True),
+    (lambda pair: pair.ask_refresh(), False),
+], ids=['enable', 'configure', 'stream', 'refresh'])
+def test_a_light_stays_on_as_long_as_it_is_commanded(
+        act: Callable[[Pair], object], on: bool) -> None:
+    pair = silenced()
+    pair.enable(True)
+    for _ in range(4):
+        act(pair)
+        pair.run(SILENCE - 1.0)
+
+    assert pair.light.status.enabled is on
+
+
+@pytest.mark.parametrize('way', ['request', 'another sender', 'already on'])
+def test_a_light_goes_off_after_silence_however_it_was_switched_on(way: str) -> None:
+    light = FakeLight(enable=int(way == 'already on'))
+    pair = silenced(light)
+    if way == 'request':
+        pair.enable(True)
+    light.fields['enable'] = 1
+    pair.run(SILENCE + 2.0)
+
+    assert light.fields['enable'] == 0
+    assert [one.on for one in pair.recorder.others if isinstance(one, AutomaticSwitch)] == [False]
+
+
+def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
+    light = FakeLight()
+    pair = silenced(light, drop=0.3)
+    pair.run_until(lambda: pair.enable(True).success)
+    light.results[ON_OFF] = [MavResult.FAILED] * 3 + [None] * 9 + [MavResult.ACCEPTED]
+    pair.run(40.0)
+
+    assert light.fields['enable'] == 0
+    assert any(one.failure for one in pair.recorder.others if isinstance(one, AutomaticSwitch))
+
+
+def test_a_light_without_statuses_goes_off_after_silence_too() -> None:
+    light = FakeLight(stream=0.0)
+    light.answers.clear()
+    pair = silenced(light)
+    pair.enable(True)
+    pair.run(SILENCE + 1.0)
+
+    assert [command.param1 for command in pair.commands(ON_OFF)] == [1.0, 0.0]
+
+
+def test_a_light_that_was_lost_meanwhile_goes_off_when_it_is_heard_again() -> None:
+    light = FakeLight()
+    pair = silenced(light)
+    pair.enable(True)
+    pair.close()
+    pair.run(SILENCE + 1.0)
+    pair.open()
+    pair.run(2.0)
+
+    assert light.fields['enable'] == 0
+
+
+@pytest.mark.parametrize(('before', 'change', 'undone'), [
+    ({}, {'brightness': 30.0, 'strobe_period': 1.0}, True),
+    ({}, {'mode': 2}, True),
+    ({'enable': 1}, {'enable': 0}, True),
+    ({}, {'enable': 1}, True),
+    ({}, {'brightness': 30.0, 'error_status': 1}, False),
+], ids=str)
+def test_a_change_by_another_sender_is_undone_unless_the_light_is_hot(
+        before: dict[str, int], change: dict[str, float], undone: bool) -> None:
+    light, pair = reasserting()
+    if before:
+        pair.enable(True)
+    agreed = dict(light.fields)
+    light.fields |= change
+    pair.run(3.0)
+
+    assert (light.fields == agreed) is undone
+    assert pair.snapshot.configuration.brightness == 50.0
+
+
+def test_a_light_that_no_request_has_switched_on_is_not_switched_on_again() -> None:
+    light, pair = reasserting(enable=1)
+    light.fields['enable'] = 0
+    pair.run(5.0)
+
+    assert pair.commands(ON_OFF) == []
+
+
+@pytest.mark.parametrize(('fields', 'kind'), [
+    ({'brightness': 90.0}, CONFIGURE), ({'enable': 1}, ON_OFF)])
+def test_a_sender_that_insists_is_left_alone_after_three_times_in_a_row(
+        fields: dict[str, float], kind: MavCmd) -> None:
+    light, pair = reasserting()
+    insist(light, pair, 20.0, **fields)
+    times = [at for at, command in pair.commands_at(kind) if not command.confirmation]
+
+    assert len(times) == 3
+    assert min(after - before for before, after in zip(times, times[1:], strict=False)) >= 2.0
+    assert [one.undone for one in pair.recorder.others
+            if isinstance(one, ChangedByOther) and not one.undone] == [False]
+    assert light.fields == light.fields | fields
+
+    pair.run(60.0)
+    pair.configure(brightness=50.0)
+    pair.enable(False)
+    # A change in the 2 s after a command counts as its effect.
+    pair.run(2.5)
+    light.fields |= fields
+    pair.run(4.0)
+
+    assert light.fields != light.fields | fields
+    assert math.isfinite(pair.light.next_deadline())
