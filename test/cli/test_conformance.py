@@ -203,32 +203,23 @@ def test_a_name_that_the_encoding_lacks_is_escaped(
     assert 'M\\xfcller' in program.log
 
 
-@pytest.mark.parametrize(('link', 'reason'), [
-    ('udpin://{url}', 'no light was heard within 0.5 s'),
-    ('tcp://127.0.0.1:1', 'link not open: tcp://127.0.0.1:1: ')])
-def test_without_a_light_one_requirement_fails_with_status_1(
-        url: str, start: Start, link: str, reason: str) -> None:
+@pytest.mark.parametrize(('link', 'used', 'status', 'reason'), [
+    ('udpin://{url}', False, 1, 'no light: no light was heard within 0.5 s'),
+    ('tcp://127.0.0.1:1', False, 1, 'no light: link not open: tcp://127.0.0.1:1: '),
+    # This computer cannot open the link, which is not a finding about the light.
+    ('udpin://{url}', True, 2, 'Address already in use; nothing was checked'),
+    ('serial:///nowhere/tty:57600', False, 2, 'nothing was checked')])
+def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
+        url: str, start: Start, simulate: Start, link: str, used: bool, status: int, reason: str,
+) -> None:
+    if used:
+        simulate()
     program = start('conformance', link.format(url=url), '--wait', '0.5')
 
-    assert program.wait() == 1
-    *_, light, summary = program.log.splitlines()
-    assert light.startswith(f'no light: {reason}')
-    assert summary.startswith('0 passed, 1 failed')
-    assert len(program.log.splitlines()) < 12
-
-
-@pytest.mark.parametrize(('link', 'reason'), [
-    ('udpin://{url}', 'Address already in use; nothing was checked'),
-    ('serial:///nowhere/tty:57600', 'nothing was checked'),
-])
-def test_a_link_that_this_computer_cannot_open_ends_with_status_2_and_no_finding(
-        url: str, start: Start, simulate: Start, link: str, reason: str) -> None:
-    simulate()
-    program = start('conformance', link.format(url=url), '--wait', '0.5')
-
-    assert program.wait() == 2
+    assert program.wait() == status
     assert reason in program.log
-    assert 'FAIL' not in program.log
+    assert ('0 passed, 1 failed' in program.log) == ('FAIL' in program.log) == (status == 1)
+    assert len(program.log.splitlines()) < 12
 
 
 @pytest.mark.parametrize(('arguments', 'reason'), [
@@ -249,28 +240,20 @@ def test_a_wrong_argument_is_named_in_one_line_with_status_2(
     assert ended.stderr.count('\n') == 1
 
 
-@pytest.mark.parametrize(('answer', 'reply'), [
-    ('n', 'SKIPPED strobe'), ('y', 'PASS    strobe'),
-    ('maybe', "'maybe' is neither y nor n: taken as no")])
-def test_the_question_names_the_light_after_the_others_on_the_link(
-        url: str, simulate: Start, answer: str, reply: str) -> None:
+@pytest.mark.parametrize(('only', 'answers', 'reply'), [
+    ('strobe', ['n'], 'SKIPPED strobe'), ('strobe', ['y'], 'PASS    strobe'),
+    ('strobe', ['maybe'], "'maybe' is neither y nor n: taken as no"),
+    ('heartbeat', [], 'PASS    heartbeat')])
+def test_a_check_that_needs_consent_asks_after_it_named_the_lights_on_the_link(
+        url: str, simulate: Start, only: str, answers: list[str], reply: str) -> None:
     simulate('--light', '1/7', '--light', '1/8')
     status, seen = conversation(
-        'illuminator_ros.conformance', f'udpout://{url}', '--target', '1/8', '--only', 'strobe',
-        '--only', 'address', answers=[('[y/N]', answer)])
+        'illuminator_ros.conformance', f'udpout://{url}', '--target', '1/8', '--only', only,
+        '--only', 'address', answers=[('[y/N]', answer) for answer in answers])
 
-    announced, _, question = seen.partition('Some checks')
+    announced, question, answered = seen.partition('May light 1/8 strobe')
     assert 'found light 1/8' in announced
     assert 'not checked: light 1/7' in announced
-    assert 'May light 1/8 strobe' in question
-    assert reply in question
+    assert bool(question) == bool(answers)
+    assert reply in (answered or announced)
     assert status == 0
-
-
-def test_without_checks_that_need_consent_nothing_is_asked(url: str, simulate: Start) -> None:
-    simulate()
-    status, seen = conversation(
-        'illuminator_ros.conformance', f'udpout://{url}', '--only', 'address', answers=[])
-
-    assert status == 0
-    assert '[y/N]' not in seen

@@ -20,14 +20,8 @@ from xml.etree import ElementTree
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.report import (
-    as_json,
-    as_junit,
-    catalogue,
-    lines,
-    Report,
-    Table,
-)
+from illuminator_ros.payload.checks import report as reports
+from illuminator_ros.payload.checks.report import lines, Report, Table
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.conformance_run import Run
@@ -51,7 +45,7 @@ def shown(run: Run) -> list[str]:
 
 
 def test_the_json_report_has_every_requirement_with_its_messages(report: Report) -> None:
-    content = json.loads(as_json(report))
+    content = json.loads(reports.as_json(report))
     assert [one['name'] for one in content['results']] == [one.name for one in REQUIREMENTS]
     (nan,) = [one for one in content['results'] if one['name'] == 'not-a-number']
     assert nan['verdict'] == 'FAIL'
@@ -61,11 +55,12 @@ def test_the_json_report_has_every_requirement_with_its_messages(report: Report)
     assert any('< COMMAND_ACK' in line for line in nan['exchange'])
     assert content['counts']['FAIL'] == 3
     assert content['passed'] is False
+    assert report.summary == '44 passed, 3 failed, 1 skipped in 12 s; the light is as it was'
     assert (content['light'], content['restored']) == (report.device, 'the light is as it was')
 
 
 def test_the_junit_report_has_counts_reasons_and_sections(report: Report) -> None:
-    suite = ElementTree.fromstring(as_junit(report))
+    suite = ElementTree.fromstring(reports.as_junit(report))
     assert (suite.tag, suite.get('name')) == ('testsuite', 'illuminator conformance')
     assert [suite.get(key) for key in ('tests', 'failures', 'skipped')] == ['48', '3', '1']
     assert [len(suite.findall(path)) for path in (
@@ -88,14 +83,6 @@ def test_the_table_has_reason_section_and_messages_of_a_failed_requirement(run: 
     assert '> COMMAND_LONG to 1/200: MAV_CMD_ILLUMINATOR_ON_OFF 1' in messages[0]
     assert not any(' HEARTBEAT ' in line for line in messages)
     assert 'set no flag; try a longer --heat' in lines(run.result('thermal-flags'))[1]
-
-
-def test_a_finding_has_the_reason_and_the_messages() -> None:
-    result = Run(faults=('anything',)).finish().result('brightness-values')
-    assert 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101 0 0: MAV_RESULT_ACCEPTED' in result.detail
-    sent, received = result.exchange[-2:]
-    assert '> COMMAND_LONG to 1/243: MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101' in sent
-    assert '< COMMAND_ACK MAV_CMD_DO_ILLUMINATOR_CONFIGURE: MAV_RESULT_ACCEPTED' in received
 
 
 def test_requirements_that_were_not_reached_share_one_line() -> None:
@@ -121,11 +108,7 @@ def test_requirements_that_were_skipped_for_their_own_reason_keep_their_lines() 
     assert shown(alone) == lines(alone.result('on'))
 
 
-def test_the_summary_counts_verdicts(report: Report) -> None:
-    assert report.summary == '44 passed, 3 failed, 1 skipped in 12 s; the light is as it was'
-
-
 def test_the_catalogue_has_a_line_for_each_requirement_with_its_section() -> None:
-    for one, row in zip(REQUIREMENTS, catalogue(REQUIREMENTS, 'light'), strict=True):
+    for one, row in zip(REQUIREMENTS, reports.catalogue(REQUIREMENTS, 'light'), strict=True):
         assert row.startswith(one.name)
         assert f'[{one.specification.title}, "{one.section}"' in row

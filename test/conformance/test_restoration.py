@@ -45,15 +45,11 @@ def is_restored(run: Run) -> bool:
     return run.lamp.enabled and run.lamp.configuration.differences(BEFORE) == []
 
 
-def test_switch_and_configuration_are_restored() -> None:
-    run = used().finish()
+@pytest.mark.parametrize('faults', [(), *((fault,) for fault in RESTORABLE)])
+def test_switch_and_configuration_are_restored(faults: tuple[str, ...]) -> None:
+    run = used(*faults).finish()
     assert is_restored(run)
     assert run.suite.restored == 'the light is as it was'
-
-
-@pytest.mark.parametrize('fault', RESTORABLE)
-def test_a_light_with_a_fault_is_restored(fault: str) -> None:
-    assert is_restored(used(fault).finish())
 
 
 @pytest.mark.parametrize(('default', 'changed', 'after'), [

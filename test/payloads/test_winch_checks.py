@@ -18,14 +18,14 @@ from typing import Any
 
 from illuminator_ros.illuminator.simulated import describe
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
 from illuminator_ros.payload.checks.suite import Suite
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from payloads.winch import SimulatedWinch, WINCH
-from payloads.winch_checks import CHECKS, REQUIREMENTS
+from payloads.winch_checks import REQUIREMENTS
 import pytest
+from support.virtual_link import START, VirtualLink
 
 DECK = Address(1, 169)
 
@@ -33,14 +33,13 @@ DECK = Address(1, 169)
 @pytest.mark.parametrize(('fault', 'failed'), [('', set()), ('lie', {'release'})])
 def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_every_component(
         fault: str, failed: set[str]) -> None:
-    winch = SimulatedWinch()
+    winch, checks = SimulatedWinch(), WINCH.load('checks')
     described: list[Description[Any]] = [
         describe(IlluminatorProperties()), Description(DECK, winch)]
-    devices = SimulatedComponents(described, 0.0)
+    devices = SimulatedComponents(described, START)
     component = devices.components[1]
     if fault:
-        component.behave(winch.faults.add(component.behaviour, fault), 0.0)
-    checks = WINCH.load('checks')
+        component.behave(winch.faults.add(component.behaviour, fault), START)
     session = checks.session(Address(255, 190))
     suite = Suite(checks, session, Conditions(), checks.requirements)
 
@@ -49,19 +48,8 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
         await suite.run()
 
     session.runner.run(run())
-    session.link_opened(0.0)
-    sides: tuple[Endpoint, Endpoint] = (session, devices)
-    for step in range(10_000):
-        now = 0.01 * step
-        for side, other in (sides, sides[::-1]):
-            side.poll(now)
-            while side.outgoing:
-                source, message = side.outgoing.popleft()
-                other.receive(source, message, now)
-        if not session.runner.running:
-            break
+    VirtualLink(session, devices).run_until(lambda: not session.runner.running, within=100.0)
 
-    assert checks is CHECKS
     assert session.found == DECK
     assert {one.requirement.name for one in suite.results if one.verdict is Verdict.FAIL} == failed
     assert len(suite.results) == len(REQUIREMENTS)

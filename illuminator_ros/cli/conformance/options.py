@@ -81,10 +81,9 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks
             metavar=one.metavar, help=f'{one.help} (default: %(default)g)')
     add('--wait', type=number(0.1, 3600), default=FIND_TIMEOUT, metavar='S',
         help=f'how long to wait for the {checks.device} (default: %(default)g)')
-    add('--system-id', type=integer(1, 255), default=255, metavar='ID',
-        help='our MAVLink system ID (default: 255)')
-    add('--component-id', type=integer(1, 255), default=190, metavar='ID',
-        help='our component ID (default: 190)')
+    for part, default in (('system', 255), ('component', 190)):
+        add(f'--{part}-id', type=integer(1, 255), default=default, metavar='ID',
+            help=f'our MAVLink {part} ID (default: %(default)s)')
     add('--junit', metavar='FILE', help='also write a JUnit report')
     add('--json', metavar='FILE', help='also write a JSON report with all messages')
     add('-v', '--verbose', action='store_true',

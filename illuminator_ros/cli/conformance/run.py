@@ -29,7 +29,7 @@ import signal
 import sys
 import threading
 from types import FrameType
-from typing import Any, TextIO
+from typing import Any
 
 from .options import parse
 from ..options import signing
@@ -83,6 +83,7 @@ class Conformance:
     ) -> None:
         self._options = options
         self._checks = checks
+        self._payload_options = {one.name: getattr(options, one.name) for one in checks.options}
         self._requirements: list[Requirement[Any]] = [
             one for one in checks.requirements
             if not options.only or one.name in options.only]
@@ -115,16 +116,17 @@ class Conformance:
             self._link.stop()
             _complain(f'{missing}; nothing was checked')
             return 2
+        self._write_line(*self._announcement)
         conditions = Conditions(
-            bool(self._announcement) and self._announce_and_ask(),
-            lambda: self._link.state().decoding.crc_errors, self._own_options())
+            bool(self._announcement) and self._consent(),
+            lambda: self._link.state().decoding.crc_errors, self._payload_options)
         suite = self._suite = Suite(
             checks, self._session, conditions, self._requirements, missing, self._show)
         self._finish(suite.run())
         self._link.stop()
         self._write_line(*self._table.end())
         report = Report(
-            checks.payload, checks.device, options.url, self._describe_device(missing),
+            checks.payload, checks.device, options.url, self._describe_device(),
             tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
         self._write_line('', report.device, report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
@@ -135,23 +137,18 @@ class Conformance:
         if texts:
             self._written &= _print(*texts)
 
-    def _own_options(self) -> dict[str, float]:
-        return {one.name: getattr(self._options, one.name) for one in self._checks.options}
-
     def _finish(self, main: Main) -> None:
         """Run a coroutine of the session to its end, and print what comes meanwhile."""
         ended = threading.Event()
 
-        def begin(now: float) -> None:
-            self._session.runner.run(main)
-
-        def check(now: float) -> None:
-            if not self._session.runner.running:
+        async def until_end() -> None:
+            try:
+                await main
+            finally:
                 ended.set()
 
-        self._link.call(begin)
+        self._link.call(lambda now: self._session.runner.run(until_end()))
         while not ended.is_set() or not self._texts.empty():
-            self._link.call(check)
             with contextlib.suppress(queue.Empty):
                 self._write_line(self._texts.get(timeout=0.1))
 
@@ -160,8 +157,8 @@ class Conformance:
             self._texts.put(str(event))
 
     def _show(self, result: Result) -> None:
-        if lines := self._table.add(result):
-            self._texts.put('\n'.join(lines))
+        for line in self._table.add(result):
+            self._texts.put(line)
 
     async def _find(self) -> None:
         """Find the device; note the others on the link, or why there is none."""
@@ -182,24 +179,19 @@ class Conformance:
         if others := session.heard - session.devices - {session.found}:
             self._announcement.append(f'also on this link: {names(others)}')
 
-    def _announce_and_ask(self) -> bool:
-        """Name the device and the others on the link; return whether there is consent."""
-        self._write_line(*self._announcement)
-        if self._options.yes:
-            return True
-        if not any(one.needs_consent for one in self._requirements):
-            return False
-        return _is_terminal(sys.stdin) and _is_terminal(sys.stdout) and self._ask()
-
-    def _ask(self) -> bool:
+    def _consent(self) -> bool:
+        """Return whether there is consent; ask for it if there is a terminal."""
+        # A stream whose descriptor was closed before the start is None.
+        terminal = all(stream and stream.isatty() for stream in (sys.stdin, sys.stdout))
+        if self._options.yes or not terminal or not any(
+                one.needs_consent for one in self._requirements):
+            return bool(self._options.yes)
         _print(self._checks.question.format(
-            device=self._session.device, **self._own_options()), end='')
+            device=self._session.device, **self._payload_options), end='')
         # Not input(), which a signal does not end.
-        while not self._session.runner.interrupted:
-            if select.select([sys.stdin], [], [], 0.1)[0]:
-                break
-        else:
-            return False
+        while not select.select([sys.stdin], [], [], 0.1)[0]:
+            if self._session.runner.interrupted:
+                return False
         try:
             answer = sys.stdin.readline().strip()
         except (OSError, ValueError):
@@ -222,16 +214,11 @@ class Conformance:
         _complain(f'interrupted; restoring the {device}; a second signal ends without it'
                   if changed else 'interrupted')
 
-    def _describe_device(self, missing: str) -> str:
+    def _describe_device(self) -> str:
         session, device = self._session, self._checks.device
-        if session.found is None:
-            return f'no {device}: {missing}' if missing else f'no {device}'
-        return f'{device} {session.found}' + (f': {session.identity}' if session.identity else '')
-
-
-def _is_terminal(stream: TextIO | None) -> bool:
-    # A stream whose descriptor was closed before the start is None.
-    return stream is not None and stream.isatty()
+        name, detail = (f'{device} {session.found}', session.identity) if session.found else (
+            f'no {device}', self._missing)
+        return f'{name}: {detail}' if detail else name
 
 
 def _complain(text: str) -> None:
