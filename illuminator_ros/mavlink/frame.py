@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import re
+from typing import cast
 
 from fastcrc.crc16 import mcrf4xx
 
@@ -66,10 +67,23 @@ class Frame:
 
 
 @dataclass(slots=True)
+class ForeignFrames:
+    """
+    Consecutive valid frames of one source that the receiver only counts.
+
+    :param sequences: of each frame, in order.
+    """
+
+    source: Address
+    sequences: bytearray
+
+
+@dataclass(slots=True)
 class DecoderCounters:
     """Bytes and frames that a :class:`Decoder` has read since it was made."""
 
     frames: int = 0
+    foreign: int = 0
     crc_errors: int = 0
     unknown_ids: int = 0
     skipped_bytes: int = 0
@@ -139,13 +153,31 @@ class Decoder:
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return the frames that ``data`` completes, in order."""
+        return cast('list[Frame]', self.sort(data, {}))
+
+    def sort(
+        self, data: bytes, foreign: Mapping[bytes, bytes],
+    ) -> list[Frame | ForeignFrames]:
+        """
+        Return the frames that ``data`` completes, in order, and foreign ones as runs.
+
+        :param foreign: the messages that are only counted: CRC_EXTRA by the 3 bytes of the id.
+            A frame that is signed, cut in two or of MAVLink 1 is returned all the same.
+        """
         self.taken += len(data)
         data = self._rest + data if self._rest else data
-        frames: list[Frame] = []
+        frames: list[Frame | ForeignFrames] = []
+        count = 0
         position = end = 0
         signature_end = self._signature_end
         while match := _START.search(data, position):
             start = match.start()
+            if foreign and start >= signature_end:
+                begin, start = start, self._count_foreign(data, start, foreign, frames)
+                if start > begin:
+                    self.counters.skipped_bytes += begin - end
+                    position = end = start
+                    continue
             found = self._read(data, start)
             if found is None:
                 if start < signature_end and self._is_frame(data, signature_end):
@@ -158,6 +190,7 @@ class Decoder:
                 position = start + 1
                 continue
             frames.append(frame)
+            count += 1
             self.counters.skipped_bytes += start - end
             position = end = start + size
             if frame.signature is not None:
@@ -168,11 +201,37 @@ class Decoder:
                 signature_end = end
         else:
             start = len(data)
-        self.counters.frames += len(frames)
+        self.counters.frames += count
         self.counters.skipped_bytes += start - end
         self._rest = data[start:]
         self._signature_end = max(signature_end - start, 0)
         return frames
+
+    def _count_foreign(
+        self, data: bytes, start: int, foreign: Mapping[bytes, bytes],
+        frames: list[Frame | ForeignFrames],
+    ) -> int:
+        """Append the foreign frames from ``start``; return where something else begins."""
+        size = len(data)
+        source = b''
+        count = 0
+        while (payload := start + HEADER_V2) < size and data[start] == STX_V2:
+            crc_extra = foreign.get(data[start + 7:payload])
+            end = payload + CHECKSUM + data[start + 1]
+            if (crc_extra is None or data[start + 2] or end > size
+                    or mcrf4xx(data[start + 1:end - CHECKSUM] + crc_extra)
+                    != data[end - 2] | data[end - 1] << 8):
+                break
+            if data[start + 5:start + 7] != source:
+                source = data[start + 5:start + 7]
+                sequences = bytearray()
+                frames.append(ForeignFrames(Address(*source), sequences))
+            sequences.append(data[start + 4])
+            count += 1
+            start = end
+        self.counters.frames += count
+        self.counters.foreign += count
+        return start
 
     def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
         """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""

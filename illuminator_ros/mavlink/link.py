@@ -22,6 +22,7 @@ import contextlib
 import copy
 import logging
 import math
+import select
 import selectors
 import socket
 import struct
@@ -45,10 +46,13 @@ from .url import Url
 
 # s; the loop polls this often even where nothing is due.
 IDLE = 1.0
-# A busy link rests for REST s after a turn with more frames than this, so that the next turn
-# reads many of them: a turn costs as much as several frames. A call waits no longer than that.
-MAX_FRAMES_WITHOUT_REST = 16
-REST = 0.0005
+# A turn costs as much as ten foreign frames. Where more than BUSY come per second, they collect
+# for REST s, or until COLLECTED are expected; a UDP socket has room for 250. A call ends the
+# rest, and there is none within HURRY s of a message that may be answered.
+BUSY = 1000.0
+REST = 0.02
+COLLECTED = 128
+HURRY = 1.0
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
 # s that a channel stays open until it is proved without a frame.
@@ -114,7 +118,7 @@ class Link:
         self._connecting = False
         self._connect_at = -math.inf
         self._channel: Channel | None = None
-        self._receiver = Receiver(self._signing)
+        self._receiver = Receiver(self._signing, self._classes)
         self._router = Router()
         self._traffic = Traffic()
         self._status = LinkStatus(label, clock())
@@ -126,8 +130,11 @@ class Link:
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
         self._work_pending = False
-        # Good frames received before this turn.
-        self._frames_before = 0
+        # Foreign frames received until the last turn that had some, when that was, and until
+        # when an answer is expected, s.
+        self._foreign_before = 0
+        self._foreign_at = -math.inf
+        self._hurry_until = -math.inf
         self._snapshot_due = 0.0
         self._snapshot = self.snapshot(clock())
         self._calls: deque[Callable[[float], None]] = deque()
@@ -136,6 +143,8 @@ class Link:
         self._wake_in.setblocking(False)
         self._selector = selector or selectors.DefaultSelector()
         self._selector.register(self._wake_out, selectors.EVENT_READ)
+        self._calls_only = select.poll()
+        self._calls_only.register(self._wake_out, select.POLLIN)
         self._stopping = threading.Event()
         self._starting = threading.Lock()
         # s that the next turn must wait at least: there was a fault.
@@ -242,12 +251,24 @@ class Link:
             elif self._channel is not None:
                 self._serve(key.fileobj, events)
         now = self.clock()
-        frames = self._receiver.counters.frames
-        if frames > self._frames_before + MAX_FRAMES_WITHOUT_REST:
-            time.sleep(REST)
-        self._frames_before = frames
         if self._work_pending or self._calls or now >= due:
             self._work()
+        self._rest(now)
+
+    def _rest(self, now: float) -> None:
+        """Let foreign frames collect on a busy link."""
+        foreign = self._receiver.counters.foreign
+        count, gap = foreign - self._foreign_before, now - self._foreign_at
+        if not count or self._channel is None or self._channel.more:
+            return
+        self._foreign_before, self._foreign_at = foreign, now
+        if now >= self._hurry_until and count > BUSY * gap > 0:
+            rest = min(REST, COLLECTED * gap / count)
+            # poll() cannot wait for less than 1 ms.
+            if rest < 0.001:
+                time.sleep(rest)
+            else:
+                self._calls_only.poll(1000 * rest)
 
     def _work(self) -> None:
         """Do what others asked for, and what is due."""
@@ -304,32 +325,41 @@ class Link:
         frames = self._receiver.take(peer, data, now, self._wall_clock())
         if frames:
             for frame in frames:
-                self._accept(channel, peer, frame, now)
+                if isinstance(frame, Frame):
+                    self._accept(channel, peer, frame, now)
+                elif frame.source not in self._writer.sequences:
+                    # Those from our own address are our own, returned, or an address conflict.
+                    self._heard(channel, peer, frame.source, frame.sequences, now)
             self._flush()
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
-        source = frame.source
-        if source in self._writer.sequences and self._writer.is_loopback(frame, now):
+        if frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
             return
+        self._heard(channel, peer, frame.source, bytes((frame.sequence,)), now)
+        cls = self._classes.get(frame.message_id)
+        if cls is not None:
+            self._work_pending = True
+            message = decode_payload(cls, frame.payload)
+            if _frame_log.isEnabledFor(logging.DEBUG):
+                _frame_log.debug('received from %s: %s', frame.source, message)
+            self._safe_call(self.endpoint.receive, frame.source, message, now)
+
+    def _heard(
+        self, channel: Channel, peer: Peer, source: Address, sequences: bytes | bytearray,
+        now: float,
+    ) -> None:
         if not self._frame_received:
             self._frame_received = self._work_pending = True
             self._connector.backoff.answered()
             self._status.take(LinkInput.PROVED, now, channel.name)
         self._greet_at = now + SILENCE
-        self._traffic.count(source, frame.sequence)
+        self._traffic.count(source, sequences)
         if channel.heard(peer, now):
             self._work_pending = True
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('new peer %s on %s', peer, channel.name)
             self._safe_call(self.endpoint.link_opened, now)
         self._router.heard(source, peer, now)
-        cls = self._classes.get(frame.message_id)
-        if cls is not None:
-            self._work_pending = True
-            message = decode_payload(cls, frame.payload)
-            if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('received from %s: %s', source, message)
-            self._safe_call(self.endpoint.receive, source, message, now)
 
     def _poll_channel(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
@@ -359,6 +389,8 @@ class Link:
                     break
                 peers = towards
                 outgoing.popleft()
+                if getattr(message, 'target_system', 0):
+                    self._hurry_until = now + HURRY
                 self._write(frames, source, message, now)
             try:
                 if frames:

@@ -176,15 +176,16 @@ class Traffic:
         return replace(self, sources={
             source: copy(counter) for source, counter in self.sources.items()})
 
-    def count(self, source: Address, sequence: int) -> None:
-        """Count a frame with the right checksum."""
+    def count(self, source: Address, sequences: bytes | bytearray) -> None:
+        """Count frames with the right checksum by their sequence numbers."""
         counter = self.sources.get(source)
         if counter is None:
             if len(self.sources) >= MAX_SOURCES:
-                self._frames_of_others += 1
+                self._frames_of_others += len(sequences)
                 return
             counter = self.sources[source] = SequenceCounter()
-        counter.add(sequence)
+        for sequence in sequences:
+            counter.add(sequence)
 
     def restart(self) -> None:
         """Forget the sequence numbers but not the counts: the link was interrupted."""

@@ -20,7 +20,7 @@ import random
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.frame import Decoder, FLAG_SIGNED, Frame, MAX_FRAME
+from illuminator_ros.mavlink.frame import Decoder, FLAG_SIGNED, ForeignFrames, Frame, MAX_FRAME
 from illuminator_ros.mavlink.messages import LAYOUTS
 from illuminator_ros.mavlink.signing import signature
 import pytest
@@ -230,3 +230,23 @@ def test_giving_up_leaves_nothing_and_counts_each_byte_once(stream: list[bytes])
     assert decoder.counters.frames == len(found)
     assert decoder.counters.skipped_bytes == len(data) - sum(
         len(bytes_of(frame)) for frame in found)
+
+
+@given(st.lists(st.one_of(noise, frames), max_size=10), st.lists(st.integers(1, 60), min_size=1))
+@PROPERTY
+def test_counting_foreign_frames_finds_the_same_frames_as_reading_them(
+    stream: list[bytes], sizes: list[int],
+) -> None:
+    foreign = {id_.to_bytes(3, 'little'): bytes((layout.crc_extra,))
+               for id_, layout in LAYOUTS.items() if id_ not in (0, 77)}
+    reading, counting = Decoder(), Decoder()
+    data, at = b''.join(stream), 0
+    for size in [*sizes, len(data)]:
+        piece, at = data[at:at + size], at + size
+        found: list[tuple[object, int]] = []
+        for one in counting.sort(piece, foreign):
+            numbers = one.sequences if isinstance(one, ForeignFrames) else (one.sequence,)
+            found += [(one.source, number) for number in numbers]
+        assert found == [(one.source, one.sequence) for one in reading.feed(piece)]
+    assert counting.counters.frames == reading.counters.frames
+    assert counting.counters.skipped_bytes == reading.counters.skipped_bytes

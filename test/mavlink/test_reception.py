@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.messages import Address, LAYOUTS
 from illuminator_ros.mavlink.receiver import MAX_DECODERS, Receiver, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
@@ -31,7 +31,7 @@ FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\
 @pytest.fixture
 def reception() -> Receiver:
     """Return the way in of a link without signing."""
-    return Receiver(Signing())
+    return Receiver(Signing(), LAYOUTS)
 
 
 def sources(frames: list) -> list[Address]:
@@ -133,7 +133,7 @@ def test_garbage_of_many_peers_does_not_cost_a_good_one_its_incomplete_frame(
 
 
 def test_what_is_not_to_be_believed_does_not_come_through() -> None:
-    reception = Receiver(Signing(SigningMode.REQUIRE, bytes(32)))
+    reception = Receiver(Signing(SigningMode.REQUIRE, bytes(32)), LAYOUTS)
     assert reception.take('a', heartbeat_frame(), 0.0, UNIX) == []
     reception.take('a', FALSE_STARTS[0] + heartbeat_frame(), 0.0, UNIX)
     assert reception.give_up(STALL, UNIX) == []

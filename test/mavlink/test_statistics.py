@@ -217,15 +217,15 @@ def test_rates_of_a_link_are_bytes_per_second() -> None:
     traffic.bytes_received, traffic.bytes_sent = 5000, 200
     snapshot = traffic.snapshot(2.0)
     assert (snapshot.received_rate, snapshot.sent_rate) == (2500.0, 100.0)
-    traffic.count(LIGHT, 0)
+    traffic.count(LIGHT, bytes((0,)))
     assert snapshot.sources == {}
 
 
 def test_each_source_has_its_own_sequence() -> None:
     traffic = Traffic()
     for number in range(10):
-        traffic.count(LIGHT, number)
-        traffic.count(Address(1, 1), 3 * number)
+        traffic.count(LIGHT, bytes((number,)))
+        traffic.count(Address(1, 1), bytes((3 * number,)))
     assert counts(traffic.sources[LIGHT]) == (10, 0, 0, 0)
     assert counts(traffic.sources[Address(1, 1)]) == (10, 18, 0, 0)
     assert traffic.frames_received == 20
@@ -233,10 +233,10 @@ def test_each_source_has_its_own_sequence() -> None:
 
 def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
     traffic = Traffic()
-    traffic.count(LIGHT, 0)
+    traffic.count(LIGHT, bytes((0,)))
     for number in range(2 * MAX_SOURCES):
-        traffic.count(Address(2 + number // 256, number % 256), 0)
-    traffic.count(LIGHT, 1)
+        traffic.count(Address(2 + number // 256, number % 256), bytes((0,)))
+    traffic.count(LIGHT, bytes((1,)))
     assert len(traffic.sources) == MAX_SOURCES
     assert traffic.frames_received == 2 * MAX_SOURCES + 2
     assert traffic.sources[LIGHT].received == 2
@@ -244,9 +244,9 @@ def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
 
 def test_interruption_of_the_link_is_no_loss() -> None:
     traffic = Traffic()
-    traffic.count(LIGHT, 10)
-    traffic.count(LIGHT, 13)
+    traffic.count(LIGHT, bytes((10,)))
+    traffic.count(LIGHT, bytes((13,)))
     traffic.restart()
-    traffic.count(LIGHT, 90)
-    traffic.count(LIGHT, 92)
+    traffic.count(LIGHT, bytes((90,)))
+    traffic.count(LIGHT, bytes((92,)))
     assert counts(traffic.sources[LIGHT]) == (4, 3, 0, 0)
