@@ -163,7 +163,7 @@ class ConfigurationManager:
     @property
     def is_confirming(self) -> bool:
         """Whether a request waits for a status."""
-        return self._queue.current is not None and self._queue.current.is_confirming
+        return self._queue.is_confirming
 
     @property
     def sent_at(self) -> float:
@@ -341,7 +341,7 @@ class ConfigurationManager:
 
     def lost(self, message: str, now: float) -> None:
         """Note that the light is lost; a setpoint must not take effect when it is heard again."""
-        self._queue.cancel_waiting(message, now)
+        self._queue.cancel(message, now, only_waiting=True)
         if self._setpoint is not None:
             self._setpoint = None
             self._setpoint_failed(message)

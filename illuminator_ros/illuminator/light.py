@@ -196,9 +196,8 @@ class Light:
         event = StatusReceived(
             self.address, status, now, self.temperature, report.shared_address)
         # A request that waits for the status is answered before the status is published.
-        current = self._switching.current
-        is_awaited = (self._configuration.is_confirming or bool(self._refreshes)
-                      or current is not None and current.is_confirming)
+        is_awaited = (self._switching.is_confirming or self._configuration.is_confirming
+                      or bool(self._refreshes))
         if not is_awaited:
             self._emit(event)
         self._take_report(report, now, restarted=restarted)
@@ -206,19 +205,17 @@ class Light:
             self._emit(event)
 
     def _take_report(self, report: Report[Status], now: float, *, restarted: bool) -> None:
-        enabled = report.status.enabled
+        before, self._enabled = self._enabled, report.status.enabled
         # Several lights at one address seem to switch again and again.
-        if enabled and not self._enabled and (
+        if self._enabled and not before and (
                 not report.shared_address or self._requested_at == -math.inf):
             self._requested_at = now
-        if self._switching.current:
-            self._enabled = enabled
-            self._switching.take(report, now)
-        else:
-            if self._automatic and enabled is self._automatic.on:
+        if not self._switching:
+            if self._automatic and self._enabled is self._automatic.on:
                 self._automatic = None
-            self._switching.take(report, now)
-            self._follow_switch(report, now, restarted=restarted)
+            if not restarted:
+                self._follow_switch(before, report, now)
+        self._switching.take(report, now)
         self._configuration.take(
             report, now, can_follow=self._tracker.conflict.can_follow,
             switched_at=self._last_switch[1])
@@ -226,11 +223,10 @@ class Light:
             refresh.status = ''
         self._check_refreshes(now)
 
-    def _follow_switch(self, report: Report[Status], now: float, *, restarted: bool) -> None:
+    def _follow_switch(self, before: bool | None, report: Report[Status], now: float) -> None:
         """Report that the light was switched without a request under way."""
         status = report.status
-        before, self._enabled = self._enabled, status.enabled
-        if (before is None or status.enabled is None or before == status.enabled or restarted
+        if (before is None or status.enabled is None or before == status.enabled
                 or report.shared_address or status.error_flags & DIMMING_FLAGS
                 or status.mode is Mode.EXTERNAL_SYNC):
             return
@@ -274,7 +270,7 @@ class Light:
             self._tracker.lost()
             self._emit(LightLost(self.address, reason))
             message = self.unreachable(now)
-            self._switching.cancel_waiting(message, now)
+            self._switching.cancel(message, now, only_waiting=True)
             self._configuration.lost(message, now)
 
     def link_opened(self, now: float) -> None:
@@ -340,6 +336,15 @@ class Light:
 
     # Requests
 
+    def _can_reach(self, now: float, done: Done, *, is_command: bool = True) -> bool:
+        """Return whether the light is heard; if not, fail a request with the reason."""
+        if is_command:
+            self.was_commanded = True
+            self._requested_at = now
+        if reason := self.unreachable(now):
+            done(Result(False, reason), now)
+        return not reason
+
     def enable(self, on: bool, now: float, done: Done, *, detail: str = '') -> None:
         """
         Switch the light on or off; ``done`` is called once with the result.
@@ -348,17 +353,10 @@ class Light:
 
         :param detail: how it was asked for, which :class:`LightSwitched` repeats.
         """
-        self.note_request(now)
-        if unreachable := self.unreachable(now):
-            done(Result(False, unreachable), now)
+        if not self._can_reach(now, done):
             return
         self._automatic = None
         self._switch(on, now, done, detail)
-
-    def note_request(self, now: float) -> None:
-        """Note that a user has commanded the light."""
-        self.was_commanded = True
-        self._requested_at = now
 
     def _switch(self, on: bool, now: float, done: Done, detail: str) -> None:
         change = Switch(on, self.instance)
@@ -390,10 +388,7 @@ class Light:
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
-        self.note_request(now)
-        if unreachable := self.unreachable(now):
-            done(Result(False, unreachable), now)
-        else:
+        if self._can_reach(now, done):
             self._configuration.configure(changes, now, done)
             self._changed(self, now)
 
@@ -403,11 +398,10 @@ class Light:
 
         :param brightness: %, checked.
         """
-        self.note_request(now)
-        if unreachable := self.unreachable(now):
-            self._configuration.lost(unreachable, now)
-            self._emit(SetpointFailed(self.address, unreachable))
-        else:
+        def failed(result: Result, now: float) -> None:
+            self._emit(SetpointFailed(self.address, result.message))
+
+        if self._can_reach(now, failed):
             self._configuration.set_brightness(brightness, now)
             self._changed(self, now)
 
@@ -430,8 +424,7 @@ class Light:
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
-        if unreachable := self.unreachable(now):
-            done(Result(False, unreachable), now)
+        if not self._can_reach(now, done, is_command=False):
             return
         refresh = _Refresh(done, now)
         self._refreshes.append(refresh)

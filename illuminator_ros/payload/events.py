@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import logging
 import math
 from typing import Generic, TypeVar
 
 E = TypeVar('E')
+
+_log = logging.getLogger(__name__)
 
 
 class Listeners(Generic[E]):
@@ -34,9 +37,12 @@ class Listeners(Generic[E]):
         self._listeners.append(listener)
 
     def emit(self, event: E) -> None:
-        """Give an event to each listener."""
+        """Give an event to each listener, whether or not others raise an exception."""
         for listener in self._listeners:
-            listener(event)
+            try:
+                listener(event)
+            except Exception:
+                _log.exception('A listener failed on %s; the others were called', event)
 
 
 class RepeatLimit:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 import math
 from typing import Generic, Protocol, TypeVar
@@ -89,9 +89,7 @@ class Target:
         self._commands.start(
             Command(self.address, command, params), now, ended, limit=limit, overtake=overtake)
 
-    def request_message(
-        self, message_id: int, now: float, done: CommandDone = lambda result, now: None,
-    ) -> None:
+    def request_message(self, message_id: int, now: float, done: CommandDone) -> None:
         """Request one message."""
         self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done)
 
@@ -239,25 +237,22 @@ class Request(Generic[S]):
         self.phase = Phase.WAITING
         self.limit = limit
         self.is_stream = is_stream
+        self.overtakes = overtakes
         self.change: Change[S] | None = None
         self._target = target
         self._prepare = prepare
         self._done = done
-        self.overtakes = overtakes
         self._submitted = now
         self._sent_at = math.inf
-        self._params: tuple[float, ...] = ()
         # Times that it is sent again since acknowledgements of earlier commands may come.
         self._repeats: int | None = None
         self._was_repeated = False
         self._outcome: CommandResult | None = None
         self._before: S | None = None
         self._has_status = False
-        self._acknowledged_at = math.inf
-        self._confirm_until = math.inf
-        self._ask_at = math.inf
-        self._contradiction: S | None = None
-        self._is_shared = False
+        self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
+        # How a status contradicts, and whether one was too old to tell.
+        self._contradiction = ''
         self._is_outdated = False
         self._shown_by: set[int] = set()
         self._shown_since = math.inf
@@ -272,6 +267,21 @@ class Request(Generic[S]):
         """Whether the device has acknowledged, and the status is awaited."""
         return self.phase is Phase.CONFIRMING
 
+    @property
+    def is_accepted(self) -> bool:
+        """Whether the device has accepted, and the status is awaited."""
+        return self.is_confirming and self._answer.accepted
+
+    @property
+    def _sent(self) -> Change[S]:
+        assert self.change is not None
+        return self.change
+
+    @property
+    def _answer(self) -> CommandResult:
+        assert self._outcome is not None
+        return self._outcome
+
     def _step(self, step: Step) -> None:
         self.phase = TRANSITIONS[self.phase, step]
 
@@ -284,35 +294,33 @@ class Request(Generic[S]):
         self._before = status
         self._has_status = status is not None
         self.change = self._prepare(now)
-        self._step(Step.SEND)
-        self._sent_at = now
-        self._send(now)
+        self._send(Step.SEND, now)
 
-    def _send(self, now: float) -> None:
-        assert self.change is not None
-        self._params = self.change.params
+    def _send(self, step: Step, now: float) -> None:
+        self._step(step)
+        # A status from between two repeats may show what an earlier command still undoes.
+        self._sent_at = now
         self._target.send(
-            self.change.command, self._params, now, self._answered, limit=self.limit,
+            self._sent.command, self._sent.params, now, self._answered, limit=self.limit,
             overtake=self.overtakes)
 
     def _answered(self, outcome: CommandResult, now: float) -> None:
         if self.is_finished:
             return
+        self._outcome = outcome
         if outcome.status is CommandStatus.CANCELLED:
             self.fail(OVERTAKEN, now)
         elif outcome.accepted and self._must_repeat(outcome, now):
-            self._step(Step.SEND_AGAIN)
-            self._send(now)
+            self._send(Step.SEND_AGAIN, now)
         elif outcome.accepted or outcome.may_answer_earlier(now, ACK_REACH):
             self._step(Step.ACKNOWLEDGED)
-            self._outcome = outcome
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
             # On the next poll, not immediately: many devices send a status after the
             # acknowledgement by themselves.
             self._ask_at = now
         else:
-            self._refused(outcome, now)
+            self._refused(now)
 
     def _must_repeat(self, outcome: CommandResult, now: float) -> bool:
         """
@@ -325,25 +333,12 @@ class Request(Generic[S]):
             earlier = outcome.earlier
             self._repeats = 0
             if (earlier is not None and earlier.result is None
-                    and earlier.command.params != self._params
+                    and earlier.command.params != self._sent.params
                     and outcome.may_answer_earlier(now, ACK_REACH)):
                 self._repeats = earlier.tries
         self._repeats -= 1
         self._was_repeated |= self._repeats >= 0
         return self._repeats >= 0
-
-    def _refused(self, outcome: CommandResult, now: float) -> None:
-        if self._was_repeated and outcome.result is None:
-            assert self.change is not None
-            self._finish(Result(
-                False, f'{self.change.goal} not confirmed: the acknowledgement may be that of an '
-                f'earlier command ({outcome.timing(now - self._submitted)})'), now)
-            return
-        answered = outcome.status is CommandStatus.ANSWERED
-        self._finish(Result(
-            False, f'{"refused: " if answered else ""}{outcome.describe()} '
-            f'({outcome.timing(now - self._submitted)})',
-            answered and outcome.result in PERMANENT_RESULTS), now)
 
     def take(self, report: Report[S], now: float) -> None:
         """
@@ -355,11 +350,10 @@ class Request(Generic[S]):
         self._has_status = True
         if not self.is_confirming:
             return
-        assert self.change is not None
         delay = 0.0 if report.has_clock else self._target.status_delay
-        self._is_shared = report.shared_address
-        shown = self.change.shown_by(report.status)
-        if shown and self._before is not None and not self.change.shown_by(self._before):
+        shown = self._sent.shown_by(report.status)
+        if (shown and not self._was_repeated and self._before is not None
+                and not self._sent.shown_by(self._before)):
             self._target.note_status_delay(now - self._sent_at)
             self._before = None
         wait = max(delay + ASK_INTERVAL, 2 * report.span)
@@ -368,7 +362,10 @@ class Request(Generic[S]):
         if report.sent_by - delay < self._sent_at:
             self._is_outdated = True
         elif not shown:
-            self._contradiction = report.status
+            self._contradiction = f'shows {self._sent.actual(report.status)}'
+            if report.shared_address:
+                self._contradiction += (f', several {self._target.kind}s '
+                                        f'answer as {self._target.address}')
             self._shown_by.clear()
             self._shown_since = math.inf
             if not self.is_accepted and now >= self._acknowledged_at + ASK_INTERVAL:
@@ -378,25 +375,13 @@ class Request(Generic[S]):
             self._shown_by.add(report.sender)
             self._shown_since = min(self._shown_since, now)
             if report.senders <= self._shown_by and now >= self._shown_since + report.span:
-                self._finish(
-                    self._success(self.change.evidence(report.status), now), now, report.status)
-
-    @property
-    def is_accepted(self) -> bool:
-        """Whether the device has accepted, and the status is awaited."""
-        return self.is_confirming and self._outcome is not None and self._outcome.accepted
-
-    def supersede(self, now: float) -> None:
-        """End an accepted change without its confirmation: a newer one replaces it."""
-        self._finish(replace(self._success('accepted, superseded', now), superseded=True), now)
+                self._succeed(self._sent.evidence(report.status), now, report.status)
 
     def poll(self, now: float) -> None:
         """Request the status, or end."""
-        if not self.is_confirming:
-            return
-        if now >= self._confirm_until:
+        if self.is_confirming and now >= self._confirm_until:
             self._unconfirmed(now)
-        elif now >= self._ask_at:
+        elif self.is_confirming and now >= self._ask_at:
             self._ask_at = now + ASK_INTERVAL
             self._target.request_status(now)
 
@@ -404,45 +389,58 @@ class Request(Generic[S]):
         """Return when :meth:`poll` has something to do."""
         return min(self._confirm_until, self._ask_at) if self.is_confirming else math.inf
 
-    def _unconfirmed(self, now: float) -> None:
-        assert self.change is not None and self._outcome is not None
-        name, address, kind = (
-            self._target.status_name, self._target.address, self._target.kind)
-        if not self.is_accepted:
-            self._refused(self._outcome, now)
-        elif self._contradiction is not None:
-            several = f', several {kind}s answer as {address}' if self._is_shared else ''
-            self._failure(f'but {name} shows {self.change.actual(self._contradiction)}{several}',
-                          now, contradicted=True)
-        elif self._shown_by:
-            self._failure(
-                f'but not each of several {kind}s that answer as {address} has sent {name}', now)
-        elif self._has_status:
-            later = 'later ' if self._is_outdated else ''
-            waited = format_seconds(now - self._acknowledged_at)
-            self._failure(f'but no {later}{name} came within {waited}', now)
-        else:
-            self._finish(self._success(
-                f'accepted, not confirmed (the {kind} sends no {name})', now), now)
+    # The end
 
-    def _success(self, how: str, now: float) -> Result:
-        assert self.change is not None and self._outcome is not None
-        timing = self._outcome.timing(now - self._submitted)
-        return Result(
-            True, f'{self.change.goal}, {how}: {self._outcome.describe()} ({timing})',
-            note=self.change.note)
-
-    def _failure(self, reason: str, now: float, *, contradicted: bool = False) -> None:
-        assert self.change is not None and self._outcome is not None
-        timing = self._outcome.timing(now - self._submitted)
-        self._finish(Result(
-            False, f'{self.change.goal} not confirmed: {self._outcome.describe()}, {reason} '
-            f'({timing})', contradicted=contradicted), now)
+    def supersede(self, now: float) -> None:
+        """End an accepted change without its confirmation: a newer one replaces it."""
+        self._succeed('accepted, superseded', now, superseded=True)
 
     def fail(self, message: str, now: float) -> None:
         """End without a success, if it has not ended."""
         if not self.is_finished:
             self._finish(Result(False, message), now)
+
+    def _refused(self, now: float) -> None:
+        answer = self._answer
+        answered = answer.status is CommandStatus.ANSWERED
+        if self._was_repeated and answer.result is None:
+            self._end(f'{self._sent.goal} not confirmed: the acknowledgement may be that of an '
+                      'earlier command', now)
+        else:
+            self._end(f'{"refused: " if answered else ""}{answer.describe()}', now,
+                      permanent=answered and answer.result in PERMANENT_RESULTS)
+
+    def _unconfirmed(self, now: float) -> None:
+        name, kind = self._target.status_name, self._target.kind
+        if not self.is_accepted:
+            self._refused(now)
+            return
+        if self._contradiction:
+            reason = f'{name} {self._contradiction}'
+        elif self._shown_by:
+            reason = (f'not each of several {kind}s that answer as {self._target.address} has '
+                      f'sent {name}')
+        elif self._has_status:
+            reason = (f'no {"later " if self._is_outdated else ""}{name} came within '
+                      f'{format_seconds(now - self._acknowledged_at)}')
+        else:
+            self._succeed(f'accepted, not confirmed (the {kind} sends no {name})', now)
+            return
+        self._end(f'{self._sent.goal} not confirmed: {self._answer.describe()}, but {reason}', now,
+                  contradicted=bool(self._contradiction))
+
+    def _succeed(
+        self, how: str, now: float, status: S | None = None, *, superseded: bool = False,
+    ) -> None:
+        self._end(f'{self._sent.goal}, {how}: {self._answer.describe()}', now, status,
+                  success=True, superseded=superseded, note=self._sent.note)
+
+    def _end(
+        self, text: str, now: float, status: S | None = None, *, success: bool = False,
+        note: str = '', **flags: bool,
+    ) -> None:
+        timing = self._answer.timing(now - self._submitted)
+        self._finish(Result(success, f'{text} ({timing})', note=note, **flags), now, status)
 
     def _finish(self, result: Result, now: float, status: S | None = None) -> None:
         self._step(Step.FINISH)
@@ -450,7 +448,11 @@ class Request(Generic[S]):
 
 
 class RequestQueue(Generic[S]):
-    """The requests of one kind to one device, in the order in which they were made."""
+    """
+    The requests of one kind to one device, in the order in which they were made.
+
+    Each may wait for the same time, so that the first one that waits is the first to give up.
+    """
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -461,6 +463,11 @@ class RequestQueue(Generic[S]):
     def current(self) -> Request[S] | None:
         """Return the request that is on its way."""
         return self._requests[0] if self._requests else None
+
+    @property
+    def is_confirming(self) -> bool:
+        """Whether a request waits for a status."""
+        return bool(self._requests) and self._requests[0].is_confirming
 
     def __len__(self) -> int:
         """Return how many requests are on their way or wait."""
@@ -474,7 +481,6 @@ class RequestQueue(Generic[S]):
             return
         self._requests.append(request)
         if len(self._requests) == 1:
-            request.start(self._status, now)
             self.poll(now)
 
     def overtake(self, request: Request[S], now: float) -> None:
@@ -485,17 +491,11 @@ class RequestQueue(Generic[S]):
         for one in overtaken:
             one.fail(OVERTAKEN, now)
 
-    def cancel(self, message: str, now: float) -> None:
-        """End all requests, whether on their way or waiting."""
-        ended, self._requests = self._requests, deque()
+    def cancel(self, message: str, now: float, *, only_waiting: bool = False) -> None:
+        """End all requests, or only those that wait."""
+        kept = [self._requests.popleft()] if only_waiting and self._requests else []
+        ended, self._requests = self._requests, deque(kept)
         for request in ended:
-            request.fail(message, now)
-
-    def cancel_waiting(self, message: str, now: float) -> None:
-        """End the requests that wait."""
-        waiting = list(self._requests)[1:]
-        self._requests = deque(list(self._requests)[:1])
-        for request in waiting:
             request.fail(message, now)
 
     def take(self, report: Report[S], now: float) -> None:
@@ -506,23 +506,26 @@ class RequestQueue(Generic[S]):
 
     def poll(self, now: float) -> None:
         """Do what is due, and start the request that has waited."""
-        if not self._requests:
-            return
-        for waiting in list(self._requests)[1:]:
-            if now >= waiting.limit:
-                waiting.fail('not sent: earlier requests took too long', now)
-        self._requests[0].poll(now)
-        while self._requests and self._requests[0].is_finished:
-            while self._requests and self._requests[0].is_finished:
+        while len(self._requests) > 1 and now >= self._requests[1].limit:
+            late = self._requests[1]
+            del self._requests[1]
+            late.fail('not sent: earlier requests took too long', now)
+        if self._requests:
+            self._requests[0].poll(now)
+        while self._requests:
+            first = self._requests[0]
+            if first.is_finished:
                 self._requests.popleft()
-            if self._requests:
-                self._requests[0].start(self._status, now)
+            elif first.phase is Phase.WAITING:
+                first.start(self._status, now)
+            else:
+                break
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
         if not self._requests:
             return math.inf
-        first, *waiting = self._requests
-        if first.is_finished:
+        if self._requests[0].is_finished:
             return -math.inf
-        return min([first.next_deadline(), *(request.limit for request in waiting)])
+        waiting = self._requests[1].limit if len(self._requests) > 1 else math.inf
+        return min(self._requests[0].next_deadline(), waiting)

@@ -47,12 +47,15 @@ LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperti
 LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **{kind: ((kind,), (kind,)) for kind in KINDS},
     'all of these': (KINDS, KINDS),
+    'drop, duplicate, reorder': (KINDS[:3], KINDS[:3]),
     'drop, to the lights': (('drop',), ()),
     'drop, from the lights': ((), ('drop',)),
     'delay, to the lights': (('delay',), ()),
     'delay, from the lights': ((), ('delay',)),
 }
-CELLS = [('drop', 0.0), *((line, share) for line in LINES for share in SHARES)]
+# Repeats of overtaken commands and late copies of acknowledgements meet here.
+CELLS = [('drop', 0.0), ('drop, duplicate, reorder', 0.3), *((line, share) for line in LINES for share in SHARES
+                             if ',' not in line or 'lights' in line)]
 
 
 class User:

@@ -153,6 +153,25 @@ def test_off_is_sent_until_an_acknowledgement_cannot_be_that_of_on(
     assert not answer.result.success
 
 
+def test_a_status_from_before_the_last_repeat_does_not_confirm(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    # The light does off and then, late, on: its status from in between comes after the repeat.
+    fake.results[ON_OFF] = None
+    assert not faked.enable(True).success
+    fake.stream, fake.applies = 0.0, False
+    fake.answers.clear()
+    answer = faked.ask_enable(False)
+    faked.run(0.3)
+    shows_off = fake.status(faked.now)
+    fake.fields['enable'] = 1
+    for _ in range(10):
+        fake.send(CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+        faked.run(0.05)
+    fake.send(shows_off)
+    assert not faked.wait_for(answer).success
+
+
 def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
     fake: FakeLight, faked: Pair,
 ) -> None:
@@ -270,6 +289,20 @@ def test_a_strobe_period_alone_also_sets_a_duty_cycle_that_is_0(
     assert faked.configure(strobe_duty_cycle=20.0).success
     assert not faked.configure(strobe_period=2.0).note
     assert fake.fields['strobe_duty_cycle'] == 20.0
+
+
+def test_a_listener_that_raises_does_not_stop_the_others(
+    faked: Pair, caplog: pytest.LogCaptureFixture,
+) -> None:
+    def fail(event: AnyLightEvent) -> None:
+        raise RuntimeError('as the test says')
+
+    faked.controller.events.subscribe(fail)
+    events = events_of(faked)
+    assert faked.enable(True).success
+    assert switches(events) == [(True, Origin.REQUEST, '')]
+    assert 'A listener failed on LightSwitched' in caplog.text
+    assert 'as the test says' in caplog.text
 
 
 def test_a_request_is_answered_before_its_status_is_published(faked: Pair) -> None:

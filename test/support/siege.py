@@ -21,6 +21,7 @@ import math
 import random
 from typing import Any
 
+from illuminator_ros.illuminator.events import AnyLightEvent
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated import describe, simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -124,8 +125,16 @@ class BridgeSiege(Siege):
     def make_endpoint(self) -> Any:
         self.results: list[list[Result]] = []
         client = Client(BRIDGE, Settings(status_interval=1.0))
-        client.events.subscribe(check_event)
+        self.wrong_events: list[str] = []
+        client.events.subscribe(self._check_event)
         return client
+
+    def _check_event(self, event: AnyLightEvent) -> None:
+        # The client goes on after a listener that raises.
+        try:
+            check_event(event)
+        except AssertionError as error:
+            self.wrong_events.append(str(error))
 
     @property
     def controller(self) -> Client:
@@ -182,6 +191,7 @@ class BridgeSiege(Siege):
 
     def check_bounds(self) -> None:
         super().check_bounds()
+        assert not self.wrong_events, self.wrong_events[0]
         controller, sender = self.controller, self.controller.sender
         lights = controller.lights.values()
         for what, size, bound in (

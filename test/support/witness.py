@@ -29,7 +29,6 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
-    CommandLong,
     Heartbeat,
     MavCmd,
     MavResult,
@@ -107,6 +106,14 @@ class Request:
         return self.answer.result.message
 
 
+def asked_for(sent: Any) -> dict[str, Any]:
+    """Return the fields that a command sets, by the names of :class:`Witness`."""
+    if sent.command == ON_OFF:
+        return {'enabled': bool(sent.param1)}
+    return {'mode': Mode(int(sent.param1)), 'brightness': sent.param2,
+            'strobe_period': sent.param3, 'strobe_duty_cycle': sent.param4}
+
+
 class Judge:
     """Compares answers with what went over the line and what the lights did."""
 
@@ -132,28 +139,25 @@ class Judge:
 
     def _tries(self, request: Request) -> list[tuple[float, Any]]:
         """Return when the command was sent, and the messages; as often as the answer says."""
-        answer, tries = request.answer, []
-        for at, sent in self._pair.near.sent:
-            if not (isinstance(sent, CommandLong) and sent.command == request.kind
-                    and (sent.target_system, sent.target_component) == request.light.address):
-                continue
-            # A command sent at the very end is the next one.
-            if at > answer.ended_at or tries and at == answer.ended_at:
-                break
-            tries = [*tries, (at, sent)] if sent.confirmation else [(at, sent)]
+        groups: list[list[tuple[float, Any]]] = []
+        for at, sent in self._pair.commands_to(request.light.address, request.kind):
+            if at <= request.answer.ended_at:
+                groups = groups if sent.confirmation else [*groups, []]
+                groups[-1].append((at, sent))
         match = TRIES.search(request.message)
-        assert match is not None and len(tries) == int(match[1]), request
-        return tries
+        assert match is not None, request
+        # The failure of a setpoint may be that of one before it; and a command sent at the very
+        # end may be the next one, or the last repeat of this one.
+        return max((group for group in groups if len(group) == int(match[1])), key=lambda group: (
+            group[0][0] >= request.answer.asked_at
+            and request.wish.items() <= asked_for(group[0][1]).items(),
+            group[0][0] < request.answer.ended_at, group[0][0]))
 
-    def _states(self, request: Request) -> tuple[Fields, list[State]]:
-        """Return the sent values, and the states of the light since."""
+    def _states(self, request: Request, error: float = 0.0) -> tuple[Fields, list[State]]:
+        """Return the sent values, and the states of the light since, or by so much earlier."""
         (since, sent), *_ = self._tries(request)
-        wish = request.wish
-        if request.kind == CONFIGURE:
-            wish = {**wish, 'mode': Mode(int(sent.param1)), 'brightness': sent.param2,
-                    'strobe_period': sent.param3, 'strobe_duty_cycle': sent.param4}
-        assert all(wish[name] == value for name, value in request.wish.items()), request
-        return wish, self._witnesses[request.light.address].states(since, request.answer.ended_at)
+        witness = self._witnesses[request.light.address]
+        return asked_for(sent), witness.states(since - error, request.answer.ended_at)
 
     def _received(self, request: Request, kind: type, since: float) -> list[tuple[float, Any]]:
         return [(at, message) for at, source, message in self._pair.near.received
@@ -193,7 +197,7 @@ class Judge:
     def _not_shown(self, request: Request) -> str:
         if not self._accepted(request):
             return 'not accepted'
-        wish, states = self._states(request)
+        wish, states = self._states(request, UPTIME_ERROR)
         return 'as wished all the time' if all(s.matches(wish) for s in states) else ''
 
     def _no_status(self, request: Request) -> str:
