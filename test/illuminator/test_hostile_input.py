@@ -43,8 +43,7 @@ from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.payload.discovery import MAX_DEVICES
 from illuminator_ros.payload.request import MAX_WAITING, Result
 import pytest
-from support.frames import frame_of, raw_v2
-from support.heartbeats import heartbeat_frame
+from support.frames import frame_of, heartbeat_frame, raw_v2
 from support.siege import BRIDGE, BridgeSiege, GENUINE, LightSiege, Siege, SIEGES
 
 PEER = ('127.0.0.1', 40_000)

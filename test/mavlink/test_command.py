@@ -12,248 +12,473 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The command protocol: how often is sent, and how it ends."""
+"""The command protocol: how often a command is sent, which answer counts, and how it ends."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
+from typing import Any
 
-from illuminator_ros.mavlink.command import CommandStatus
-from illuminator_ros.mavlink.messages import CommandInt, CommandLong, MavResult
+from illuminator_ros.mavlink.command import (
+    Command,
+    CommandResult,
+    CommandSender,
+    CommandStatus,
+    format_seconds,
+    MAX_WAITING,
+    Position,
+    PROGRESS_TIMEOUT,
+)
+from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, MavResult
 import pytest
 from support.command_rig import (
     ACCEPTED,
+    DENIED,
     FAILED,
     IN_PROGRESS,
     LIGHT,
     LONG,
+    OURS,
     REJECTED,
     Rig,
 )
 
-ANSWERED, NO_ANSWER = CommandStatus.ANSWERED, CommandStatus.NO_ANSWER
-
-# QGroundControl's table of command tests: what each try is acknowledged with, the retries that
-# are allowed -> ending, result, frames sent. (What QGroundControl calls progress is in
-# test_command_progress.py.)
-QGROUNDCONTROL: dict[str, tuple[list[list[int]], int, CommandStatus, int | None, int]] = {
-    'always accepted': ([[ACCEPTED]], 3, ANSWERED, ACCEPTED, 1),
-    'always failed': ([[FAILED]], 3, ANSWERED, FAILED, 1),
-    'second attempt accepted': ([[], [ACCEPTED]], 3, ANSWERED, ACCEPTED, 2),
-    'second attempt failed': ([[], [FAILED]], 3, ANSWERED, FAILED, 2),
-    'no response': ([], 3, NO_ANSWER, None, 4),
-    'no response, no retry': ([], 0, NO_ANSWER, None, 1),
-    'in progress, accepted': ([[IN_PROGRESS, ACCEPTED]], 3, ANSWERED, ACCEPTED, 1),
-    'in progress, failed': ([[IN_PROGRESS, FAILED]], 3, ANSWERED, FAILED, 1),
-    'in progress, no ack': ([[IN_PROGRESS]], 3, CommandStatus.PROGRESS_STOPPED, IN_PROGRESS, 1),
-}
+OTHER = Address(1, 244)
+INT_ONLY, LONG_ONLY = MavResult.COMMAND_INT_ONLY, MavResult.COMMAND_LONG_ONLY
+STATUS = CommandStatus
 
 
-@pytest.mark.parametrize(
-    ('answers', 'retries', 'ending', 'result', 'frames'), QGROUNDCONTROL.values(),
-    ids=QGROUNDCONTROL.keys())
-def test_ends_as_in_qgroundcontrols_table(
-        answers: Sequence[Sequence[int]], retries: int, ending: CommandStatus, result: int | None,
-        frames: int) -> None:
-    rig = Rig(*answers, retries=retries)
-    run = rig.ended()
-    assert (run.status, run.result) == (ending, result)
-    assert run.outcome.tries == len(rig.frames) == frames
-    assert rig.idle
+# The answers to each try, 20 ms apart; retries and the limit -> the result as text, and when the
+# tries were sent, s. The first nine are QGroundControl's own test cases.
+@pytest.mark.parametrize(('answers', 'options', 'said', 'times'), [
+    ([[ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (1 try, 20 ms)', [0.0]),
+    ([[FAILED]], {}, 'MAV_RESULT_FAILED (1 try, 20 ms)', [0.0]),
+    ([[], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (2 tries, 520 ms)', [0.0, 0.5]),
+    ([[], [FAILED]], {}, 'MAV_RESULT_FAILED (2 tries, 520 ms)', [0.0, 0.5]),
+    ([], {}, 'no acknowledgement (4 tries, 2.00 s)', [0.0, 0.5, 1.0, 1.5]),
+    ([], {'retries': 0}, 'no acknowledgement (1 try, 500 ms)', [0.0]),
+    ([[IN_PROGRESS, ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (1 try, 40 ms)', [0.0]),
+    ([[IN_PROGRESS, FAILED]], {}, 'MAV_RESULT_FAILED (1 try, 40 ms)', [0.0]),
+    ([[IN_PROGRESS]], {}, 'no final acknowledgement, last answer MAV_RESULT_IN_PROGRESS at 0 % '
+     '(1 try, 3.02 s)', [0.0]),
+    ([[77]], {}, 'MAV_RESULT 77 (unknown) (1 try, 20 ms)', [0.0]),
+    # Progress ends the resending.
+    ([[], [IN_PROGRESS]], {}, 'no final acknowledgement, last answer MAV_RESULT_IN_PROGRESS at '
+     '0 % (2 tries, 3.52 s)', [0.0, 0.5]),
+    ([[REJECTED, IN_PROGRESS]], {}, 'no final acknowledgement, last answer '
+     'MAV_RESULT_IN_PROGRESS at 0 % (1 try, 3.04 s)', [0.0]),
+    ([[IN_PROGRESS, REJECTED, ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (1 try, 60 ms)', [0.0]),
+    # A temporary rejection is tried again with growing pauses, and is not one of the retries.
+    ([[REJECTED], [REJECTED], [REJECTED], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (4 tries, '
+     '780 ms)', [0.0, 0.12, 0.34, 0.76]),
+    ([[REJECTED] * 3, [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (2 tries, 140 ms)', [0.0, 0.12]),
+    ([[REJECTED]] * 100, {}, 'MAV_RESULT_TEMPORARILY_REJECTED (5 tries, 1.60 s)',
+     [0.0, 0.12, 0.34, 0.76, 1.58]),
+    ([[REJECTED], [REJECTED]], {'retries': 1}, 'no acknowledgement, last answer '
+     'MAV_RESULT_TEMPORARILY_REJECTED (4 tries, 1.34 s)', [0.0, 0.12, 0.34, 0.84]),
+    # The try without an answer may keep the target busy, and succeed.
+    ([[], *[[REJECTED]] * 100], {}, 'not finished in time, last answer '
+     'MAV_RESULT_TEMPORARILY_REJECTED (5 tries, 1.28 s)', [0.0, 0.5, 0.62, 0.84, 1.26]),
+    # COMMAND_INT is sent once it was asked for, and only then.
+    ([[INT_ONLY], [], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (3 tries, 540 ms)',
+     [0.0, 0.02, 0.52]),
+    ([[INT_ONLY], [LONG_ONLY]], {}, 'MAV_RESULT_COMMAND_LONG_ONLY (2 tries, 40 ms)',
+     [0.0, 0.02]),
+    ([[INT_ONLY]] * 20, {}, 'no acknowledgement, last answer MAV_RESULT_COMMAND_INT_ONLY '
+     '(5 tries, 2.02 s)', [0.0, 0.02, 0.52, 1.02, 1.52]),
+    ([[IN_PROGRESS, INT_ONLY]], {}, 'MAV_RESULT_COMMAND_INT_ONLY (1 try, 40 ms)', [0.0]),
+    # The limit ends a command in any state.
+    ([], {'limit': 0.9}, 'no acknowledgement (2 tries, 900 ms)', [0.0, 0.5]),
+    ([], {'limit': 0.0}, 'not finished in time (0 tries, 0 ms)', []),
+    ([[IN_PROGRESS] * 250], {'limit': 1.5}, 'not finished in time, last answer '
+     'MAV_RESULT_IN_PROGRESS at 0 % (1 try, 1.50 s)', [0.0]),
+    ([[REJECTED]] * 100, {'limit': 0.3}, 'MAV_RESULT_TEMPORARILY_REJECTED (2 tries, 140 ms)',
+     [0.0, 0.12])])
+def test_command_ends_as_its_answers_say(
+        answers: Sequence[Sequence[int]], options: dict[str, Any], said: str,
+        times: list[float]) -> None:
+    rig = Rig(*answers, retries=options.get('retries', 3))
+    run = rig.ended(limit=options.get('limit', math.inf))
+    assert (str(run.outcome), rig.times, rig.idle) == (said, times, True)
+    assert run.outcome.accepted == said.startswith('MAV_RESULT_ACCEPTED')
 
 
-# Every answer and none
-
-def test_every_result_and_silence_end_in_exactly_one_outcome() -> None:
-    for answers in ([], *([[result]] * 40 for result in range(256))):
-        rig = Rig(*answers)
-        assert len(rig.ended().outcomes) == 1, answers[:1]
-        assert rig.idle
+def test_every_other_result_ends_a_command_at_its_first_try_and_in_progress() -> None:
+    for result in set(range(256)) - {REJECTED, IN_PROGRESS, INT_ONLY}:
+        for answers in ([result], [IN_PROGRESS, result]):
+            run = Rig(answers).ended()
+            assert (run.status, run.result, run.outcome.tries) == (STATUS.ANSWERED, result, 1)
 
 
-@pytest.mark.parametrize('result', [
-    result for result in range(256)
-    if result not in (MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS,
-                      MavResult.COMMAND_INT_ONLY)])
-def test_result_ends_the_command_at_its_first_try(result: int) -> None:
-    rig = Rig([result])
-    run = rig.ended()
-    assert (run.status, run.result, run.outcome.tries) == (ANSWERED, result, 1)
-    assert run.outcome.accepted == (result == ACCEPTED)
+def test_command_int_carries_the_params_of_the_command_long() -> None:
+    rig = Rig([INT_ONLY], [], [ACCEPTED])
+    rig.ended(406, params=(1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0))
+    as_int = CommandInt(*LIGHT, 0, 406, 0, 0, 1.0, 50.0, 0.5, 25.0, 5, 6, 7.0)
+    assert rig.messages == [
+        CommandLong(*LIGHT, 406, 0, 1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0), as_int, as_int]
 
 
-def test_target_that_wants_command_int_gets_it_once() -> None:
-    rig = Rig([MavResult.COMMAND_INT_ONLY], [ACCEPTED])
-    run = rig.ended(406, params=(1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0))
-    assert run.outcome.accepted
-    long, as_int = rig.messages
-    assert isinstance(long, CommandLong)
-    assert isinstance(as_int, CommandInt)
-    assert (as_int.param1, as_int.param2, as_int.param3, as_int.param4, as_int.x, as_int.y,
-            as_int.z) == (1.0, 50.0, 0.5, 25.0, 5, 6, 7.0)
-    assert (as_int.target_system, as_int.target_component, as_int.command) == (*LIGHT, 406)
-
-
-def test_command_int_is_resent_as_such() -> None:
-    rig = Rig([MavResult.COMMAND_INT_ONLY], [], [ACCEPTED])
-    assert rig.ended().outcome.accepted
-    assert [type(message) for message in rig.messages] == [CommandLong, CommandInt, CommandInt]
-
-
-def test_second_refusal_of_command_long_does_not_end_the_command_int() -> None:
-    # Two tries went out before the first was refused, so the refusal comes twice.
+def test_second_refusal_of_the_command_long_does_not_end_the_command_int() -> None:
+    # Two tries were sent before the first was refused, so the refusal comes twice.
     rig = Rig()
     run = rig.start()
     rig.run(0.6)
-    assert len(rig.frames) == 2
-    rig.ack(MavResult.COMMAND_INT_ONLY)
-    rig.ack(MavResult.COMMAND_INT_ONLY)
-    assert run.outcomes == []
-    rig.ack(ACCEPTED)
+    for result in (INT_ONLY, INT_ONLY, ACCEPTED):
+        assert run.outcomes == []
+        rig.ack(result)
     assert run.outcome.accepted
     assert [type(message) for message in rig.messages] == [CommandLong, CommandLong, CommandInt]
 
 
-def test_target_that_wants_now_the_one_and_now_the_other_form_is_believed_once() -> None:
-    rig = Rig([MavResult.COMMAND_INT_ONLY], [MavResult.COMMAND_LONG_ONLY])
-    run = rig.ended()
-    assert (run.status, run.result) == (ANSWERED, MavResult.COMMAND_LONG_ONLY)
-    assert len(rig.frames) == 2
-
-
-def test_target_that_refuses_both_forms_the_same_way_is_given_up() -> None:
-    rig = Rig(*[[MavResult.COMMAND_INT_ONLY]] * 20)
-    assert rig.ended().status is NO_ANSWER
-
-
-# Sent messages
-
-def test_params_that_are_not_given_are_zero() -> None:
-    rig = Rig()
-    rig.start(405, params=(1.0,))
-    (message,) = rig.messages
-    assert [getattr(message, f'param{number}') for number in range(1, 8)] == [1.0, *[0.0] * 6]
-    assert (message.target_system, message.target_component, message.command) == (*LIGHT, 405)
-
-
-def test_confirmation_counts_the_resends() -> None:
-    rig = Rig(retries=4)
-    rig.ended()
-    assert [message.confirmation for message in rig.messages] == [0, 1, 2, 3, 4]
-
-
-def test_confirmation_stays_within_its_field() -> None:
-    rig = Rig(timeout=0.1, retries=300)
-    rig.ended()
-    assert len(rig.frames) == 301
-    assert [message.confirmation for message in rig.messages][254:] == [254, *[255] * 46]
-
-
-def test_is_resent_each_time_the_timeout_is_over() -> None:
-    rig = Rig(timeout=0.5)
-    run = rig.ended()
-    assert rig.times == [0.0, 0.5, 1.0, 1.5]
-    assert run.outcome.elapsed == pytest.approx(2.0)
-
-
-def test_poll_before_it_is_due_sends_nothing() -> None:
-    rig = Rig()
-    rig.start()
-    for _ in range(100):
-        rig.sender.poll(rig.now + 0.499)
-    assert len(rig.frames) == 1
-    assert rig.sender.next_deadline() == pytest.approx(rig.now + 0.5)
-
-
-# A target that is busy
-
-def test_temporary_rejection_is_tried_again_with_growing_pauses() -> None:
-    rig = Rig([REJECTED], [REJECTED], [REJECTED], [ACCEPTED])
-    run = rig.ended()
-    assert run.outcome.accepted
-    assert rig.times == [0.0, 0.12, 0.34, 0.76]
-
-
-def test_temporary_rejection_that_does_not_pass_is_the_answer_within_the_deadline() -> None:
-    rig = Rig(*[[REJECTED]] * 100)
-    run = rig.ended()
-    assert (run.status, run.result) == (ANSWERED, REJECTED)
-    assert run.outcome.elapsed < 4 * 0.5
-    assert len(rig.frames) >= 4
-
-
-def test_rejection_is_not_the_answer_where_an_earlier_try_got_none() -> None:
-    # That may be what keeps the target busy, and succeed.
-    rig = Rig([], *[[REJECTED]] * 100)
-    run = rig.ended()
-    assert (run.status, run.result) == (CommandStatus.OUT_OF_TIME, REJECTED)
-    assert str(run.outcome).startswith(
-        'not finished in time, last answer MAV_RESULT_TEMPORARILY_REJECTED (')
-
-
-def test_rejected_try_is_none_of_the_retries() -> None:
-    rig = Rig([REJECTED], [REJECTED], retries=1)
-    run = rig.ended()
-    assert (run.status, run.result) == (NO_ANSWER, REJECTED)
-    assert len(rig.frames) == 4
-
-
-def test_rejection_that_is_repeated_on_its_way_counts_once() -> None:
-    rig = Rig([REJECTED, REJECTED, REJECTED], [ACCEPTED])
-    assert rig.ended().outcome.accepted
-    assert rig.times == [0.0, 0.12]
-
-
-def test_rejection_is_not_retried_beyond_the_limit() -> None:
-    rig = Rig(*[[REJECTED]] * 100)
-    run = rig.ended(limit=0.3)
-    assert (run.status, run.result) == (ANSWERED, REJECTED)
-    assert run.outcome.elapsed < 0.3
-    assert rig.times == [0.0, 0.12]
-
-
-# The limit
-
-def test_limit_ends_what_got_no_answer() -> None:
-    rig = Rig()
-    run = rig.ended(limit=0.9)
-    assert (run.status, run.outcome.tries) == (NO_ANSWER, 2)
-    assert run.outcome.elapsed == pytest.approx(0.9)
-
-
-def test_limit_ends_what_is_in_progress() -> None:
-    rig = Rig([IN_PROGRESS] * 250)
-    run = rig.ended(limit=1.5)
-    assert (run.status, run.result) == (CommandStatus.OUT_OF_TIME, IN_PROGRESS)
-    assert run.outcome.elapsed == pytest.approx(1.5)
-
-
-def test_nothing_is_sent_after_the_limit() -> None:
-    rig = Rig()
-    run = rig.start(limit=0.0)
-    assert (run.status, rig.frames) == (CommandStatus.OUT_OF_TIME, [])
-
-
-@pytest.mark.parametrize('ended_by', ['acknowledgement', 'poll'])
-def test_command_whose_limit_passed_while_it_waited_is_never_sent(ended_by: str) -> None:
-    rig = Rig()
-    first, second = rig.start(), rig.start(limit=0.4)
-    rig.now += 0.45
-    if ended_by == 'acknowledgement':
-        rig.ack(ACCEPTED)
-    else:
-        rig.sender.poll(rig.now)
-    assert second.status is CommandStatus.OUT_OF_TIME
-    assert second.outcome.tries == 0
-    rig.run(LONG)
-    assert second.frames == []
-    assert len(first.outcomes) == len(second.outcomes) == 1
-
-
-def test_refusal_of_the_form_after_the_limit_sends_no_other() -> None:
+def test_refusal_of_the_command_long_after_the_limit_ends_the_command() -> None:
     rig = Rig()
     run = rig.start(limit=0.3)
     rig.now += 0.4
-    rig.ack(MavResult.COMMAND_INT_ONLY)
-    assert (run.status, run.result) == (ANSWERED, MavResult.COMMAND_INT_ONLY)
-    assert len(rig.frames) == 1
+    rig.ack(INT_ONLY)
+    assert (run.status, run.result, len(rig.frames)) == (STATUS.ANSWERED, INT_ONLY, 1)
+
+
+def test_confirmation_counts_the_resends_up_to_255() -> None:
+    rig = Rig(timeout=0.1, retries=300)
+    rig.ended()
+    assert [message.confirmation for message in rig.messages] == [*range(256), *[255] * 45]
+
+
+def test_poll_before_the_timeout_sends_nothing() -> None:
+    rig = Rig()
+    rig.start()
+    rig.sender.poll(rig.now + 0.499)
+    assert (len(rig.frames), rig.sender.next_deadline()) == (1, pytest.approx(rig.now + 0.5))
+
+
+# Acknowledgements
+
+@pytest.mark.parametrize(('changes', 'unexpected'), [
+    *(({'source': source}, 1) for source in (
+        Address(1, 1), Address(2, 243), OTHER, Address(0, 0), OURS)),
+    ({'command': 406}, 1),
+    # A ground station may command the same light.
+    *(({'target': target}, 0) for target in (
+        Address(255, 190), Address(1, 191), Address(2, 194), Address(255, 0), Address(0, 191)))])
+def test_acknowledgement_of_another_source_command_or_target_does_not_count(
+        changes: dict[str, Any], unexpected: int) -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.ack(DENIED, **changes)
+    assert (run.outcomes, rig.sender.counters.unexpected_acks) == ([], unexpected)
+    assert len(rig.sender.round_trip(LIGHT)) == 0
+
+
+@pytest.mark.parametrize('target', [OURS, Address(0, 0), Address(1, 0), Address(0, 194)])
+def test_acknowledgement_to_us_or_without_target_counts(target: Address) -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.ack(ACCEPTED, target=target)
+    assert run.outcome.accepted
+
+
+def test_acknowledgements_before_a_command_and_after_its_end_change_nothing() -> None:
+    rig = Rig()
+    rig.ack(ACCEPTED)
+    run, silent = rig.start(), rig.start(406)
+    for result in (DENIED, ACCEPTED, DENIED):
+        rig.ack(result)
+    rig.run(LONG)
+    rig.ack(ACCEPTED, 406)
+    assert (run.result, silent.status) == (DENIED, STATUS.NO_ANSWER)
+    assert rig.sender.counters.unexpected_acks == 4
+
+
+def test_late_acknowledgement_of_an_earlier_try_counts() -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.run(1.2)
+    rig.ack(ACCEPTED)
+    assert str(run.outcome) == 'MAV_RESULT_ACCEPTED (3 tries, 1.20 s)'
+
+
+def test_component_does_not_answer_a_command_to_all_components() -> None:
+    rig = Rig()
+    run = rig.start(target=Address(1, 0))
+    rig.ack(ACCEPTED, source=LIGHT)
+    rig.run(LONG)
+    assert run.status is STATUS.NO_ANSWER
+
+
+# Progress
+
+def test_each_report_of_progress_lengthens_the_wait_and_nothing_is_resent() -> None:
+    rig = Rig()
+    run = rig.start()
+    for percent in (0, 40, 80):
+        rig.ack(IN_PROGRESS, progress=percent)
+        assert rig.sender.next_deadline() == pytest.approx(rig.now + PROGRESS_TIMEOUT)
+        rig.run(2.99)
+    assert run.outcomes == []
+    rig.run(0.02)
+    assert (run.status, run.outcome.progress, len(run.frames)) == (
+        STATUS.PROGRESS_STOPPED, 80, 1)
+    assert run.outcome.elapsed == pytest.approx(8.98)
+
+
+@pytest.mark.parametrize(('reported', 'known'), [(0, 0), (100, 100), (101, None), (255, None)])
+def test_progress_above_100_is_unknown(reported: int, known: int | None) -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.ack(IN_PROGRESS, progress=reported)
+    rig.ack(FAILED, result_param2=-7)
+    assert (run.outcome.progress, run.outcome.result_param2) == (known, -7)
+    assert '%' not in str(run.outcome)
+
+
+def test_rejection_of_a_resend_does_not_end_the_try_in_progress() -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.run(0.6)
+    for result in (IN_PROGRESS, REJECTED, ACCEPTED):
+        assert run.outcomes == []
+        rig.ack(result)
+    assert run.outcome.accepted
+
+
+# Several commands
+
+def test_commands_of_one_kind_are_sent_one_after_the_other() -> None:
+    rig = Rig()
+    runs = [rig.start() for _ in range(3)]
+    rig.run(1.2)
+    assert [len(run.frames) for run in runs] == [3, 0, 0]
+    for place, result in enumerate((ACCEPTED, DENIED, FAILED)):
+        rig.ack(result)
+        assert runs[place].result == result
+        assert [bool(run.frames) for run in runs] == [True, True, place > 0]
+    assert runs[1].frames[0][1].confirmation == 0
+
+
+def test_command_behind_one_without_answer_is_sent_and_its_time_begins_then() -> None:
+    rig = Rig([], [], [], [], [ACCEPTED])
+    first, second = rig.start(), rig.start()
+    rig.run(LONG)
+    assert first.status is STATUS.NO_ANSWER
+    assert str(second.outcome) == 'MAV_RESULT_ACCEPTED (1 try, 20 ms)'
+
+
+@pytest.mark.parametrize('ended_by', ['acknowledgement', 'late poll', 'poll'])
+def test_command_whose_limit_passes_while_it_waits_is_never_sent(ended_by: str) -> None:
+    rig = Rig()
+    first, second = rig.start(), rig.start(limit=0.4)
+    begun = rig.now
+    if ended_by == 'poll':
+        rig.run(0.45)
+        assert second.ended_at == pytest.approx(begun + 0.4)
+    rig.now = begun + 0.45
+    if ended_by == 'acknowledgement':
+        rig.ack(ACCEPTED)
+    rig.poll()
+    assert str(second.outcome) == 'not finished in time (0 tries, 0 ms)'
+    rig.run(LONG)
+    assert (second.frames, len(first.outcomes), len(second.outcomes)) == ([], 1, 1)
+
+
+def test_command_beyond_the_bound_of_waiting_ones_is_refused() -> None:
+    rig = Rig()
+    runs = [rig.start() for _ in range(MAX_WAITING + 2)]
+    assert [len(run.outcomes) for run in runs] == [0] * (MAX_WAITING + 1) + [1]
+    assert str(runs[-1].outcome) == (
+        'too many commands are waiting for this component (0 tries, 0 ms)')
+
+
+def test_commands_of_other_kinds_and_targets_do_not_wait() -> None:
+    rig = Rig()
+    runs = [rig.start(405), rig.start(406), rig.start(405, OTHER),
+            rig.start(512, params=(148.0,)), rig.start(512, params=(259.0,))]
+    assert [message.command for message in rig.messages] == [405, 406, 405, 512, 512]
+    assert [rig.sender.pending(LIGHT, command) for command in (405, 406, 400)] == [
+        True, True, False]
+    for command, source in ((406, LIGHT), (405, OTHER), (512, LIGHT), (512, LIGHT)):
+        rig.ack(ACCEPTED, command, source=source)
+    assert [len(run.outcomes) for run in runs] == [0, 1, 1, 1, 1]
+    assert not rig.sender.pending(OTHER, 405)
+
+
+def test_fifty_targets_are_answered_in_any_order() -> None:
+    rig = Rig()
+    targets = [Address(system, component) for system in (1, 2) for component in range(1, 26)]
+    runs = [rig.start(target=target) for target in targets]
+    for place, target in reversed(list(enumerate(targets))):
+        rig.ack(100 + place, source=target)
+    assert [run.result for run in runs] == list(range(100, 150))
+
+
+# Ended from outside
+
+@pytest.mark.parametrize('ending', [STATUS.LINK_LOST, STATUS.CANCELLED])
+def test_all_commands_that_are_sent_or_wait_can_be_ended_for_good(ending: CommandStatus) -> None:
+    rig = Rig()
+    for command, target in ((405, LIGHT), (405, LIGHT), (406, LIGHT), (405, OTHER)):
+        rig.start(command, target)
+    rig.ack(IN_PROGRESS, 406, progress=30)
+    rig.now += 0.1
+    for status in (ending, STATUS.OUT_OF_TIME):
+        rig.sender.end_all(rig.now, status)
+    rig.ack(ACCEPTED)
+    rig.run(LONG)
+    assert [run.status for run in rig.runs] == [ending] * 4
+    assert (len(rig.frames), rig.idle) == (3, True)
+    assert str(rig.runs[2].outcome) == (
+        f'{ending.value}, last answer MAV_RESULT_IN_PROGRESS at 30 % (1 try, 100 ms)')
+    again = rig.start()
+    rig.ack(ACCEPTED)
+    assert again.outcome.accepted
+
+
+def test_commands_of_one_target_can_be_ended_without_those_of_others() -> None:
+    rig = Rig()
+    rig.start()
+    rig.start()
+    kept = rig.start(target=OTHER)
+    rig.sender.end_all(rig.now, STATUS.CANCELLED, LIGHT)
+    assert [len(run.outcomes) for run in rig.runs] == [1, 1, 0]
+    rig.ack(ACCEPTED, source=OTHER)
+    assert kept.outcome.accepted
+
+
+@pytest.mark.parametrize('by', ['acknowledgement', 'silence', 'lost link'])
+def test_callback_may_start_the_same_command_again(by: str) -> None:
+    rig = Rig()
+    outcomes: list[CommandResult] = []
+
+    def again(outcome: CommandResult, now: float) -> None:
+        outcomes.append(outcome)
+        if len(outcomes) < 3:
+            rig.sender.start(Command(LIGHT, 405), now, again)
+
+    rig.sender.start(Command(LIGHT, 405), rig.now, again)
+    for _ in range(3):
+        if by == 'acknowledgement':
+            rig.ack(ACCEPTED)
+        elif by == 'silence':
+            rig.run(2.0)
+        else:
+            rig.sender.end_all(rig.now, STATUS.LINK_LOST)
+    assert (len(outcomes), rig.idle) == (3, True)
+
+
+def test_callback_may_end_all_other_commands() -> None:
+    rig = Rig(retries=0)
+    ends: list[CommandStatus] = []
+
+    def close(outcome: CommandResult, now: float) -> None:
+        ends.append(outcome.status)
+        rig.sender.end_all(now, STATUS.CANCELLED)
+
+    for target in (LIGHT, OTHER) * 3:
+        rig.sender.start(Command(target, 405), rig.now, close)
+    rig.run(LONG)
+    assert sorted(ends, key=str) == [STATUS.CANCELLED] * 5 + [STATUS.NO_ANSWER]
+    assert rig.idle
+
+
+def test_overtaking_command_cancels_those_that_wait_or_are_unacknowledged_and_is_sent() -> None:
+    rig = Rig()
+    others = [rig.start() for _ in range(31)]
+    off = rig.start(overtake=True)
+    assert [run.status for run in others] == [STATUS.CANCELLED] * 31
+    assert (len(rig.frames), len(off.frames)) == (2, 1)
+    rig.ack(ACCEPTED)
+    assert off.outcome.accepted
+
+
+@pytest.mark.parametrize('rejections', [0, 1])
+def test_overtaking_command_is_sent_beside_one_in_progress(rejections: int) -> None:
+    rig = Rig()
+    on = rig.start()
+    rig.ack(IN_PROGRESS)
+    off, waiting = rig.start(overtake=True), rig.start()
+    for _ in range(rejections):
+        # A command in progress is not rejected: the rejection is that of the other.
+        rig.ack(REJECTED)
+        rig.run(0.15)
+    assert [len(run.frames) for run in (on, off, waiting)] == [1, 1 + rejections, 0]
+    for result in (ACCEPTED, DENIED, FAILED):
+        # The acknowledgements name only the command: each answers the oldest.
+        rig.ack(result)
+    assert (on.result, off.result, waiting.result) == (ACCEPTED, DENIED, FAILED)
+
+
+@pytest.mark.parametrize('place', [0, 1])
+def test_cancelled_command_ends_and_the_other_is_sent(place: int) -> None:
+    rig = Rig()
+    runs = [rig.start(), rig.start()]
+    rig.sender.cancel(runs[place].command, rig.now)
+    rig.flush()
+    assert runs[place].status is STATUS.CANCELLED
+    assert (runs[1 - place].outcomes, len(runs[1 - place].frames)) == ([], 1)
+
+
+@pytest.mark.parametrize(('first', 'second', 'after', 'doubtful'), [
+    (DENIED, DENIED, 0.4, True), (DENIED, DENIED, 0.6, False), (ACCEPTED, DENIED, 0.4, False),
+    (None, DENIED, 0.4, True), (None, ACCEPTED, 0.4, True)])
+def test_result_says_whether_it_may_be_that_of_the_command_before(
+        first: int | None, second: int, after: float, doubtful: bool) -> None:
+    rig = Rig()
+    before = rig.start()
+    if first is None:
+        rig.sender.cancel(before.command, rig.now)
+    else:
+        rig.ack(first)
+    rig.now += after
+    run = rig.start()
+    rig.ack(second)
+    assert not before.outcome.may_answer_earlier(rig.now, 0.5)
+    assert run.outcome.may_answer_earlier(rig.now, 0.5) is doubtful
+
+
+# Fields, arguments, texts and counters
+
+@pytest.mark.parametrize(('command', 'as_int', 'message'), [
+    (Command(LIGHT, 1, (1.0,)), False, CommandLong(*LIGHT, 1, 2, 1.0, *[0.0] * 6)),
+    (Command(LIGHT, 1, (1.0,), math.nan), False, CommandLong(*LIGHT, 1, 2, 1.0, *[math.nan] * 6)),
+    (Command(LIGHT, 1, (1.0,), math.nan), True, CommandInt(
+        *LIGHT, 0, 1, 0, 0, 1.0, *[math.nan] * 3, 0x7FFFFFFF, 0x7FFFFFFF, math.nan)),
+    (Command(LIGHT, 195, (1.0,), 0.0, Position(0, 47.3977418, -8.5455938, 488.25)), False,
+     CommandInt(*LIGHT, 0, 195, 0, 0, 1.0, 0.0, 0.0, 0.0, 473977418, -85455938, 488.25)),
+    (Command(LIGHT, 195, (), 0.0, Position(1, 12.5, -0.0001, -3.5)), False,
+     CommandInt(*LIGHT, 1, 195, 0, 0, 0.0, 0.0, 0.0, 0.0, 125000, -1, -3.5)),
+    (Command(LIGHT, 195, (), 0.0, Position(5, math.nan, math.nan, math.nan)), False, CommandInt(
+        *LIGHT, 5, 195, 0, 0, 0.0, 0.0, 0.0, 0.0, 0x7FFFFFFF, 0x7FFFFFFF, math.nan))])
+def test_message_has_unset_params_and_position_as_the_command_says(
+        command: Command, as_int: bool, message: CommandLong | CommandInt) -> None:
+    # repr, because NaN differs from itself.
+    assert repr(command.message(2, as_int)) == repr(message)
+
+
+def test_position_timeout_and_retries_out_of_range_are_refused() -> None:
+    with pytest.raises(ValueError, match='position of 300, 0'):
+        Position(0, 300.0, 0.0, 0.0)
+    for timeout in (0.0, -0.5, math.nan, math.inf):
+        with pytest.raises(ValueError, match='timeout'):
+            CommandSender(OURS, timeout)
+    with pytest.raises(ValueError, match='retries -1'):
+        CommandSender(OURS, 0.5, -1)
+
+
+def test_durations_are_in_ms_below_a_second() -> None:
+    assert [format_seconds(seconds) for seconds in (0.0004, 0.9994, 0.9996, 12.345)] == [
+        '0 ms', '999 ms', '1.00 s', '12.35 s']
+
+
+def test_sender_counts_tries_and_silence_and_names_the_silent_target_until_it_answers() -> None:
+    rig = Rig(retries=2)
+    rig.ended()
+    assert rig.sender.unanswering == {LIGHT}
+    for target in (OTHER, LIGHT):
+        rig.start(target=target)
+        assert rig.sender.unanswering == {LIGHT}
+        rig.ack(DENIED, source=target)
+    rig.ack(ACCEPTED)
+    counters = rig.sender.counters
+    assert (counters.sent, counters.resent, counters.unanswered, counters.unexpected_acks) == (
+        5, 2, 1, 1)
+    assert not rig.sender.unanswering

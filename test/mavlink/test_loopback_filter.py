@@ -14,8 +14,19 @@
 
 """Our own frames that return are distinguished from frames of another sender with our address."""
 
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
 from illuminator_ros.mavlink.frame import Frame
-from illuminator_ros.mavlink.frame_writer import FrameWriter, LoopbackFilter, MAX_FRAMES, MEMORY
+from illuminator_ros.mavlink.frame_writer import (
+    FrameWriter,
+    LoopbackFilter,
+    MAX_FRAMES,
+    MAX_STAMPS,
+    MEMORY,
+)
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
@@ -23,52 +34,28 @@ from support.frames import LIGHT, only
 from support.messages import STATUS
 
 OURS = Address(1, 194)
-SENT = {'source': OURS, 'sequence': 7, 'message_id': 0, 'payload': b'\x01\x02\0\0'}
+FRAME = Frame(2, 7, OURS, 0, b'\x01\x02')
 
 
-@pytest.fixture
-def echoes() -> LoopbackFilter:
-    """Return echoes that know of one frame, sent at 100 s."""
-    echoes = LoopbackFilter()
-    echoes.sent(**SENT, now=100.0)
-    return echoes
-
-
-def frame(**changes):
-    """Return the frame that was sent, as it comes in; or a slightly different one."""
-    fields = {**SENT, 'payload': b'\x01\x02', **changes}
-    return Frame(2, fields['sequence'], fields['source'], fields['message_id'], fields['payload'])
-
-
-@pytest.mark.parametrize('after', [0.0, 0.001, MEMORY])
-@pytest.mark.parametrize('payload', [b'\x01\x02', b'\x01\x02\0\0'], ids=['cut', 'whole'])
-def test_what_was_sent_lately_is_an_echo(echoes, after, payload):
-    assert echoes.has(frame(payload=payload), 100.0 + after)
-
-
-def test_it_is_one_however_often_it_comes(echoes):
-    assert echoes.has(frame(), 100.1)
-    assert echoes.has(frame(), 100.2)
-
-
-@pytest.mark.parametrize('changes', [
-    {'sequence': 8}, {'payload': b'\x01\x03'}, {'message_id': 76}, {'source': Address(1, 195)}])
-def test_what_differs_in_anything_is_of_somebody_else(echoes, changes):
-    assert not echoes.has(frame(**changes), 100.1)
-
-
-def test_what_comes_long_after_it_was_sent_is_of_somebody_else(echoes):
-    assert not echoes.has(frame(), 100.1 + MEMORY)
-
-
-def test_memory_is_bounded(echoes):
+@pytest.mark.parametrize(('changes', 'after', 'is_ours'), [
+    ({}, 0.0, True), ({}, MEMORY, True), ({'payload': b'\x01\x02\0\0'}, 0.1, True),
+    ({'sequence': 8}, 0.1, False), ({'payload': b'\x01\x03'}, 0.1, False),
+    ({'message_id': 76}, 0.1, False), ({'source': Address(1, 195)}, 0.1, False),
+    ({}, MEMORY + 0.1, False)])
+def test_unsigned_frame_is_ours_if_it_equals_one_sent_within_a_second(
+        changes: dict[str, Any], after: float, is_ours: bool) -> None:
+    loopback = LoopbackFilter()
+    loopback.sent(OURS, 7, 0, b'\x01\x02\0\0', 100.0)
+    assert [loopback.has(replace(FRAME, **changes), 100.0 + after) for _ in range(2)] == [
+        is_ours, is_ours]
     for number in range(MAX_FRAMES):
-        echoes.sent(OURS, number, 76, b'\x01', 100.0)
-    assert not echoes.has(frame(), 100.1)
+        loopback.sent(OURS, number, 76, b'\x01', 100.0)
+    assert not loopback.has(FRAME, 100.0)
 
 
-def test_signed_frame_that_comes_back_late_is_recognised() -> None:
+def test_signed_frame_that_returns_late_is_ours_until_many_have_followed() -> None:
     writer = FrameWriter(Signing(SigningMode.REQUIRE, bytes(range(32))))
-    frame = only(writer.frame(LIGHT, STATUS, 0.0, 1.7e9))
-
-    assert writer.is_loopback(frame, 3600.0)
+    first, *others = [only(writer.frame(LIGHT, STATUS, 0.0, 1.7e9)) for _ in range(MAX_STAMPS)]
+    assert writer.is_loopback(first, 3600.0)
+    writer.frame(LIGHT, STATUS, 0.0, 1.7e9)
+    assert [writer.is_loopback(frame, 3600.0) for frame in (first, others[0])] == [False, True]

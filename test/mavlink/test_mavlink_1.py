@@ -12,16 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""MAVLink 1 links, checked by a parser of their own."""
+"""MAVLink 1 links, checked by a parser that accepts nothing else."""
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -29,19 +27,18 @@ from illuminator_ros.mavlink.messages import (
     CommandInt,
     CommandLong,
     Heartbeat,
-    heartbeat,
     Message,
 )
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.url import parse_url
 import pytest
-from support.heartbeats import heartbeat_frame
+from support.frames import heartbeat_frame
+from support.live_link import BRIDGE, Talker
 from support.simulated_link import SimulatedLink
 
 PEER = ('127.0.0.1', 14550)
 # Payload length and CRC_EXTRA by message id, from the definition of MAVLink 1's common messages.
 STRICT = {0: (9, 50), 75: (35, 158), 76: (33, 152), 77: (3, 143)}
-OURS = Address(1, 194)
 
 
 def parse_strictly(data: bytes) -> list[tuple[int, bytes]]:
@@ -58,37 +55,27 @@ def parse_strictly(data: bytes) -> list[tuple[int, bytes]]:
     return found
 
 
-class Endpoint1(Endpoint):
-    """Sends what a test gives it."""
+class Talker1(Talker):
+    """Handles the messages given, and acknowledges each."""
 
-    messages: Any = (Heartbeat, CommandAck)
-
-    def __init__(self) -> None:
-        self.outgoing: deque[tuple[Address, Message]] = deque()
-
-    def link_opened(self, now: float) -> None:
-        self.outgoing.append((OURS, heartbeat(18)))
+    def __init__(self, *messages: type[Message]) -> None:
+        super().__init__()
+        self.messages = messages
 
     def receive(self, source: Address, message: Message, now: float) -> None:
-        self.outgoing.append((OURS, CommandAck(405, 0, 50, -1, *source)))
-
-    def poll(self, now: float) -> None:
-        pass
-
-    def next_deadline(self) -> float:
-        return float('inf')
+        self.outgoing.append((BRIDGE, CommandAck(405, 0, 50, -1, *source)))
 
 
 def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_frames() -> None:
     sent: list[bytes] = []
-    endpoint = Endpoint1()
+    endpoint = Talker1(Heartbeat, CommandAck)
     link = SimulatedLink(endpoint, lambda data, peer: sent.append(data), mavlink_version=1)
 
-    # Whatever it receives: these are MAVLink 2 frames.
+    # Whatever it receives: this is a MAVLink 2 frame.
     link.receive((heartbeat_frame(Address(1, 1)), PEER))
     link.ask(lambda now: endpoint.outgoing.extend([
-        (OURS, CommandLong(1, 2, 512, 0, 0, 0, 0, 0, 0, 0, 0)),
-        (OURS, CommandInt(1, 2, 0, 195, 0, 0, 0, 0, 0, 0, 0, 0, 0))]))
+        (BRIDGE, CommandLong(1, 2, 512, 0, 0, 0, 0, 0, 0, 0, 0)),
+        (BRIDGE, CommandInt(1, 2, 0, 195, 0, 0, 0, 0, 0, 0, 0, 0, 0))]))
 
     assert parse_strictly(b''.join(sent)) == [
         (0, bytes((0, 0, 0, 0, 18, 8, 0, 4, 3))), (77, bytes((149, 1, 0))),
@@ -100,10 +87,7 @@ def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_
     ((), {'signing': Signing(SigningMode.SIGN, bytes(32))}, 'cannot be signed'),
     ((), {'mavlink_version': 3}, 'version 3 is neither')])
 def test_link_that_mavlink_1_cannot_serve_is_refused_with_the_reason(
-        messages: Any, options: dict[str, Any], reason: str) -> None:
-    endpoint = Endpoint1()
-    endpoint.messages = messages
-
+        messages: tuple[type[Message], ...], options: dict[str, Any], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
-        Link(parse_url('memory://one'), endpoint, label='one',
+        Link(parse_url('memory://one'), Talker1(*messages), label='one',
              **{'mavlink_version': 1, **options})

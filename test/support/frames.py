@@ -16,49 +16,81 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections import Counter
 
 from fastcrc.crc16 import mcrf4xx
 from illuminator_ros.mavlink.frame import Decoder, encode_frame, Frame
-from illuminator_ros.mavlink.messages import Address, encode_payload, LAYOUTS
-from support.messages import STATUS
+from illuminator_ros.mavlink.messages import (
+    Address,
+    encode_payload,
+    heartbeat,
+    LAYOUTS,
+    MavType,
+    Message,
+)
+from illuminator_ros.mavlink.signing import Signing
+from support.messages import decode_payload, HANDLED, STATUS
 
 LIGHT = Address(1, 243)
-AUTOPILOT = Address(7, 1)
 # Never the beginning of a frame, and long enough to end the wait for the rest of any.
 FILLER = bytes(300)
 
 
-def frame_of(message: Any = STATUS, sequence: int = 0, source: Address = LIGHT, *,
+def frame_of(message: Message = STATUS, sequence: int = 0, source: Address = LIGHT, *,
              signed: bool = False) -> bytes:
     """Return a frame of ours, without the signature that a signed one still needs."""
     return encode_frame(
         message.id, encode_payload(message), sequence=sequence, source=source,
-        crc_extra=LAYOUTS[message.id].crc_extra, signed=signed)
+        crc_extra=message.crc_extra, signed=signed)
+
+
+def heartbeat_frame(source: Address = LIGHT, sequence: int = 0,
+                    mav_type: int = MavType.ILLUMINATOR) -> bytes:
+    """Return the heartbeat of a light, or of another component."""
+    return frame_of(heartbeat(mav_type), sequence, source)
+
+
+class Codec:
+    """
+    Messages to numbered frames and back, as a component at the far end of a line has them.
+
+    :param signing: signs the frames, as its mode says.
+    """
+
+    def __init__(self, signing: Signing | None = None) -> None:
+        self.decoder = Decoder()
+        self._signing = signing or Signing()
+        self._sent: Counter[Address] = Counter()
+
+    def frame(self, source: Address, message: Message, now: float = 0.0) -> bytes:
+        """Return a message as a frame with the next sequence number of its sender."""
+        data = frame_of(message, self._sent[source] & 0xFF, source, signed=self._signing.signs)
+        self._sent[source] += 1
+        return self._signing.sign(data, 1.7e9 + now) if self._signing.signs else data
+
+    def messages(self, data: bytes) -> list[tuple[Address, Message]]:
+        """Return the messages in a stream, with their senders."""
+        return [(frame.source, decode_payload(frame.message_id, frame.payload))
+                for frame in self.decoder.feed(data) if frame.message_id in HANDLED]
 
 
 def raw_v2(message_id: int, payload: bytes, *, crc_extra: int | None = None, incompat: int = 0,
            compat: int = 0, sequence: int = 0, source: Address = LIGHT) -> bytes:
     """Return a MAVLink 2 frame as it is not written by us: any flags, any length, any seed."""
-    if crc_extra is None:
-        crc_extra = LAYOUTS[message_id].crc_extra
     header = bytes((len(payload), incompat, compat, sequence, *source))
-    body = header + message_id.to_bytes(3, 'little') + payload
-    return b'\xfd' + body + mcrf4xx(body + bytes((crc_extra,))).to_bytes(2, 'little')
-
-
-def foreign_frame(sequence: int = 0, source: Address = AUTOPILOT) -> bytes:
-    """Return a frame with a message that is nothing to us: ATTITUDE."""
-    return raw_v2(30, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)
+    return _raw(0xFD, message_id, header + message_id.to_bytes(3, 'little') + payload, crc_extra)
 
 
 def raw_v1(message_id: int, payload: bytes, *, crc_extra: int | None = None, sequence: int = 0,
            source: Address = LIGHT) -> bytes:
     """Return a MAVLink 1 frame of any length."""
-    if crc_extra is None:
-        crc_extra = LAYOUTS[message_id].crc_extra
-    body = bytes((len(payload), sequence, *source, message_id)) + payload
-    return b'\xfe' + body + mcrf4xx(body + bytes((crc_extra,))).to_bytes(2, 'little')
+    return _raw(0xFE, message_id,
+                bytes((len(payload), sequence, *source, message_id)) + payload, crc_extra)
+
+
+def _raw(stx: int, message_id: int, body: bytes, crc_extra: int | None) -> bytes:
+    seed = LAYOUTS[message_id].crc_extra if crc_extra is None else crc_extra
+    return bytes((stx,)) + body + mcrf4xx(body + bytes((seed,))).to_bytes(2, 'little')
 
 
 def spoilt(frame: bytes, at: int = -1) -> bytes:
@@ -77,3 +109,11 @@ def only(data: bytes) -> Frame:
 def decoded(data: bytes) -> list[Frame]:
     """Return the frames that a stream holds which ends with the data."""
     return Decoder().feed(data + FILLER)
+
+
+AUTOPILOT = Address(7, 1)
+
+
+def foreign_frame(sequence: int = 0, source: Address = AUTOPILOT) -> bytes:
+    """Return a frame with a message that no endpoint here handles: ATTITUDE."""
+    return raw_v2(30, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)

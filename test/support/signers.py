@@ -16,46 +16,27 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from illuminator_ros.mavlink.frame import Frame
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.mavlink.signing import (
-    EPOCH,
-    signature,
-    Signing,
-    SigningMode,
-    ticks,
-)
+from illuminator_ros.mavlink.signing import EPOCH, signature, Signing, SigningMode
 from support.frames import frame_of, LIGHT, only
-from support.messages import STATUS
 
 KEY = bytes(range(32))
 WRONG_KEY = bytes(range(1, 33))
-# Unix time, s, of a day long after the epoch of signing.
+# Unix time, s, of a day long after the epoch of signing, and its time stamp; and the last stamp.
 NOW = EPOCH + 400_000_000.0
-# Of 48 bits.
+STAMP = 40_000_000_000_000
 LAST_STAMP = 2 ** 48 - 1
+SECOND = 100_000
 
 
-def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Address = LIGHT,
-           message: Any = STATUS, sequence: int = 0) -> Frame:
+def signed(stamp: int, *, key: bytes = KEY, link_id: int = 0, source: Address = LIGHT) -> Frame:
     """Return a frame signed with any key and time stamp."""
-    data = (frame_of(message, sequence, source, signed=True)
-            + bytes([link_id]) + stamp.to_bytes(6, 'little'))
+    data = frame_of(source=source, signed=True) + bytes([link_id]) + stamp.to_bytes(6, 'little')
     return only(data + signature(key, data))
 
 
-def unsigned(source: Address = LIGHT) -> Frame:
-    """Return a frame without signature."""
-    return only(frame_of(source=source))
-
-
-def checker(mode: SigningMode = SigningMode.REQUIRE, **arguments: Any) -> Signing:
-    """Return what checks frames with the key."""
-    return Signing(mode, KEY, **arguments)
-
-
-def stamp_at(unix_time: float) -> int:
-    """Return the time stamp of a Unix time, s."""
-    return ticks(unix_time)
+def checker(mode: SigningMode = SigningMode.REQUIRE, *, timestamp: int = 0,
+            link_id: int = 0) -> Signing:
+    """Return a signing state with the key."""
+    return Signing(mode, KEY, link_id, timestamp)

@@ -1,0 +1,98 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pauses between tries to open a link, and the thread that tries."""
+
+from __future__ import annotations
+
+import threading
+from types import SimpleNamespace
+
+from hypothesis import given
+from hypothesis import strategies as st
+from illuminator_ros.mavlink import connector
+from illuminator_ros.mavlink.connector import Backoff, Connector
+from illuminator_ros.mavlink.transport import Channel
+from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
+from illuminator_ros.mavlink.url import MemoryUrl, Url
+import pytest
+
+
+def pauses(count: int, jitter: float = 1.0, spent: float = 0.0) -> list[float]:
+    """Return the pauses before the first try and after each failure."""
+    backoff = Backoff(lambda: jitter)
+    found = [backoff.pause(spent)]
+    for _ in range(count):
+        backoff.failed()
+        found.append(backoff.pause(spent))
+    return found
+
+
+def test_pauses_double_from_an_immediate_first_try_to_half_a_second() -> None:
+    assert pauses(6) == [0.0, 0.05, 0.1, 0.2, 0.4, 0.5, 0.5]
+    assert pauses(5000)[-1] == 0.5
+    assert pauses(50, spent=60.0)[-1] == 0.05
+
+
+@given(st.integers(1, 50), st.floats(0, 1), st.floats(0, CONNECT_TIMEOUT))
+def test_tries_begin_within_a_second_of_each_other_and_never_without_pause(
+        failures: int, jitter: float, spent: float) -> None:
+    longest, pause = pauses(failures)[-1], pauses(failures, jitter, spent)[-1]
+    assert 0.025 <= pause <= longest * (0.5 + 0.5 * jitter)
+    assert spent + pause < 1.0
+
+
+def test_two_bridges_without_given_jitter_pause_differently() -> None:
+    backoffs = [Backoff(), Backoff()]
+    found = [[] for _ in backoffs]  # type: list[list[float]]
+    for backoff, of_one in zip(backoffs, found, strict=True):
+        for _ in range(10):
+            backoff.failed()
+            of_one.append(backoff.pause(0.0))
+    assert found[0] != found[1]
+
+
+def test_pause_is_none_after_success_and_short_after_an_answer() -> None:
+    backoff = Backoff(lambda: 1.0)
+    found = []
+    for noted in (backoff.answered, backoff.succeeded):
+        for _ in range(10):
+            backoff.failed()
+        noted()
+        found.append(backoff.pause(0.0))
+    assert found == [0.05, 0.0]
+
+
+def test_connector_counts_the_time_of_a_try_in_its_pause(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, spent, ended = [0.0], list[float](), threading.Event()
+
+    class Recorded(Backoff):
+
+        def pause(self, seconds: float) -> float:
+            spent.append(seconds)
+            if len(spent) > 2:
+                one.stop()
+                ended.set()
+            return 0.0
+
+    def fail_slowly(url: Url) -> Channel:
+        now[0] += 0.7
+        raise OSError('refused')
+
+    monkeypatch.setattr(connector, 'open_channel', fail_slowly)
+    monkeypatch.setattr(connector, 'time', SimpleNamespace(monotonic=lambda: now[0]))
+    one = Connector(MemoryUrl('x'), lambda channel: None, lambda reason: None, backoff=Recorded())
+    one.start()
+    assert ended.wait(20.0)
+    assert spent == pytest.approx([0.0, 0.7, 0.7])

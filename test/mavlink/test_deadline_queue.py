@@ -1,0 +1,55 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The deadline queue, compared with a search over all deadlines."""
+
+import math
+import time
+
+from hypothesis import given
+from hypothesis import strategies as st
+from illuminator_ros.mavlink.deadline_queue import DeadlineQueue
+
+TIMES = st.integers(0, 20)
+KEYS = st.integers(0, 4)
+STEPS = st.lists(st.tuples(st.just('set'), KEYS, TIMES | st.just(math.inf))
+                 | st.tuples(st.just('due'), KEYS, TIMES)
+                 | st.tuples(st.just('remove'), KEYS, TIMES), max_size=60)
+
+
+@given(STEPS)
+def test_queue_agrees_with_search_over_all_deadlines(steps: list[tuple[str, int, float]]) -> None:
+    queue: DeadlineQueue[int] = DeadlineQueue()
+    deadlines: dict[int, float] = {}
+    for kind, key, moment in steps:
+        if kind == 'set':
+            queue.set(key, moment)
+            deadlines[key] = moment
+        elif kind == 'remove':
+            queue.remove(key)
+            deadlines.pop(key, None)
+        else:
+            assert sorted(queue.due(moment)) == sorted(
+                key for key, deadline in deadlines.items() if deadline <= moment)
+        assert queue.next_deadline() == min(deadlines.values(), default=math.inf)
+
+
+def test_postponing_one_deadline_takes_no_time_that_grows() -> None:
+    queue: DeadlineQueue[str] = DeadlineQueue()
+    begun = time.process_time()
+    for second in range(10_000):
+        queue.set('light', second + 3.0)
+        assert queue.due(float(second)) == []
+    assert queue.due(10_003.0) == ['light']
+    assert time.process_time() - begun < 5.0

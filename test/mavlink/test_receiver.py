@@ -1,0 +1,108 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The receiver: frames put together for each peer, and false beginnings given up in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from illuminator_ros.mavlink.frame import ForeignFrames, Frame
+from illuminator_ros.mavlink.messages import Address, LAYOUTS
+from illuminator_ros.mavlink.receiver import MAX_DECODERS, Receiver, STALL
+from illuminator_ros.mavlink.signing import Signing, SigningMode
+import pytest
+from support.frames import heartbeat_frame, LIGHT, raw_v1
+
+UNIX = 1.7e9
+FRAME = heartbeat_frame()
+# The beginnings of frames of 250 bytes, MAVLink 1 and 2, that do not go on.
+FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\x00\x00']
+
+
+@pytest.fixture
+def receiver() -> Receiver:
+    return Receiver(Signing(), LAYOUTS)
+
+
+def sources(frames: Sequence[Frame | ForeignFrames]) -> list[Address]:
+    return [frame.source for frame in frames]
+
+
+def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Receiver) -> None:
+    frames = {peer: heartbeat_frame(Address(1, peer)) for peer in (1, 2)}
+    for peer, frame in frames.items():
+        assert receiver.take(peer, frame[:9], 0.0, UNIX) == []
+    for peer, frame in frames.items():
+        assert sources(receiver.take(peer, frame[9:], 0.1, UNIX)) == [Address(1, peer)]
+    assert receiver.counters.frames == 2
+
+
+@pytest.mark.parametrize('noise', [*FALSE_STARTS, b''.join(FALSE_STARTS * 5)])
+def test_good_frame_behind_false_starts_comes_after_the_stall_time_without_more_bytes(
+        receiver: Receiver, noise: bytes) -> None:
+    assert receiver.take('a', noise + FRAME, 0.0, UNIX) == []
+    assert receiver.next_deadline() == STALL
+    assert receiver.give_up(STALL - 0.01, UNIX) == []
+    assert [(peer, frame.source) for peer, frame in receiver.give_up(STALL, UNIX)] == [
+        ('a', LIGHT)]
+    assert receiver.next_deadline() == math.inf
+
+
+def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: Receiver) -> None:
+    receiver.take('a', FALSE_STARTS[0], 0.0, UNIX)
+    receiver.take('a', FRAME[:9], 0.4, UNIX)
+    assert receiver.next_deadline() == STALL
+    assert receiver.give_up(STALL, UNIX) == []
+    assert sources(receiver.take('a', FRAME[9:], STALL + 0.1, UNIX)) == [LIGHT]
+
+
+def test_wait_begins_anew_with_the_next_frame(receiver: Receiver) -> None:
+    receiver.take('a', FRAME[:9], 0.0, UNIX)
+    receiver.take('a', FRAME[9:] + FRAME[:9], 0.4, UNIX)
+    assert receiver.next_deadline() == 0.4 + STALL
+
+
+def test_longest_frame_at_9600_baud_is_not_given_up(receiver: Receiver) -> None:
+    found = []
+    for number, byte in enumerate(raw_v1(110, bytes(range(1, 251)))):
+        now = number * 0.00104
+        assert receiver.give_up(now, UNIX) == []
+        found += receiver.take('a', bytes((byte,)), now, UNIX)
+    assert sources(found) == [LIGHT]
+
+
+def test_garbage_of_many_peers_is_bounded_and_costs_a_good_peer_nothing(
+        receiver: Receiver) -> None:
+    receiver.take('good', FRAME + FRAME[:9], 0.0, UNIX)
+    for number in range(10 * MAX_DECODERS):
+        receiver.take(number, FALSE_STARTS[0], 0.0, UNIX)
+    assert len(receiver) == MAX_DECODERS
+    assert sources(receiver.take('good', FRAME[9:], 0.1, UNIX)) == [LIGHT]
+    assert sources(receiver.take(0, FRAME, 0.1, UNIX)) == [LIGHT]
+    assert receiver.give_up(STALL, UNIX) == []
+
+
+def test_unsigned_frames_do_not_pass_where_signing_is_required() -> None:
+    receiver = Receiver(Signing(SigningMode.REQUIRE, bytes(32)), LAYOUTS)
+    assert receiver.take('a', FRAME + FALSE_STARTS[0] + FRAME, 0.0, UNIX) == []
+    assert receiver.give_up(STALL, UNIX) == []
+
+
+def test_closed_link_awaits_nothing(receiver: Receiver) -> None:
+    receiver.take('a', FRAME[:9], 0.0, UNIX)
+    receiver.clear()
+    assert receiver.next_deadline() == math.inf
+    assert receiver.take('a', FRAME[9:], 0.1, UNIX) == []
