@@ -23,7 +23,6 @@ from typing import Any
 
 from illuminator_ros.cli.conformance.run import LISTEN_TIME
 from illuminator_ros.illuminator.checks.catalogue import CHECKS, REQUIREMENTS
-from illuminator_ros.illuminator.checks.tester import LightTester
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
@@ -62,21 +61,19 @@ class Run:
         self.light = self.lights.components[0]
         self.session = CHECKS.session(TESTER, target)
         self.link = VirtualLink(self.session, self.lights)
-        self._conditions = Conditions(
-            consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat})
-        self._requirements = [one for one in requirements if not only or one.name in only]
-        self.suite = self._suite('')
+        self.suite = Suite(
+            CHECKS, self.session, Conditions(
+                consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat}),
+            [one for one in requirements if not only or one.name in only])
         self.session.runner.run(self._main())
 
-    def _suite(self, missing: str) -> Suite[LightTester]:
-        return Suite(CHECKS, self.session, self._conditions, self._requirements, missing)
-
     async def _main(self) -> None:
+        missing = ''
         with contextlib.suppress(Interrupted):
             await self.session.find(FIND_TIMEOUT, LISTEN_TIME)
             if self.session.found is None:
-                self.suite = self._suite(absence(self.session, CHECKS, FIND_TIMEOUT))
-        await self.suite.run()
+                missing = absence(self.session, CHECKS, FIND_TIMEOUT)
+        await self.suite.run(missing)
 
     @property
     def lamp(self) -> SimulatedIlluminator:

@@ -121,8 +121,8 @@ class Conformance:
             bool(self._announcement) and self._consent(),
             lambda: self._link.state().decoding.crc_errors, self._payload_options)
         suite = self._suite = Suite(
-            checks, self._session, conditions, self._requirements, missing, self._show)
-        self._finish(suite.run())
+            checks, self._session, conditions, self._requirements, self._show)
+        self._finish(suite.run(missing))
         self._link.stop()
         self._write_line(*self._table.end())
         report = Report(

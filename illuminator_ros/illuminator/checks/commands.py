@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import astuple
 
 from .tester import Change, CONFIGURE, DIM, ILLUMINATOR, LightTester, LOW, ON_OFF, same
@@ -26,7 +26,6 @@ from ...payload.checks.requirement import Requirement, requirement
 from ...payload.checks.session import fail_if, Failed, Skipped
 from ...payload.checks.specification import COMMAND, MESSAGES, ROUTING, Specification
 
-ON_OFF_SECTION = 'MAV_CMD_ILLUMINATOR_ON_OFF'
 CONFIGURE_SECTION = 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE'
 INTERNAL = float(Mode.INTERNAL_CONTROL)
 
@@ -163,47 +162,42 @@ async def brightness(tester: LightTester) -> str:
 # Invalid parameters
 
 def _rejects(
-    name: str, title: str, prepare: Callable[[LightTester], Awaitable[None]],
-    *commands: tuple[float, ...], section: str = CONFIGURE_SECTION,
+    name: str, title: str, *commands: tuple[float, ...],
+    state: Sequence[Callable[[LightTester], Awaitable[None]]] = (LightTester.baseline,),
+    section: str = CONFIGURE_SECTION,
 ) -> Requirement[LightTester]:
     """
     Return the requirement that a light rejects some commands.
 
-    :param prepare: brings the light to the state in which they are sent.
     :param commands: each a MAV_CMD and its parameters.
+    :param state: steps that bring the light to the state in which they are sent.
     """
     @requirement(name, title, MESSAGES, section, changes=True)
     async def check(tester: LightTester) -> None:
-        await prepare(tester)
+        for step in state:
+            await step(tester)
         fail_if([await tester.rejected(int(command), *params) for command, *params in commands])
     return check
 
 
-async def _unlit(tester: LightTester) -> None:
-    await tester.ensure_unlit()
-    await tester.baseline()
-
-
-async def _unlit_and_dim(tester: LightTester) -> None:
-    await tester.ensure_unlit()
-    await tester.ensure_dim()
-
-
 on_off_values = _rejects(
-    'on-off-values', 'rejects ON_OFF values other than 0 and 1', LightTester.ensure_dim,
-    *((ON_OFF, value) for value in (-1.0, 2.0, 0.5, 255.0)), section=ON_OFF_SECTION)
+    'on-off-values', 'rejects ON_OFF values other than 0 and 1',
+    *((ON_OFF, value) for value in (-1.0, 2.0, 0.5, 255.0)), state=(LightTester.ensure_dim,),
+    section='MAV_CMD_ILLUMINATOR_ON_OFF')
 mode_values = _rejects(
-    'mode-values', 'rejects mode 0 (unknown) and undefined modes', LightTester.baseline,
+    'mode-values', 'rejects mode 0 (unknown) and undefined modes',
     *((CONFIGURE, mode, LOW, 0.0, 0.0) for mode in (0.0, -1.0, 3.0, 1.5, 255.0)))
 brightness_values = _rejects(
-    'brightness-values', 'rejects a brightness outside 0 to 100 %', _unlit,
-    *((CONFIGURE, INTERNAL, value, 0.0, 0.0) for value in (-1.0, 101.0)))
+    'brightness-values', 'rejects a brightness outside 0 to 100 %',
+    *((CONFIGURE, INTERNAL, value, 0.0, 0.0) for value in (-1.0, 101.0)),
+    state=(LightTester.ensure_unlit, LightTester.baseline))
 # One by one: every comparison with NaN is false, so it passes range checks.
 not_a_number = _rejects(
-    'not-a-number', 'rejects NaN and infinity in every parameter', _unlit_and_dim,
+    'not-a-number', 'rejects NaN and infinity in every parameter',
     *(command for value in map(float, ('nan', 'inf', '-inf')) for command in (
         (ON_OFF, value), (CONFIGURE, value, LOW, 0.0, 0.0), (CONFIGURE, INTERNAL, value, 0.0, 0.0),
-        (CONFIGURE, INTERNAL, LOW, value, 0.0), (CONFIGURE, INTERNAL, LOW, 0.0, value))))
+        (CONFIGURE, INTERNAL, LOW, value, 0.0), (CONFIGURE, INTERNAL, LOW, 0.0, value))),
+    state=(LightTester.ensure_unlit, LightTester.ensure_dim))
 
 
 # Strobe, which needs consent

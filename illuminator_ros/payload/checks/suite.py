@@ -68,7 +68,6 @@ class Suite(Generic[T]):
 
     :param checks: those of the payload.
     :param requirements: those to check.
-    :param missing: why there is no device to check, '' if there is one.
     :param on_result: called with each result.
     :ivar results: one for each requirement, in order, after the run.
     :ivar restored: the state in which the device was left, as text.
@@ -78,7 +77,7 @@ class Suite(Generic[T]):
 
     def __init__(
         self, checks: PayloadChecks[T], session: Session, conditions: Conditions,
-        requirements: Sequence[Requirement[T]], missing: str = '',
+        requirements: Sequence[Requirement[T]],
         on_result: Callable[[Result], None] = lambda result: None,
     ) -> None:
         self.results: list[Result] = []
@@ -89,7 +88,7 @@ class Suite(Generic[T]):
         self._session = session
         self._tester = checks.tester(session, conditions)
         self._requirements = requirements
-        self._missing = missing
+        self._missing = ''
         self._on_result = on_result
         self._lost = ''
 
@@ -100,8 +99,13 @@ class Suite(Generic[T]):
         return (not self.left_changed and not self._session.runner.interrupted
                 and Verdict.FAIL not in verdicts and Verdict.PASS in verdicts)
 
-    async def run(self) -> None:
-        """Check all requirements; to be run once by the session's runner."""
+    async def run(self, missing: str = '') -> None:
+        """
+        Check all requirements; to be run once by the session's runner.
+
+        :param missing: why there is no device to check, '' if there is one.
+        """
+        self._missing = missing
         try:
             for one in self._requirements:
                 # Raises Interrupted, before the first check too.
