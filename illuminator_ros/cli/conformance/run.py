@@ -130,7 +130,12 @@ class Conformance:
             tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
         self._write_line('', report.device, report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
-            self._written &= _write(path, text)
+            try:
+                if path is not None:
+                    Path(path).write_text(text, encoding='utf-8')
+            except OSError as error:
+                _complain(f'{path}: {error.strerror}')
+                self._written = False
         return 0 if suite.passed and self._written else 1
 
     def _write_line(self, *texts: str) -> None:
@@ -238,17 +243,5 @@ def _print(*texts: str, end: str = '\n') -> bool:
     except OSError as error:
         _complain(f'standard output: {error.strerror}')
         discard_output()
-        return False
-    return True
-
-
-def _write(path: str | None, text: str) -> bool:
-    """Write a report if one is wanted; return whether that succeeded."""
-    if path is None:
-        return True
-    try:
-        Path(path).write_text(text, encoding='utf-8')
-    except OSError as error:
-        _complain(f'{path}: {error.strerror}')
         return False
     return True
