@@ -64,7 +64,7 @@ class IlluminatorClient:
 
     @property
     def lights(self) -> Mapping[Address, Light]:
-        """The lights that were announced, by address, in the order of their announcement."""
+        """Return the announced lights by address, in the order of their announcement."""
         return self._discovery.devices
 
     @property

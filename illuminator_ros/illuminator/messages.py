@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..mavlink.messages import define, Float, Message, UInt8, UInt32
+from ..mavlink.messages import define, Float, Message, UInt8, UInt32  # noqa: I101
 
 
 @define(440, 'ILLUMINATOR_STATUS')

@@ -130,7 +130,7 @@ class IlluminatorProperties:
 
     @property
     def reported_bitmask(self) -> int:
-        """The mode_bitmask of ILLUMINATOR_STATUS."""
+        """Return the mode_bitmask of ILLUMINATOR_STATUS."""
         if self.mode_bitmask is not None:
             return self.mode_bitmask
         return sum({1 << mode if self.shifted_bitmask else mode for mode in self.modes})

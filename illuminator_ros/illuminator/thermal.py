@@ -74,17 +74,17 @@ class ThermalModel:
 
     @property
     def flags(self) -> ErrorFlag:
-        """The error flags that it makes the light report: without a sensor it knows no heat."""
+        """Return the error flags of its report: without a sensor it knows no heat."""
         return ErrorFlag.THERMISTOR_FAILURE if self.sensor_failed else self._flags
 
     @property
     def reading(self) -> float:
-        """The temperature as the light reports it, degC."""
+        """Return the temperature as the light reports it, degC."""
         return BROKEN_READING if self.sensor_failed else self.temperature
 
     @property
     def output(self) -> float:
-        """The share (0..1) of the commanded brightness that the light gives."""
+        """Return the share (0..1) of the commanded brightness that the light gives."""
         if self.flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN:
             return 0.0
         return self.properties.throttle_to if self.flags & ErrorFlag.THERMAL_THROTTLING else 1.0

@@ -73,7 +73,7 @@ class SigningCounters:
 
     @property
     def refusals(self) -> str:
-        """The refused frames and why, for people; '' where there are none."""
+        """Return the refused frames and why, for people; '' where there are none."""
         return ', '.join(f'{number} frames refused: {reason}' for number, reason in (
             (self.bad, 'signed with another key'),
             (self.replayed, 'time stamps too old or repeated (replay protection); '

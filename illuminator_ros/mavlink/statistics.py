@@ -52,12 +52,12 @@ class WindowedCounter(NamedTuple):
 
     @property
     def growth(self) -> int:
-        """The growth within the window."""
+        """Return the growth within the window."""
         return self.total - self.samples[0][1] if self.samples else 0
 
     @property
     def rate(self) -> float:
-        """The growth per second."""
+        """Return the growth per second."""
         elapsed = self.time - self.samples[0][0] if self.samples else 0.0
         return self.growth / elapsed if elapsed > 0 else 0.0
 
@@ -128,7 +128,7 @@ class SequenceCounter:
 
     @property
     def recent_loss(self) -> float:
-        """The share of frames lost recently, %, as of the last sample."""
+        """Return the share of frames lost recently, %, as of the last sample."""
         lost, received = self._recently_lost.growth, self._recently_received.growth
         return 100.0 * max(lost, 0) / (lost + received) if lost + received > 0 else 0.0
 
@@ -159,12 +159,12 @@ class Traffic:
 
     @property
     def received_rate(self) -> float:
-        """The bytes received per second recently, as of the last sample."""
+        """Return the bytes received per second recently, as of the last sample."""
         return self._in.rate
 
     @property
     def sent_rate(self) -> float:
-        """The bytes sent per second recently, as of the last sample."""
+        """Return the bytes sent per second recently, as of the last sample."""
         return self._out.rate
 
     def snapshot(self, now: float) -> Traffic:

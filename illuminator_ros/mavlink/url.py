@@ -243,7 +243,8 @@ class _Parser:
 
     def serial(self, rest: str, hardware_flow_control: bool = False) -> Url:
         if not rest.startswith('/'):
-            self.fail(f'{rest!r} is not an absolute device path, as in serial:///dev/ttyACM0:57600')
+            self.fail(f'{rest!r} is not an absolute device path, '
+                      'as in serial:///dev/ttyACM0:57600')
         device, colon, baud = rest.rpartition(':')
         if not colon:
             return SerialUrl(rest, MAVROS_BAUD, hardware_flow_control)

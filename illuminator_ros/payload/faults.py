@@ -137,7 +137,7 @@ class Fault:
 
     @property
     def default_text(self) -> str:
-        """The default value for people, '' if the fault has no value."""
+        """Return the default value for people, '' if the fault has no value."""
         return (self.text(self.default) or 'for ever') if self.read else ''
 
     def text(self, value: Any) -> str:

@@ -141,11 +141,11 @@ class Change(Protocol[S_contra]):
 
     @property
     def command(self) -> int:
-        """The MAV_CMD that makes it."""
+        """Return the MAV_CMD that makes it."""
 
     @property
     def params(self) -> tuple[float, ...]:
-        """The params of the command."""
+        """Return the params of the command."""
 
     @property
     def goal(self) -> str:

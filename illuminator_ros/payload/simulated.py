@@ -100,7 +100,7 @@ class ConsoleCommand(Generic[T_contra, R_co]):
 
     @property
     def name(self) -> str:
-        """The word that a line begins with."""
+        """Return the word that a line begins with."""
         return self.usage.partition(' ')[0]
 
 
@@ -177,7 +177,7 @@ class SimulatedType(Generic[D]):
 
     @cached_property
     def all_settings(self) -> Mapping[str, Setting]:
-        """The settings of the payload, and those of every payload."""
+        """Return the settings of the payload, and those of every payload."""
         return {
             **self.settings,
             'fault': Setting(f'[{self.noun.upper()}:]NAME[=VALUE]', 'a fault, see below',
@@ -266,7 +266,7 @@ class SimulatedComponent(Generic[D]):
 
     @property
     def behaviour(self) -> Any:
-        """The behaviour of the device, of the payload's type."""
+        """Return the behaviour of the device, of the payload's type."""
         return self.device.behaviour
 
     def power_on(self, now: float) -> None:

@@ -83,7 +83,7 @@ class Publication:
     """
 
     name: str
-    type: Any
+    type: Any  # noqa: A003
     qos: QoSProfile | None = None
 
 
@@ -99,7 +99,7 @@ class RequestService:
     """
 
     name: str
-    type: Any
+    type: Any  # noqa: A003
     start: Callable[[Any, float, Callable[[bool, str], None]], None]
     limit: int = MAX_PENDING
 
@@ -116,7 +116,7 @@ class CommandTopic:
     """
 
     name: str
-    type: Any
+    type: Any  # noqa: A003
     take: Callable[[Any, float], None]
     check: Callable[[Any], Any] = lambda value: value
 

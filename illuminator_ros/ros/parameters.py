@@ -73,7 +73,7 @@ class ParameterSpec:
     constraints: str = ''
 
     @property
-    def type(self) -> Parameter.Type:
+    def type(self) -> Parameter.Type:  # noqa: A003
         """Return the parameter's type."""
         return _TYPES[type(self.default)][0]
 

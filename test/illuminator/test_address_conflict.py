@@ -62,7 +62,7 @@ def test_lights_without_a_clock_are_told_by_what_they_show():
     conflict = AddressConflict()
     for number in range(8):
         conflict.take(Status.from_message(status_message(0, enable=number % 2)), 1000.0 + number,
-                     commanded=False)
+                      commanded=False)
     assert conflict.detected
 
 

@@ -106,7 +106,7 @@ class Simulation:
 
     @property
     def greeted_at(self) -> list[float]:
-        """Times at which a new peer may have appeared."""
+        """Return the times at which a new peer may have appeared."""
         return list(self.endpoint.greetings)
 
 
