@@ -23,8 +23,7 @@ from .events import AnyLightEvent, ClientSnapshot, LightForgotten, LightFound
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
-from ..mavlink.command import CommandSender, CommandStatus
-from ..mavlink.deadline_queue import DeadlineQueue
+from ..mavlink.command import CommandSender
 from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, MavType, Message
 from ..payload.discovery import Discovery
 from ..payload.events import Listeners
@@ -57,10 +56,8 @@ class IlluminatorClient:
         self.commands = commands
         self.settings = settings
         self.events: Listeners[AnyLightEvent] = Listeners()
-        self._discovery = Discovery(self._make, self._drop, wanted)
-        self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
-        # Lights whose deadline may have changed.
-        self._dirty: set[Address] = set()
+        self._discovery = Discovery(
+            self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
 
     @property
     def lights(self) -> Mapping[Address, Light]:
@@ -96,22 +93,17 @@ class IlluminatorClient:
         return Light(address, self.commands, self.settings, emit, self._changed)
 
     def _changed(self, light: Light, now: float) -> None:
-        self._dirty.add(light.address)
+        self._discovery.changed(light.address)
         if light.has_answered:
-            self._prove(light, now)
+            self._discovery.prove(light.address, now)
 
-    def _prove(self, light: Light, now: float) -> None:
-        if self._discovery.prove(light.address):
-            self.events.emit(LightFound(light.address))
-            for event in light.snapshot(now).events():
-                self.events.emit(event)
+    def _found(self, light: Light, now: float) -> None:
+        self.events.emit(LightFound(light.address))
+        for event in light.snapshot(now).events():
+            self.events.emit(event)
 
-    def _drop(self, light: Light) -> None:
-        """End the commands of a light that the discovery has forgotten."""
-        self._dirty.discard(light.address)
-        self._deadlines.remove(light.address)
-        self.commands.end_all(light.heard_at, CommandStatus.CANCELLED, light.address)
-        self._dirty.discard(light.address)
+    def _forgotten(self, light: Light) -> None:
+        self.events.emit(LightForgotten(light.address))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
@@ -126,59 +118,28 @@ class IlluminatorClient:
         """See :meth:`Payload.link_closed`."""
         for light in self._discovery:
             light.link_closed(now, reason)
-            self._dirty.add(light.address)
+            self._discovery.changed(light.address)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
-            light = self._discovery.hear(source, now, proved=True)
-            if light:
-                self._prove(light, now)
+            if light := self._discovery.hear(source, now, proved=True):
                 light.take_status(Status.from_message(message), now)
-        elif isinstance(message, Heartbeat):
-            light = (self._discovery.hear(source, now, proved=False)
-                     if message.type == MavType.ILLUMINATOR else self._discovery.get(source))
-            if light:
+        elif isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR:
+            if light := self._discovery.hear(source, now, proved=False):
                 light.heard(now)
-        elif isinstance(message, ComponentInformationBasic):
-            light = self._discovery.get(source)
-            if light:
-                self._prove(light, now)
+        elif light := self._discovery.get(source):
+            self._discovery.changed(source)
+            if isinstance(message, Heartbeat):
+                light.heard(now)
+            elif isinstance(message, ComponentInformationBasic):
+                self._discovery.prove(source, now)
                 light.take_identity(Identity.from_message(message), now)
-        else:
-            return
-        if light:
-            self._dirty.add(source)
-
-    def _enter_deadlines(self) -> None:
-        for address in self._dirty:
-            light = self._discovery.get(address)
-            if light is not None:
-                self._deadlines.set(address, min(
-                    light.next_deadline(), self._discovery.forgotten_at(light)))
-        self._dirty.clear()
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        self._enter_deadlines()
-        for address in self._deadlines.due(now):
-            light = self._discovery.get(address)
-            if light is None:
-                continue
-            if now >= self._discovery.forgotten_at(light):
-                self._forget(light)
-            else:
-                light.poll(now)
-                self._dirty.add(address)
-
-    def _forget(self, light: Light) -> None:
-        was_announced = light.address in self.lights
-        self._discovery.forget(light.address)
-        self._drop(light)
-        if was_announced:
-            self.events.emit(LightForgotten(light.address))
+        self._discovery.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        self._enter_deadlines()
-        return self._deadlines.next_deadline()
+        return self._discovery.next_deadline()

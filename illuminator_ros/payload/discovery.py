@@ -26,6 +26,8 @@ from collections.abc import Callable, Iterator
 import math
 from typing import Generic, Protocol, TypeVar
 
+from ..mavlink.command import CommandSender, CommandStatus
+from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import Address
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
@@ -43,12 +45,22 @@ class Device(Protocol):
     """A device as the discovery sees it."""
 
     @property
+    def address(self) -> Address:
+        """The address that it sends from."""
+
+    @property
     def lost_at(self) -> float:
         """When it was lost, s; infinity while it is heard."""
 
     @property
     def was_commanded(self) -> bool:
         """Whether a user has ever sent it a command."""
+
+    def poll(self, now: float) -> None:
+        """Do everything that is due."""
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
 
 
 D = TypeVar('D', bound=Device)
@@ -59,7 +71,9 @@ class Discovery(Generic[D]):
     The devices of one kind on a link.
 
     :param make: makes the device at an address.
-    :param drop: called with a candidate that another one takes the place of.
+    :param commands: ends the commands to a device that is dropped.
+    :param found: called when a device is announced.
+    :param forgotten: called when an announced device was dropped.
     :param wanted: tells whether a device at an address is of interest; others are ignored.
     :ivar devices: the announced devices, by address, in the order of their announcement.
     :ivar ignored: the first devices that are not wanted, by address.
@@ -67,17 +81,24 @@ class Discovery(Generic[D]):
     """
 
     def __init__(
-        self, make: Callable[[Address], D], drop: Callable[[D], None],
-        wanted: Callable[[Address], bool],
+        self, make: Callable[[Address], D], commands: CommandSender, *,
+        found: Callable[[D, float], None] = lambda device, now: None,
+        forgotten: Callable[[D], None] = lambda device: None,
+        wanted: Callable[[Address], bool] = lambda address: True,
     ) -> None:
         self.devices: dict[Address, D] = {}
         self.ignored: dict[Address, None] = {}
         self.limit_reached = False
         self._make = make
-        self._drop = drop
+        self._commands = commands
+        self._found = found
+        self._forgotten = forgotten
         self._wanted = wanted
         self._candidates: dict[Address, D] = {}
         self._found_at: dict[Address, float] = {}
+        self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
+        # Devices whose deadline may have changed.
+        self._changed: set[Address] = set()
 
     def __iter__(self) -> Iterator[D]:
         """Return the devices and the candidates."""
@@ -92,13 +113,18 @@ class Discovery(Generic[D]):
         """
         Return the device at an address; a new one becomes a candidate.
 
-        :param proved: whether the message proves that it is a device, which entitles it to a
-            place. Otherwise it may replace a candidate only after :data:`CANDIDATE_TIME`.
+        :param proved: whether the message proves that it is a device, which announces it.
+            Otherwise it may replace a candidate only after :data:`CANDIDATE_TIME`.
         :return: None if the device is not wanted, or if there are too many.
         """
-        device = self.devices.get(address) or self._candidates.get(address)
+        device = self.get(address) or self._candidate(address, now, proved=proved)
         if device is not None:
-            return device
+            self.changed(address)
+            if proved:
+                self.prove(address, now)
+        return device
+
+    def _candidate(self, address: Address, now: float, *, proved: bool) -> D | None:
         if not self._wanted(address):
             if len(self.ignored) < MAX_IGNORED:
                 self.ignored[address] = None
@@ -110,27 +136,57 @@ class Discovery(Generic[D]):
             oldest, found_at = next(iter(self._found_at.items()))
             if not proved and now < found_at + CANDIDATE_TIME:
                 return None
-            self._drop(self.forget(oldest))
+            self._drop(oldest, now)
         device = self._candidates[address] = self._make(address)
         self._found_at[address] = now
         return device
 
-    def prove(self, address: Address) -> bool:
-        """Note a valid status or an answer; return whether the device is announced by it."""
-        if address not in self._candidates or len(self.devices) >= MAX_DEVICES:
-            return False
-        del self._found_at[address]
-        self.devices[address] = self._candidates.pop(address)
-        return True
+    def prove(self, address: Address, now: float) -> None:
+        """Note a valid status or an answer, by which a candidate is announced."""
+        if address in self._candidates and len(self.devices) < MAX_DEVICES:
+            del self._found_at[address]
+            device = self.devices[address] = self._candidates.pop(address)
+            self._found(device, now)
 
-    def forgotten_at(self, device: D) -> float:
-        """Return when a device is dropped if it stays silent, s."""
+    def changed(self, address: Address) -> None:
+        """Note that the deadline of a device may have changed."""
+        self._changed.add(address)
+
+    def _forgotten_at(self, device: D) -> float:
         return math.inf if device.was_commanded else device.lost_at + FORGET_AFTER
 
-    def forget(self, address: Address) -> D:
-        """Drop a device or a candidate, and return it."""
+    def _drop(self, address: Address, now: float) -> None:
         self._found_at.pop(address, None)
-        if address in self._candidates:
-            return self._candidates.pop(address)
-        self.limit_reached = False
-        return self.devices.pop(address)
+        self._deadlines.remove(address)
+        self._candidates.pop(address, None)
+        device = self.devices.pop(address, None)
+        self._commands.end_all(now, CommandStatus.CANCELLED, address)
+        if device is not None:
+            self.limit_reached = False
+            self._forgotten(device)
+
+    def poll(self, now: float) -> None:
+        """Poll the devices that have something to do, and forget those that were silent."""
+        self._enter_deadlines()
+        for address in self._deadlines.due(now):
+            device = self.get(address)
+            if device is None:
+                continue
+            if now >= self._forgotten_at(device):
+                self._drop(address, now)
+            else:
+                device.poll(now)
+                self.changed(address)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        self._enter_deadlines()
+        return self._deadlines.next_deadline()
+
+    def _enter_deadlines(self) -> None:
+        for address in self._changed:
+            device = self.get(address)
+            if device is not None:
+                self._deadlines.set(
+                    address, min(device.next_deadline(), self._forgotten_at(device)))
+        self._changed.clear()
