@@ -23,7 +23,7 @@ from illuminator_ros.cli.simulator.scenario import components, Scenario, scenari
 from illuminator_ros.cli.simulator.view import look
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.command import CommandResult, CommandSender
+from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
 from illuminator_ros.payload.request import Result
@@ -53,7 +53,7 @@ class Vehicle:
         self.lights = IlluminatorClient(commands, Settings())
         self.winches = WinchClient(commands)
         self.reports: list[WinchReport] = []
-        self.results: list[CommandResult] = []
+        self.results: list[Result] = []
         self.sent: list[tuple[Address, Message]] = []
         self.winches.events.subscribe(self.reports.append)
         self.component = Component(commands, [self.lights, self.winches])
@@ -61,10 +61,13 @@ class Vehicle:
         self.component.link_opened(self.now)
         self.run(3.5)
 
-    def done(self, result: CommandResult, now: float) -> None:
-        self.results.append(result)
+    def release(self, length: float) -> None:
+        def done(result: Result, now: float) -> None:
+            self.results.append(result)
 
-    def run(self, seconds: float) -> None:
+        self.winches.winches[DECK].release(length, self.now, done)
+
+    def run(self, seconds: float, step: float = 0.01) -> None:
         end = self.now + seconds
         while self.now < end:
             ends: tuple[Endpoint, Endpoint] = (self.devices, self.component)
@@ -74,7 +77,7 @@ class Vehicle:
                     source, message = side.outgoing.popleft()
                     self.sent.append((source, message))
                     other.receive(source, message, self.now)
-            self.now += 0.01
+            self.now += step
 
 
 @pytest.fixture
@@ -83,30 +86,50 @@ def vehicle() -> Vehicle:
 
 
 def test_one_component_with_one_heartbeat_finds_both(vehicle: Vehicle) -> None:
-    assert (set(vehicle.lights.lights), vehicle.winches.winches) == ({LIGHT}, {DECK})
+    assert (set(vehicle.lights.lights), set(vehicle.winches.winches)) == ({LIGHT}, {DECK})
     beats = [one for one, message in vehicle.sent if isinstance(message, Heartbeat)]
     assert beats.count(BRIDGE) == beats.count(LIGHT) == beats.count(DECK) == 4
 
 
-def test_each_payload_gets_the_result_of_its_own_command(vehicle: Vehicle) -> None:
+def test_each_payload_gets_the_result_of_its_own_request(vehicle: Vehicle) -> None:
     lit: list[Result] = []
     vehicle.lights.lights[LIGHT].enable(True, vehicle.now, lambda result, now: lit.append(result))
-    vehicle.winches.release(DECK, 5.0, vehicle.now, vehicle.done)
-    vehicle.winches.release(DECK, -9.0, vehicle.now, vehicle.done)
+    vehicle.release(5.0)
+    vehicle.release(-9.0)
     vehicle.run(1.0)
     assert [one.success for one in lit] == [True]
-    assert [one.describe() for one in vehicle.results] == [
-        'MAV_RESULT_ACCEPTED', 'MAV_RESULT_DENIED']
+    assert [one.message.partition(' (')[0] for one in vehicle.results] == [
+        '5 m released, confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED',
+        'refused: MAV_RESULT_DENIED']
     assert vehicle.reports[-1] == WinchReport(DECK, 5.0)
 
 
-def test_the_faults_of_every_component_are_those_of_the_winch_too() -> None:
-    vehicle = Vehicle()
+@pytest.mark.parametrize(('fault', 'message'), [
+    ('refuse=failed', 'refused: MAV_RESULT_FAILED'),
+    ('lie', 'but WINCH_STATUS shows 0 m'), ('drop=1', 'no acknowledgement')])
+def test_a_release_that_is_not_shown_by_a_status_is_no_success(
+        fault: str, message: str, vehicle: Vehicle) -> None:
     for component in vehicle.devices.components:
-        component.behave(component.device.faults.add(component.behaviour, 'refuse=failed'), 0.0)
-    vehicle.winches.release(DECK, 5.0, vehicle.now, vehicle.done)
-    vehicle.run(1.0)
-    assert [one.describe() for one in vehicle.results] == ['MAV_RESULT_FAILED']
+        component.behave(component.device.faults.add(component.behaviour, fault), vehicle.now)
+    vehicle.release(5.0)
+    vehicle.run(5.0)
+    (result,) = vehicle.results
+    assert (result.success, message in result.message) == (False, True), result.message
+
+
+@pytest.mark.parametrize(('commanded', 'left'), [(False, set()), (True, {DECK})])
+def test_a_silent_winch_is_forgotten_unless_it_was_commanded(
+        vehicle: Vehicle, commanded: bool, left: set[Address]) -> None:
+    if commanded:
+        vehicle.release(1.0)
+        vehicle.run(1.0)
+    for component in vehicle.devices.components:
+        component.behave(
+            component.device.faults.add(component.behaviour, 'silence'), vehicle.now)
+    vehicle.run(60.0, step=0.5)
+    assert set(vehicle.winches.winches) == {DECK}
+    vehicle.run(5.0, step=0.5)
+    assert set(vehicle.winches.winches) == left
 
 
 def test_the_console_gives_each_command_to_the_components_that_have_it() -> None:

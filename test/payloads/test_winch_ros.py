@@ -67,7 +67,7 @@ def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
         def is_released() -> int:
             # The first messages may come before the node has found the publisher.
             publisher.publish(Float32(data=2.5))
-            return bridge.count('~/cmd/release: MAV_RESULT_ACCEPTED')
+            return bridge.count('confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED')
 
         eventually(is_released)
         length.wait(lambda message: message.data >= 2.5)

@@ -24,10 +24,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+import math
 
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.command import Command, CommandSender, Done
-from illuminator_ros.payload import simulated
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.payload import request, simulated
+from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.events import Listeners
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.registry import PayloadType
@@ -39,6 +41,8 @@ WINCH = PayloadType(
 MAV_TYPE_WINCH = 42
 DO_WINCH = 42600
 WINCH_RELATIVE_LENGTH_CONTROL = 1
+# s without a message after which a winch is lost.
+TIMEOUT = 3.0
 
 
 @mav.define(9005, 'WINCH_STATUS')
@@ -64,44 +68,124 @@ class WinchReport:
     line_length: float
 
 
+@dataclass(frozen=True)
+class Release:
+    """
+    Releases line, m, or winds it in if negative.
+
+    :param line_length: the released line afterwards, m.
+    """
+
+    length: float
+    line_length: float
+    note: str = ''
+    command: int = DO_WINCH
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """See :class:`Change`."""
+        return 1, WINCH_RELATIVE_LENGTH_CONTROL, self.length
+
+    @property
+    def goal(self) -> str:
+        """See :class:`Change`."""
+        return f'{self.line_length:g} m released'
+
+    def shown_by(self, status: WinchStatus) -> bool:
+        """See :class:`Change`."""
+        return abs(status.line_length - self.line_length) < 0.01
+
+    def evidence(self, status: WinchStatus) -> str:
+        """See :class:`Change`."""
+        return 'confirmed by WINCH_STATUS'
+
+    def actual(self, status: WinchStatus) -> str:
+        """See :class:`Change`."""
+        return f'{status.line_length:g} m'
+
+
+class Winch:
+    """One winch: a :class:`Device` of the discovery."""
+
+    def __init__(
+        self, address: mav.Address, commands: CommandSender, ended: request.CommandDone,
+    ) -> None:
+        self.address = address
+        self.lost_at = math.inf
+        self.was_commanded = False
+        self._heard_at = 0.0
+        self._line_length = 0.0
+        self._target = request.Target(
+            address, commands, ended, kind='winch', status_id=WinchStatus.id,
+            status_name='WINCH_STATUS')
+        self._requests = request.RequestQueue[WinchStatus](self._target)
+
+    def heard(self, now: float) -> None:
+        """Note that the winch is alive."""
+        self._heard_at, self.lost_at = now, math.inf
+
+    def take_status(self, status: WinchStatus, now: float) -> None:
+        """Take a status."""
+        self.heard(now)
+        self._line_length = status.line_length
+        self._requests.take(request.Report(status, sent_by=now, has_clock=False), now)
+
+    def release(self, length: float, now: float, done: request.Done) -> None:
+        """Release line, m, or wind it in if negative; ``done`` gets the confirmed result."""
+        self.was_commanded = True
+        self._requests.submit(request.Request(
+            self._target, lambda now: Release(length, self._line_length + length),
+            lambda result, change, status, now: done(result, now), now=now, limit=now + 30.0), now)
+
+    def poll(self, now: float) -> None:
+        """See :class:`Device`."""
+        if now >= self._heard_at + TIMEOUT:
+            self.lost_at = min(self.lost_at, now)
+        self._requests.poll(now)
+
+    def next_deadline(self) -> float:
+        """See :class:`Device`."""
+        lost = math.inf if self.lost_at < math.inf else self._heard_at + TIMEOUT
+        return min(lost, self._requests.next_deadline())
+
+
 class WinchClient:
     """
-    Finds winches on a link and releases their line.
+    Finds winches on a link; each releases line.
 
     :ivar events: a :class:`WinchReport` for each status.
+    :ivar winches: those that have sent a status, by address.
     """
 
     messages = (mav.Heartbeat, WinchStatus)
 
     def __init__(self, commands: CommandSender) -> None:
         self.events: Listeners[WinchReport] = Listeners()
-        self.winches: set[mav.Address] = set()
+        self._discovery = Discovery(self._make, commands)
+        self.winches: Mapping[mav.Address, Winch] = self._discovery.devices
+        self.poll = self._discovery.poll
+        self.next_deadline = self._discovery.next_deadline
         self._commands = commands
 
-    def release(self, winch: mav.Address, length: float, now: float, done: Done) -> None:
-        """Release line, m, or wind it in if negative; ``done`` gets the outcome."""
-        self._commands.start(
-            Command(winch, DO_WINCH, (1, WINCH_RELATIVE_LENGTH_CONTROL, length)), now, done)
+    def _make(self, address: mav.Address) -> Winch:
+        return Winch(address, self._commands,
+                     lambda result, now: self._discovery.changed(address))
 
-    def receive(self, source: mav.Address, message: object, now: float) -> None:
+    def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
-        if isinstance(message, mav.Heartbeat) and message.type == MAV_TYPE_WINCH:
-            self.winches.add(source)
-        elif isinstance(message, WinchStatus) and source in self.winches:
-            self.events.emit(WinchReport(source, message.line_length))
+        if isinstance(message, WinchStatus):
+            if winch := self._discovery.hear(source, now, proved=True):
+                winch.take_status(message, now)
+                self.events.emit(WinchReport(source, message.line_length))
+        elif (isinstance(message, mav.Heartbeat) and message.type == MAV_TYPE_WINCH
+                and (winch := self._discovery.hear(source, now, proved=False))):
+            winch.heard(now)
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return float('inf')
 
 
 class SimulatedWinch(simulated.SimulatedDevice):
@@ -120,7 +204,7 @@ class SimulatedWinch(simulated.SimulatedDevice):
         """See :meth:`SimulatedDevice.streams`."""
         return {WinchStatus.id: 1.0}
 
-    def message(self, message_id: int, now: float) -> object:
+    def message(self, message_id: int, now: float) -> mav.Message | None:
         """See :meth:`SimulatedDevice.message`."""
         if message_id == WinchStatus.id:
             return WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)

@@ -16,18 +16,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
 import math
 
-from illuminator_ros.mavlink.command import CommandResult
+from illuminator_ros.payload.request import Result
 from illuminator_ros.ros.node import CommandTopic, NodeInterface, Publication
-from illuminator_ros.ros.payload import Host, RosPayload, ShutdownReport
+from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient, WinchReport
 from std_msgs.msg import Float32
 
 
-class WinchNode:
-    """Serves all winches of a link with one node."""
+class WinchNode(ServedPayload):
+    """Serves all winches of a link with one node; a winch stays as it is at the end."""
 
     def __init__(self, client: WinchClient, host: Host) -> None:
         self._client = client
@@ -41,21 +40,11 @@ class WinchNode:
         self._interface.publish('line_length', report.line_length)
 
     def _release(self, length: float, now: float) -> None:
-        for winch in self._client.winches:
-            self._client.release(winch, length, now, self._released)
+        for winch in self._client.winches.values():
+            winch.release(length, now, self._released)
 
-    def _released(self, result: CommandResult, now: float) -> None:
-        self._log.info(f'~/cmd/release: {result}', 'release')
-
-    def poll(self, now: float) -> None:
-        """See :meth:`ServedPayload.poll`."""
-
-    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
-        """See :meth:`ServedPayload.shut_down`; a winch stays as it is."""
-        return {}
-
-    def close(self) -> None:
-        """See :meth:`ServedPayload.close`."""
+    def _released(self, result: Result, now: float) -> None:
+        self._log.info(f'~/cmd/release: {result.message}', 'release')
 
 
 def _finite(length: float) -> float:

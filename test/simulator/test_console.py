@@ -21,13 +21,14 @@ from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.faults import Behaviour
 import pytest
 
 
 class Console:
     """Two lights, ``bow`` and 1/244, and what a person types."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.lights = simulated_lights([
             IlluminatorProperties(address=Address(1, 243), name='bow'),
             IlluminatorProperties(address=Address(1, 244))], 0.0)
@@ -35,38 +36,39 @@ class Console:
         self.lights.poll(0.0)
         self.lights.outgoing.clear()
 
-    def enter(self, line, now=10.0):
+    def enter(self, line: str, now: float = 10.0) -> str:
         return execute(line, self.lights.components, now)
 
     @property
-    def behaviour(self):
-        return self.lights.components[0].behaviour
+    def behaviour(self) -> Behaviour:
+        return self.lights.components[0].device.behaviour
 
-    def status(self, now):
+    def status(self, now: float) -> IlluminatorStatus:
         return self.lights.components[0].device.status(now)
 
 
 @pytest.fixture
-def console():
+def console() -> Console:
     return Console()
 
 
 @pytest.mark.parametrize(('line', 'expected'), [
     ('on', (True, True)), ('all on', (True, True)), ('bow on', (True, False)),
     ('1/244 on', (False, True)), ('off', (False, False))])
-def test_a_line_is_for_all_lights_or_for_the_one_that_it_names(console, line, expected):
+def test_a_line_is_for_all_lights_or_for_the_one_that_it_names(
+        console: Console, line: str, expected: tuple[bool, bool]) -> None:
     assert console.enter(line) == 'done'
     assert (console.bow.enabled, console.other.enabled) == expected
 
 
-def test_a_change_by_hand_is_followed_by_a_status(console):
+def test_a_change_by_hand_is_followed_by_a_status(console: Console) -> None:
     console.enter('bow brightness 30')
     ((source, status),) = console.lights.outgoing
     assert isinstance(status, IlluminatorStatus)
     assert (source, status.brightness) == (Address(1, 243), 30.0)
 
 
-def test_each_line_changes_its_part_of_the_configuration_only(console):
+def test_each_line_changes_its_part_of_the_configuration_only(console: Console) -> None:
     for line, params in (
             ('strobe 0.5', (1.0, 100.0, 0.5, 50.0)), ('strobe 0.5 25', (1.0, 100.0, 0.5, 25.0)),
             ('brightness 30', (1.0, 30.0, 0.5, 25.0)),
@@ -88,7 +90,8 @@ def test_each_line_changes_its_part_of_the_configuration_only(console):
     ('fault bow:drop=0.2', 'for one component: bow fault drop=0.2'),
     ('--fault bow:drop', 'for one component: bow fault drop'),
     ('1/243:refuse=failed', 'for one component: 1/243 fault refuse=failed')])
-def test_a_line_that_cannot_be_executed_is_answered_and_changes_nothing(console, line, answer):
+def test_a_line_that_cannot_be_executed_is_answered_and_changes_nothing(
+        console: Console, line: str, answer: str) -> None:
     lamp = console.bow
     before = lamp.configuration, lamp.enabled, lamp.thermal.temperature, console.behaviour
     assert answer in console.enter(line)
@@ -97,7 +100,7 @@ def test_a_line_that_cannot_be_executed_is_answered_and_changes_nothing(console,
 
 
 @pytest.mark.parametrize('name', [name for name in FAULTS if name != 'reboot'])
-def test_each_fault_can_be_typed_shown_and_ended(console, name):
+def test_each_fault_can_be_typed_shown_and_ended(console: Console, name: str) -> None:
     normal = console.behaviour
     assert console.enter(f'bow {name}') == 'done'
     shown, other = console.enter('faults').splitlines()
@@ -113,7 +116,7 @@ def test_each_fault_can_be_typed_shown_and_ended(console, name):
 
 
 @pytest.mark.parametrize('line', ['reboot', 'fault reboot'])
-def test_a_restart_without_an_interval_happens_once(console, line):
+def test_a_restart_without_an_interval_happens_once(console: Console, line: str) -> None:
     console.enter('on')
     console.enter(line)
     assert (console.bow.enabled, console.bow.uptime_ms(10.0)) == (False, 0)
@@ -121,7 +124,7 @@ def test_a_restart_without_an_interval_happens_once(console, line):
     assert console.bow.uptime_ms(60.0) == 50_000
 
 
-def test_ambient_and_own_temperature_can_be_set(console):
+def test_ambient_and_own_temperature_can_be_set(console: Console) -> None:
     console.enter('ambient 90')
     assert console.status(2000.0).temp_c == pytest.approx(90.0, abs=0.1)
     assert console.status(2000.0).error_status == ErrorFlag.THERMAL_THROTTLING
@@ -129,15 +132,14 @@ def test_ambient_and_own_temperature_can_be_set(console):
     assert console.status(2000.1).error_status == 3
 
 
-def test_the_state_of_each_light_is_shown(console):
+def test_the_state_of_each_light_is_shown(console: Console) -> None:
     console.enter('bow on')
     first, second = console.enter('status').splitlines()
     assert first.startswith('1/243 bow') and '  ON  ' in first
     assert second.startswith('1/244') and '  off  ' in second
 
 
-def test_help_has_each_command_and_each_fault(console):
+def test_help_has_each_command_and_each_fault(console: Console) -> None:
     text = console.enter('help')
-    assert [one.usage for one in (*COMMANDS, *LIGHT_COMMANDS)
-            if f'  {one.usage}' not in text] == []
-    assert [name for name in FAULTS if f'  {name}' not in text] == []
+    words = [*(one.usage for one in COMMANDS), *(one.usage for one in LIGHT_COMMANDS), *FAULTS]
+    assert [word for word in words if f'  {word}' not in text] == []

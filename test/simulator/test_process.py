@@ -14,9 +14,10 @@
 
 """The simulator as a process: its output is blocked, closed, full or of another encoding."""
 
+from collections.abc import Callable
 import contextlib
 import os
-import signal
+from pathlib import Path
 import subprocess
 import sys
 
@@ -30,54 +31,59 @@ from support.waiting import PATIENCE
 SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
 
 
-@contextlib.contextmanager
-def simulator(*arguments, **streams):
-    """Run a simulator with standard streams of its own."""
-    process = subprocess.Popen([*SIMULATOR, *arguments], env=environment(), cwd=ROOT,
-                               preexec_fn=prepare_child, **streams)
+def assert_served(*command: str, stdout: int | None, stderr: int | None) -> None:
+    """Assert that a simulator obeys a bridge, and ends on SIGTERM without delay."""
+    port = free_port()
+    bridge = Bridge(f'udpin:127.0.0.1:{port}')
+    process = subprocess.Popen(
+        [*command, f'udpout://127.0.0.1:{port}'], env=environment(), cwd=ROOT, stdout=stdout,
+        stderr=stderr, stdin=subprocess.DEVNULL, preexec_fn=prepare_child)
     try:
-        yield process
+        assert bridge.enable(True).success
+        process.terminate()
+        assert process.wait(1.5) == 0
     finally:
+        bridge.stop()
         process.kill()
         process.wait()
 
 
 @pytest.mark.parametrize(('stream', 'make'), [
     ('stdout', os.pipe), ('stderr', os.pipe), ('stdout', os.openpty)])
-def test_a_reader_that_stops_reading_delays_no_command_and_no_sigterm(stream, make):
-    port = free_port()
+def test_a_reader_that_stops_reading_delays_no_command_and_no_sigterm(
+        stream: str, make: Callable[[], tuple[int, int]]) -> None:
     reading, writing = make()
     os.set_blocking(writing, False)
     with contextlib.suppress(BlockingIOError):
         while True:
             os.write(writing, bytes(4096))
     os.set_blocking(writing, True)
-    bridge = Bridge(f'udpin:127.0.0.1:{port}')
-    streams = {'stdin': subprocess.DEVNULL, 'stdout': subprocess.DEVNULL,
-               'stderr': subprocess.DEVNULL, stream: writing}
+    streams = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL, stream: writing}
     try:
-        with simulator(f'udpout://127.0.0.1:{port}', **streams) as process:
-            assert bridge.enable(True).success
-            process.send_signal(signal.SIGTERM)
-            assert process.wait(1.5) == 0
+        assert_served(*SIMULATOR, stdout=streams['stdout'], stderr=streams['stderr'])
     finally:
-        bridge.stop()
         os.close(reading)
         os.close(writing)
 
 
-def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped():
+@pytest.mark.parametrize('closed', ['<&-', '>&-', '<&- >&- 2>&-'])
+def test_lights_are_served_while_standard_streams_are_closed(closed: str) -> None:
+    command = f'exec {" ".join(SIMULATOR)} "$0" {closed}'
+    assert_served('sh', '-c', command, stdout=None, stderr=None)
+
+
+def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped() -> None:
     with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{free_port()}',
                       '--light', '1/243=Größe', env={'PYTHONIOENCODING': 'ascii'})) as program:
         program.wait_for(r'1/243 Gr\xf6\xdfe')
 
 
-def test_an_error_with_such_a_name_is_one_line():
+def test_an_error_with_such_a_name_is_one_line() -> None:
     done = run('illuminator_ros.simulator', '--fault', 'ö', env={'PYTHONIOENCODING': 'ascii'})
     assert (done.returncode, done.stderr.count('\n')) == (2, 1)
 
 
-def test_the_help_on_a_full_disk_ends_without_a_traceback():
+def test_the_help_on_a_full_disk_ends_without_a_traceback() -> None:
     with open('/dev/full', 'wb') as full:
         done = subprocess.run([*SIMULATOR, '--help'], env=environment(), cwd=ROOT, stdout=full,
                               stderr=subprocess.PIPE, preexec_fn=prepare_child,
@@ -85,7 +91,7 @@ def test_the_help_on_a_full_disk_ends_without_a_traceback():
     assert (done.returncode, done.stderr) == (0, b'')
 
 
-def test_output_to_a_file_is_written(tmp_path):
+def test_output_to_a_file_is_written(tmp_path: Path) -> None:
     """A console that quits at once; both streams of the process are one file."""
     output = tmp_path / 'output'
     with output.open('wb') as file:
@@ -96,23 +102,7 @@ def test_output_to_a_file_is_written(tmp_path):
     assert output.read_text().startswith('1 light: 1/243\n')
 
 
-@pytest.mark.parametrize('closed', ['<&-', '>&-', '<&- >&- 2>&-'])
-def test_lights_are_served_while_standard_streams_are_closed(closed):
-    port = free_port()
-    bridge = Bridge(f'udpin:127.0.0.1:{port}')
-    command = f'exec {" ".join(SIMULATOR)} udpout://127.0.0.1:{port} {closed}'
-    process = subprocess.Popen(['sh', '-c', command], env=environment(), cwd=ROOT,
-                               preexec_fn=prepare_child)
-    try:
-        assert bridge.enable(True).success
-        process.terminate()
-        assert process.wait(PATIENCE) == 0
-    finally:
-        bridge.stop()
-        process.kill()
-
-
-def test_the_first_message_of_a_peer_is_one_line():
+def test_the_first_message_of_a_peer_is_one_line() -> None:
     port = free_port()
     with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')) as program:
         bridge = Bridge(f'udpin:127.0.0.1:{port}')

@@ -14,6 +14,7 @@
 
 """The components that the command line and a file describe."""
 
+from pathlib import Path
 import sys
 
 from illuminator_ros.cli.simulator.options import parser
@@ -26,9 +27,11 @@ from illuminator_ros.cli.simulator.scenario import (
     SettingError,
 )
 from illuminator_ros.illuminator.model import Limits, Mode
-from illuminator_ros.illuminator.simulated_properties import FAULTS
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
+from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.illuminator.simulated_settings import SIMULATED
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.simulated import Description
 import pytest
 
 TYPES = [SIMULATED]
@@ -41,16 +44,16 @@ FILE = {
          'faults': {'drop': 0.2, 'thermistor': True}}]}
 
 
-def described(*arguments, file=None):
+def described(*arguments: str, file: object = None) -> list[Description[SimulatedIlluminator]]:
     return components(parser().parse_args(list(arguments)),
                       scenario(file, 'f.yaml', TYPES) if file else Scenario(), TYPES)
 
 
-def properties(*arguments, file=None):
+def properties(*arguments: str, file: object = None) -> list[IlluminatorProperties]:
     return [one.device.properties for one in described(*arguments, file=file)]
 
 
-def faults(light):
+def faults(light: Description[SimulatedIlluminator]) -> list[str]:
     return FAULTS.active(light.device.behaviour, light.device.normal)
 
 
@@ -61,18 +64,19 @@ def faults(light):
     (['--profile', 'reference'], ['255/0']),
     (['--profile', 'ardusub', '--count', '2'], ['1/1', '1/2']),
     (['--profile', 'reference', '--system-id', '9'], ['9/0'])])
-def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(arguments, addresses):
+def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(
+        arguments: list[str], addresses: list[str]) -> None:
     assert [f'{one.address} {one.name}'.rstrip() for one in described(*arguments)] == addresses
 
 
-def test_without_arguments_a_light_follows_the_protocol():
+def test_without_arguments_a_light_follows_the_protocol() -> None:
     (light,), (one,) = described(), properties()
     assert (one.limits, one.reported_bitmask, one.identity.serial_number) == (
         Limits(0.05, 10.0), 3, 'SIM-1-243')
     assert faults(light) == []
 
 
-def test_each_option_sets_its_property():
+def test_each_option_sets_its_property() -> None:
     (light,) = properties(
         '--vendor', 'ACME', '--model', 'Sun', '--software-version', '2.0', '--hardware-version',
         'B', '--serial-number', '0815', '--min-strobe-period', '0.2', '--max-strobe-period',
@@ -89,12 +93,12 @@ def test_each_option_sets_its_property():
     assert [one.seed for one in described('--seed', '3')] == [3]
 
 
-def test_several_lights_have_different_serial_numbers():
+def test_several_lights_have_different_serial_numbers() -> None:
     assert [one.identity.serial_number for one in properties(
         '--count', '2', '--serial-number', 'X')] == ['X-243', 'X-244']
 
 
-def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names():
+def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names() -> None:
     first, second = described(
         '--light', '1/243', '--light', '1/244=stern', '--fault', 'lie', '--fault',
         '1/243:drop=0.1,nan', '--fault', 'stern:slow')
@@ -102,7 +106,7 @@ def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names():
     assert first.device.behaviour.drop == 0.1
 
 
-def test_a_file_has_settings_for_all_lights_and_for_each():
+def test_a_file_has_settings_for_all_lights_and_for_each() -> None:
     bow, other = described(file=FILE)
     first, second = properties(file=FILE)
     assert (str(bow.address), bow.name, first.identity.serial_number) == ('1/243', 'bow', '815')
@@ -112,13 +116,13 @@ def test_a_file_has_settings_for_all_lights_and_for_each():
     assert (faults(bow), faults(other)) == (['lie'], ['drop', 'lie', 'thermistor'])
 
 
-def test_the_command_line_takes_precedence_over_the_file():
+def test_the_command_line_takes_precedence_over_the_file() -> None:
     lights = described('--ambient', '10', '--fault', 'bow:nan', file=FILE)
     assert [one.device.properties.thermal.ambient for one in lights] == [10, 10]
     assert faults(lights[0]) == ['lie', 'nan']
 
 
-def test_a_file_without_lights_leaves_their_number_to_the_command_line():
+def test_a_file_without_lights_leaves_their_number_to_the_command_line() -> None:
     assert len(described('--count', '2', file={'profile': 'ardusub'})) == 2
 
 
@@ -134,7 +138,7 @@ def test_a_file_without_lights_leaves_their_number_to_the_command_line():
     ({'lights': [{'id': f'1/{n}'} for n in range(1, 203)]}, '202 lights are more than 200'),
     ({'profile': 'x'}, "profile: 'x' is not one of default, reference"),
     ({'profiel': 'x'}, "no setting 'profiel'")])
-def test_an_error_in_a_file_names_its_place_and_the_reason(content, reason):
+def test_an_error_in_a_file_names_its_place_and_the_reason(content: object, reason: str) -> None:
     with pytest.raises(SettingError) as caught:
         described(file=content)
     assert reason in str(caught.value)
@@ -155,7 +159,8 @@ def test_an_error_in_a_file_names_its_place_and_the_reason(content, reason):
     (['--thermal', 'rise'], "--thermal: 'rise' is not one of ambient=VALUE"),
     (['--profile', 'x'], "--profile: 'x' is not one of default"),
     (['--ambient', 'x'], "--ambient: 'x' is not a number")])
-def test_options_that_contradict_each_other_are_refused_with_the_reason(arguments, reason):
+def test_options_that_contradict_each_other_are_refused_with_the_reason(
+        arguments: list[str], reason: str) -> None:
     with pytest.raises(SettingError) as caught:
         described(*arguments)
     assert reason in str(caught.value)
@@ -164,20 +169,22 @@ def test_options_that_contradict_each_other_are_refused_with_the_reason(argument
 @pytest.mark.parametrize(('arguments', 'reason'), [
     (['--count', '0'], '0 is outside 1 to 200'),
     (['--nope'], 'unrecognized arguments')])
-def test_a_wrong_option_is_one_line_with_exit_status_2(arguments, reason, capsys):
+def test_a_wrong_option_is_one_line_with_exit_status_2(
+        arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         described(*arguments)
     printed = capsys.readouterr().err
     assert (caught.value.code, reason in printed, printed.count('\n')) == (2, True, 1)
 
 
-def test_the_help_has_an_option_for_each_setting():
+def test_the_help_has_an_option_for_each_setting() -> None:
     text = parser().format_help()
     assert [name for name in SIMULATED.all_settings
             if f'--{name.replace("_", "-")}' not in text] == []
 
 
-def test_a_yaml_file_is_read_or_refused_with_the_reason(tmp_path, monkeypatch):
+def test_a_yaml_file_is_read_or_refused_with_the_reason(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / 'lights.yaml'
     path.write_text('url: udpin://127.0.0.1:1\nlights:\n  - {id: 1/9, ambient: 3}\n')
     found = load(str(path), TYPES)

@@ -18,9 +18,10 @@ import io
 import os
 import re
 import shutil
+from typing import Any
 
 from illuminator_ros.cli.simulator.view import LiveView, look, PlainView
-from illuminator_ros.illuminator.simulated import describe
+from illuminator_ros.illuminator.simulated import describe, SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorBehaviour,
@@ -30,25 +31,28 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
 
+Light = SimulatedComponent[SimulatedIlluminator]
 
-def simulated(**properties):
+
+def simulated(**properties: Any) -> Light:
     return SimulatedComponent(describe(IlluminatorProperties(**properties)), 0.0)
 
 
 @pytest.fixture
-def device():
+def device() -> Light:
     return simulated(address=Address(1, 243), name='bow')
 
 
-def press(component, now, **changes):
+def press(component: Light, now: float, **changes: Any) -> None:
     component.apply(component.device.press(now, **changes), now)
 
 
 class Terminal(io.StringIO):
     """A terminal as far as the view uses one: what stands on the screen."""
 
-    def screen(self):
-        rows, row, column, saved = {}, 0, 0, (0, 0)
+    def screen(self) -> list[str]:
+        rows: dict[int, str] = {}
+        row, column, saved = 0, 0, (0, 0)
         for token in re.findall(r'\x1b7|\x1b8|\x1b\[\d*[AKJ]|[^\x1b]', self.getvalue()):
             if token == '\x1b7':
                 saved = row, column
@@ -73,19 +77,19 @@ class Terminal(io.StringIO):
 
 
 @pytest.fixture
-def terminal(monkeypatch):
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     monkeypatch.setattr(shutil, 'get_terminal_size', lambda: os.terminal_size((80, 10)))
     return Terminal()
 
 
 @pytest.fixture
-def live(terminal, device):
+def live(terminal: Terminal, device: Light) -> LiveView:
     view = LiveView(terminal)
     view.show([look(device, 0.0)])
     return view
 
 
-def test_a_line_has_the_actual_state_the_flags_and_the_faults(device):
+def test_a_line_has_the_actual_state_the_flags_and_the_faults(device: Light) -> None:
     press(device, 0.0, enabled=True, brightness=60.0, strobe_period=0.5, strobe_duty_cycle=25.0,
           mode='external_sync')
     device.device.heat_to(85.0, 0.0)
@@ -97,7 +101,7 @@ def test_a_line_has_the_actual_state_the_flags_and_the_faults(device):
     assert '85.0 degC' in str(look(device, 0.1))
 
 
-def test_a_plain_line_is_written_when_the_state_changes(device):
+def test_a_plain_line_is_written_when_the_state_changes(device: Light) -> None:
     stream = io.StringIO()
     view = PlainView(stream)
     for enabled in (False, False, True, True):
@@ -108,7 +112,7 @@ def test_a_plain_line_is_written_when_the_state_changes(device):
     assert ('off' in off, 'ON' in on, '\x1b' in stream.getvalue()) == (True, True, False)
 
 
-def test_a_plain_line_is_written_when_the_temperature_changes_by_5_kelvins(device):
+def test_a_plain_line_is_written_when_the_temperature_changes_by_5_kelvins(device: Light) -> None:
     stream = io.StringIO()
     view = PlainView(stream)
     for temperature in range(30, 51):
@@ -117,14 +121,15 @@ def test_a_plain_line_is_written_when_the_temperature_changes_by_5_kelvins(devic
     assert len(stream.getvalue().splitlines()) == 5
 
 
-def test_a_fault_that_is_over_is_no_longer_shown(device):
+def test_a_fault_that_is_over_is_no_longer_shown(device: Light) -> None:
     device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'silence=2'), 'lie'), 0.0)
     assert str(look(device, 0.0)).endswith('[silence, lie]')
     device.poll(2.0)
     assert str(look(device, 2.0)).endswith('[lie]')
 
 
-def test_the_live_view_updates_the_line_and_keeps_what_is_typed(device, terminal, live):
+def test_the_live_view_updates_the_line_and_keeps_what_is_typed(
+        device: Light, terminal: Terminal, live: LiveView) -> None:
     terminal.write('brightn')
     device.device.heat_to(50.0, 0.0)
     live.show([look(device, 0.0)])
@@ -137,7 +142,7 @@ def test_the_live_view_updates_the_line_and_keeps_what_is_typed(device, terminal
 
 
 def test_the_live_view_has_an_answer_below_its_line_and_an_event_above_the_lights(
-        terminal, live):
+        terminal: Terminal, live: LiveView) -> None:
     terminal.write('faults\r\n')
     live.say('1/243: no fault', typed='faults')
     live.say('link open: somewhere')
@@ -147,7 +152,7 @@ def test_the_live_view_has_an_answer_below_its_line_and_an_event_above_the_light
     assert line.startswith('1/243 bow')
 
 
-def test_the_live_view_fits_the_terminal(device, terminal):
+def test_the_live_view_fits_the_terminal(device: Light, terminal: Terminal) -> None:
     press(device, 0.0, enabled=True)
     device.device.heat_to(85.0, 0.0)
     lights = [device, *(simulated(address=Address(1, n)) for n in range(1, 20))]
