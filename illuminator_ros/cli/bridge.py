@@ -129,7 +129,6 @@ def _serve(
     import gc
 
     import rclpy
-    from rclpy.impl.implementation_singleton import rclpy_implementation
     from rclpy.signals import SignalHandlerOptions
 
     from ..ros.bridge import Bridge
@@ -144,21 +143,21 @@ def _serve(
     # On a terminal rcutils colours its lines; it sees a pipe in its place.
     if termination.is_terminal:
         os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
+    # rclpy has an exception of its own for each thing that can be wrong with an argument.
+    failed = 'wrong ROS arguments'
     try:
         rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = PayloadNode(NODE_NAME)
-    except OSError as error:
-        return _wrong(f'cannot start: {error}')
-    except Exception as error:
-        # rclpy has an exception of its own for each thing that can be wrong with an argument.
-        return _wrong(f'wrong ROS arguments: {error}')
-    try:
+        # Such as two topics with one name.
+        failed = 'cannot create the node'
         bridge = Bridge(node, arguments, payloads)
     except ParameterError as error:
         return _wrong(f'parameter {error}')
-    except rclpy_implementation.RCLError as error:
-        # Such as two topics with one name.
-        return _wrong(f'cannot create the node: {error}')
+    except Exception as error:
+        # For a lack of descriptors or threads the middleware has none.
+        if isinstance(error, OSError) or type(error) is RuntimeError:
+            failed = 'cannot start'
+        return _wrong(f'{failed}: {error}')
     # All that exists now stays: to look for garbage among it would only hold up an answer.
     gc.collect()
     gc.freeze()

@@ -30,7 +30,7 @@ from .output import OutputQueue
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, even if something hangs.
-LIMIT = 0.9
+LIMIT = 0.85
 # s in which queued output must be written, at an orderly and at an overdue exit.
 OUTPUT_LIMIT = 0.1
 OVERDUE_OUTPUT_LIMIT = 0.02

@@ -168,7 +168,7 @@ class _Parser:
             host = default_host
         if port is None:
             if default_port is None:
-                self.fail(f'no port in {text!r}')
+                self.fail(f'no port in {text!r}' if text else 'it names no port')
             return HostPort(host, default_port)
         return HostPort(host, self.port(port))
 

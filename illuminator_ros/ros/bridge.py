@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 import contextlib
 import logging
 import math
@@ -48,10 +48,12 @@ from ..payload.registry import PayloadType
 # s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
-THREADS_LIMIT = 0.1
+THREADS_LIMIT = 0.05
 # s between checks of the diagnostics, and the minimum between two checks after events.
 TICK = 0.25
 CHECK_INTERVAL = 0.02
+# s between attempts to start a thread while the system has none to spare.
+START_RETRY = 0.5
 # s between checks for another node of the same name.
 NAMES_INTERVAL = 5.0
 
@@ -122,15 +124,16 @@ class Bridge:
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
-        self._housekeeping.start()
-        self.link.start()
+        self._start(self._housekeeping.start)
+        self._start(self.link.start)
         self._executor.run()
         if not self._ended.is_set():
             self.end()
         self._closed.wait(OFF_LIMIT + STOP_LIMIT)
         self.pool.end()
         deadline = time.monotonic() + THREADS_LIMIT
-        self._housekeeping.join(max(deadline - time.monotonic(), 0.0))
+        if self._housekeeping.ident is not None:
+            self._housekeeping.join(max(deadline - time.monotonic(), 0.0))
         self.pool.join(deadline)
         for payload in self._payloads:
             payload.close()
@@ -152,6 +155,15 @@ class Bridge:
         self._closed.set()
         self._wake.set()
         self._executor.end()
+
+    def _start(self, start: Callable[[], None]) -> None:
+        while not self._ended.is_set():
+            try:
+                start()
+                return
+            except RuntimeError as error:
+                self.log.error(f'{error}: too many threads or processes; trying again', 'thread')
+                self._ended.wait(START_RETRY)
 
     def _shut_down_devices(self) -> None:
         reports: queue.SimpleQueue[tuple[Hashable, int, str]] = queue.SimpleQueue()

@@ -23,10 +23,11 @@ from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetParameters, SetLoggerLevels
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool, Trigger
-from support.light import eventually, ServedLight
+from support.light import Address, eventually, ServedLight
 from support.processes import ended, Program, python
 from support.recording import Call
-from support.ros import Parameters, Ros, running_bridge, start_bridge
+from support.ros import bridge_arguments, Parameters, Ros, running_bridge, start_bridge
+from support.slow import pass_time_until
 
 BRIDGE = 'illuminator_ros.bridge'
 
@@ -118,9 +119,86 @@ def test_directory_for_log_files_that_cannot_be_written_is_named() -> None:
     assert 'log files cannot be written to /proc/none: ' in bridge.log
 
 
-def test_too_few_descriptors_end_the_start_without_a_traceback() -> None:
-    bridge = Program('sh', '-c', f'ulimit -n 20; exec {sys.executable} -m {BRIDGE}')
+@pytest.mark.parametrize('descriptors', [8, 14, 20, 22])
+def test_too_few_descriptors_end_the_start_without_a_traceback(descriptors: int) -> None:
+    bridge = Program(
+        'sh', '-c', f'ulimit -n {descriptors}; exec {sys.executable} -m {BRIDGE}')
 
     assert bridge.wait() == 2
-    assert 'bridge: cannot start: ' in bridge.log
+    assert bridge.count('bridge: cannot start: ') == 1
     assert 'Traceback' not in bridge.log
+
+
+NO_THREADS = """
+import sys, threading
+from illuminator_ros.cli.bridge import main
+
+start, refused = threading.Thread.start, []
+
+
+def start_later(thread):
+    if thread.name in ('housekeeping', 'mavlink-link') and refused.count(thread.name) < 2:
+        refused.append(thread.name)
+        raise RuntimeError("can't start new thread")
+    start(thread)
+
+
+threading.Thread.start = start_later
+sys.exit(main())
+"""
+
+
+def test_thread_that_cannot_be_started_is_tried_again(own_ros: Ros, port: int) -> None:
+    program = Program(sys.executable, '-c', NO_THREADS, *bridge_arguments(port), env={
+        'ROS_DOMAIN_ID': str(own_ros.domain)})
+    with ended(program), ended(python(
+            'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')):
+        program.wait_for("can't start new thread: too many threads or processes; trying again")
+        program.wait_for('light 1/243 connected')
+        assert own_ros.enable().success
+
+
+def test_debug_log_shows_peers_commands_acknowledgements_and_statuses(
+    own_ros: Ros, port: int,
+) -> None:
+    with (ended(start_bridge(own_ros.domain, port, '--log-level', 'debug')) as bridge,
+          ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
+        bridge.wait_for('light 1/243 connected')
+        assert own_ros.enable().success
+
+        for text in ("new peer ('127.0.0.1', ", 'sent from 1/194: CommandLong(',
+                     'received from 1/243: CommandAck(',
+                     'received from 1/243: IlluminatorStatus('):
+            bridge.wait_for(text)
+    with (ended(start_bridge(own_ros.domain, port)) as bridge,
+          ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
+        bridge.wait_for('light 1/243 connected')
+        assert bridge.count('[DEBUG]') == bridge.count('received from') == 0
+
+
+def test_strobe_of_a_light_whose_duty_cycle_is_zero_is_set_to_half_with_a_line(
+    own_ros: Ros, port: int,
+) -> None:
+    with (ended(start_bridge(own_ros.domain, port)) as bridge,
+          ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
+        parameters = Parameters(own_ros)
+        parameters.wait(strobe_duty_cycle=0.0)
+
+        assert parameters.set(strobe_period=1.0)[0].successful
+
+        parameters.wait(strobe_period=1.0, strobe_duty_cycle=50.0)
+        bridge.wait_for('light 1/243: strobe_duty_cycle was 0 %, at which nothing strobes, and '
+                        'was set to 50 %')
+
+
+def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: Ros, port: int) -> None:
+    with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port),
+          ServedLight(port, source=Address(1, 244)) as further):
+        bridge.wait_for('light 1/244 is served by /illuminator_1_244')
+        eventually(lambda: 'illuminator_1_244' in own_ros.node.get_node_names())
+
+        further.vanish()
+        pass_time_until(lambda: bridge.count('light 1/244 was silent for long'), step=10.0)
+
+        eventually(lambda: 'illuminator_1_244' not in own_ros.node.get_node_names())
+        assert own_ros.enable().success
