@@ -370,8 +370,9 @@ class Light:
         ) -> None:
             if result.success:
                 self._enabled = on
-                self._emit(LightSwitched(self.address, on, Origin.REQUEST, detail))
             done(result, now)
+            if result.success:
+                self._emit(LightSwitched(self.address, on, Origin.REQUEST, detail))
 
         request = Request(
             self._target, prepare, finished, now=now, limit=now + PROGRESS_LIMIT,

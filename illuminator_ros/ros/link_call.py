@@ -81,7 +81,7 @@ class LinkCalls:
                 self._log.error(reason, 'request')
                 end(lambda: refuse(reason))
 
-        self._link.call(run)
+        self._link.do(run)
 
 
 class LatestOnly(Generic[T]):
