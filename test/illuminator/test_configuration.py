@@ -12,93 +12,603 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Two configurations compared: what is another one, and what has a good reason."""
+"""The configuration of a light: set, followed, streamed, overridden and restored."""
 
-from dataclasses import replace
+from __future__ import annotations
 
-from illuminator_ros.illuminator.model import Configuration, float32, Mode, unexpected_differences
+from dataclasses import astuple
+from typing import Any
+
+from illuminator_ros.illuminator.configuration import RESTORE_INTERVAL
+from illuminator_ros.illuminator.events import Cause
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.model import Configuration, float32, Mode
+from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
+from illuminator_ros.payload.request import Result
 import pytest
+from support.back_to_back import Pair, START
+from support.fake_light import FakeLight
+from support.faulty_wire import Faults
 
-BASE = Configuration(Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)
-SYNCED = replace(BASE, mode=Mode.EXTERNAL_SYNC)
-UNKNOWN = replace(BASE, mode=Mode.UNKNOWN)
-THROTTLED, SHUT_DOWN, THERMISTOR = 1, 2, 4
+CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
+ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
+ALL = {'mode': 'internal_control', 'brightness': 70, 'strobe_period': 1, 'strobe_duty_cycle': 10}
+
+
+def sent(pair: Pair, since: float = 0.0) -> list[tuple[float, ...]]:
+    """Return param1 to param4 of the configurations that were sent, tries included."""
+    return [(m.param1, m.param2, m.param3, m.param4)
+            for m in pair.commands(CONFIGURE, since=since)]
+
+
+def confirmed(pair: Pair) -> Configuration:
+    configuration = pair.snapshot.configuration
+    assert configuration is not None
+    return configuration
+
+
+def mute() -> FakeLight:
+    """Return a light that sends no status."""
+    light = FakeLight(stream=0.0)
+    light.answers.clear()
+    return light
+
+
+# Sets
+
+def test_a_set_is_one_command_with_the_other_fields_as_confirmed(pair: Pair) -> None:
+    assert pair.configure(brightness=50).success
+    assert pair.configure(strobe_period=0.5).success
+    assert pair.configure(mode='external_sync', brightness=10, strobe_period=2,
+                          strobe_duty_cycle=30).success
+    assert sent(pair) == [(1, 50, 0, 0), (1, 50, 0.5, 50), (2, 10, 2, 30)]
+    assert astuple(confirmed(pair)) == (Mode.EXTERNAL_SYNC, 10.0, 2.0, 30.0)
+
+
+def test_a_confirmed_set_is_one_event_before_its_answer(pair: Pair) -> None:
+    answers: list[tuple[str, Any]] = []
+
+    def done(result: Result, now: float) -> None:
+        answers.append((result.message, pair.recorder.changes[-1]))
+
+    pair.light.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
+    pair.turn()
+    pair.run(5.0)
+    (message, event), = answers
+    assert message.startswith('brightness 50 %, strobe_duty_cycle 5 %, confirmed by '
+                              'ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED (1 try, ')
+    assert event == (Cause.REQUEST, {'brightness': 50.0, 'strobe_duty_cycle': 5.0})
+    assert len(pair.recorder.changes) == 2
 
 
 @pytest.mark.parametrize('changes', [
-    {}, {'brightness': 50.4}, {'brightness': 49.6}, {'strobe_duty_cycle': 25.4},
-    {'strobe_period': 1.009}, {'brightness': float32(50.1)},
-])
-def test_rounding_to_the_steps_of_a_light_is_not_a_difference(changes):
-    assert BASE.differences(replace(BASE, **changes)) == []
+    {'brightness': 101}, {'brightness': float('nan')}, {'strobe_period': 11},
+    {'strobe_period': 0.01}, {'mode': 'unknown'}, {'strobe_duty_cycle': True},
+    {'brightness': 50, 'strobe_duty_cycle': -1}])
+def test_a_set_with_a_wrong_value_fails_at_once_and_sends_nothing(
+    pair: Pair, changes: dict[str, Any],
+) -> None:
+    answer = pair.ask_configure(**changes)
+    assert answer.seconds == 0.0
+    assert answer.result.permanent
+    assert not answer.result.success
+    assert sent(pair) == []
 
 
-@pytest.mark.parametrize(('changes', 'names'), [
-    ({'brightness': 50.6}, ['brightness']),
-    ({'strobe_duty_cycle': 24.4}, ['strobe_duty_cycle']),
-    ({'strobe_period': 1.02}, ['strobe_period']),
-    ({'strobe_period': 0.0}, ['strobe_period']),
-    ({'mode': Mode.EXTERNAL_SYNC}, ['mode']),
-    ({'mode': Mode.EXTERNAL_SYNC, 'brightness': 0.0, 'strobe_period': 9.0,
-      'strobe_duty_cycle': 0.0},
-     ['mode', 'brightness', 'strobe_period', 'strobe_duty_cycle']),
+@pytest.mark.parametrize(('changes', 'fields', 'success', 'text', 'brightness'), [
+    ({'brightness': 50}, {}, False, 'but ILLUMINATOR_STATUS shows brightness 100 % (', 100.0),
+    ({'brightness': 50, 'strobe_duty_cycle': 5}, {}, False,
+     'STATUS shows brightness 100 %, strobe_duty_cycle 0 % (', 100.0),
+    # The light rounds to its own steps.
+    ({'brightness': 50}, {'brightness': 50.4}, True, 'brightness 50 %, confirmed by', 50.4),
+    ({'brightness': 80}, {'brightness': 30.0, 'error_status': 1}, True,
+     'brightness 80 %, confirmed by ILLUMINATOR_STATUS, but thermal throttling: ', 80.0),
+    ({'mode': 'external_sync', 'brightness': 80},
+     {'mode': 2, 'brightness': 3.0, 'strobe_period': 0.2}, True,
+     'accepted (ILLUMINATOR_STATUS shows brightness 3 %)', 80.0),
+    # An implausible field neither shows a change nor contradicts it.
+    ({'brightness': 40}, {'strobe_duty_cycle': float('nan')}, False,
+     'STATUS shows brightness 100 % (', 100.0),
+    ({'brightness': 40}, {'strobe_duty_cycle': float('nan'), 'brightness': 40.0}, True,
+     'brightness 40 %, confirmed by', 40.0),
+    # A light that does not report its mode is asked for internal control.
+    ({'brightness': 40}, {'mode': 0, 'brightness': 40.0}, True, 'brightness 40 %, conf', 40.0),
+], ids=['not done', 'two not done', 'rounded', 'hot', 'external sync', 'nan and not done',
+        'nan and done', 'mode not reported'])
+def test_the_answer_to_a_set_says_how_the_light_shows_it(
+    fake: FakeLight, faked: Pair, changes: dict[str, Any], fields: dict[str, Any], success: bool,
+    text: str, brightness: float,
+) -> None:
+    fake.applies = False
+    answer = faked.ask_configure(**changes)
+    fake.fields |= fields
+    result = faked.wait_for(answer)
+    assert (result.success, result.contradicted) == (success, not success)
+    assert text in result.message
+    assert faked.snapshot.discrepancy == ('' if success else result.message)
+    assert confirmed(faked).brightness == brightness
+    assert sent(faked)[0][0] == (2 if 'mode' in changes else 1)
+
+
+@pytest.mark.parametrize('result', [DENIED, None])
+def test_a_set_that_is_not_accepted_changes_nothing(
+    fake: FakeLight, faked: Pair, result: MavResult | None,
+) -> None:
+    fake.results[CONFIGURE] = result
+    before = faked.snapshot.configuration
+    assert not faked.configure(brightness=50).success
+    faked.run(5.0)
+    assert faked.snapshot.configuration == before
+    assert len(faked.recorder.changes) == 1
+
+
+def test_a_discrepancy_ends_when_the_light_shows_the_change(fake: FakeLight, faked: Pair) -> None:
+    fake.apply_after = 2.0
+    assert not faked.configure(brightness=50).success
+    assert faked.snapshot.discrepancy
+    faked.run(3.0)
+    assert faked.snapshot.discrepancy == ''
+    assert confirmed(faked).brightness == 50.0
+
+
+def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
+    pair = Pair(mute()).settle()
+    assert pair.snapshot.configuration is None
+    assert pair.configure(brightness=50).message == (
+        'the light has not reported its configuration yet, so mode, strobe_period, '
+        'strobe_duty_cycle must be set in the same call')
+    assert sent(pair) == []
+    result = pair.configure(**ALL)
+    assert result.success
+    assert 'accepted, not confirmed' in result.message
+    assert astuple(confirmed(pair)) == (Mode.INTERNAL_CONTROL, 70.0, 1.0, 10.0)
+
+
+# Changes by other senders
+
+@pytest.fixture
+def strobe(fake: FakeLight) -> Pair:
+    """Return a client and a light that strobes."""
+    fake.fields |= {'brightness': 80.0, 'strobe_period': 1.0, 'strobe_duty_cycle': 50.0}
+    return Pair(fake).settle()
+
+
+@pytest.mark.parametrize(('fields', 'cause', 'change'), [
+    ({'mode': 2}, Cause.LIGHT, {'mode': Mode.EXTERNAL_SYNC}),
+    ({'brightness': 30.0}, Cause.LIGHT, {'brightness': 30.0}),
+    ({'strobe_period': 0.0}, Cause.LIGHT, {'strobe_period': 0.0}),
+    ({'strobe_duty_cycle': 12.5}, Cause.LIGHT, {'strobe_duty_cycle': 12.5}),
+    ({'brightness': 81.0, 'strobe_period': 2.0}, Cause.LIGHT,
+     {'brightness': 81.0, 'strobe_period': 2.0}),
+    ({'brightness': 80.3}, Cause.ROUNDING, {'brightness': 80.3}),
+    ({'strobe_period': float32(1.001)}, Cause.ROUNDING, {'strobe_period': 1.001}),
+    ({'error_status': 1, 'brightness': 40.0, 'strobe_period': 2.0}, Cause.LIGHT,
+     {'strobe_period': 2.0}),
+    ({'error_status': 1, 'brightness': 40.0}, None, {}),
+    ({'error_status': 2, 'brightness': 0.0}, None, {}),
+    ({'mode': 0}, None, {}),
+    ({'brightness': float('nan')}, None, {}),
+    ({'strobe_period': -1.0}, None, {}),
 ])
-def test_more_than_a_step_is_a_difference_and_named(changes, names):
-    assert BASE.differences(replace(BASE, **changes)) == names
+def test_a_change_by_another_sender_is_followed_with_one_event_and_no_command(
+    fake: FakeLight, strobe: Pair, fields: dict[str, Any], cause: Cause | None,
+    change: dict[str, Any],
+) -> None:
+    normal = dict(fake.fields)
+    fake.fields |= fields
+    strobe.run(10.0)
+    if cause is None:
+        # Neither on its way there nor back.
+        fake.fields = normal
+        strobe.run(10.0)
+    assert strobe.recorder.changes[1:] == ([(cause, change)] if cause else [])
+    assert sent(strobe) == []
+    assert confirmed(strobe) == confirmed(strobe).with_changes(change)
+
+
+def test_the_next_command_builds_on_a_change_by_another_sender(
+    fake: FakeLight, strobe: Pair,
+) -> None:
+    fake.fields['strobe_period'] = 2.0
+    strobe.run(1.0)
+    strobe.configure(brightness=30)
+    assert sent(strobe)[-1] == (1, 30, 2, 50)
+
+
+def test_a_first_status_that_is_implausible_confirms_nothing(fake: FakeLight) -> None:
+    fake.fields['brightness'] = float('nan')
+    pair = Pair(fake).settle()
+    assert pair.snapshot.configuration is None
+    fake.fields['brightness'] = 10.0
+    pair.run(1.0)
+    assert confirmed(pair).brightness == 10.0
 
 
 @pytest.mark.parametrize('value', [60.1, 33.3, 0.1, 99.9])
-def test_float32_rounding_is_never_a_difference(value):
-    asked = replace(BASE, brightness=value, strobe_period=value, strobe_duty_cycle=value)
-    shown = replace(BASE, brightness=float32(value), strobe_period=float32(value),
-                    strobe_duty_cycle=float32(value))
-    assert asked.differences(shown, step=False) == []
+def test_float32_rounding_is_not_a_change(faked: Pair, value: float) -> None:
+    faked.configure(brightness=value, strobe_duty_cycle=value)
+    faked.run(10.0)
+    assert [cause for cause, _ in faked.recorder.changes] == [Cause.FIRST_STATUS, Cause.REQUEST]
+    assert confirmed(faked).brightness == value
 
 
-@pytest.mark.parametrize('changes', [
-    {'brightness': 50.4}, {'strobe_duty_cycle': 25.1}, {'strobe_period': 1.001}])
-def test_steps_are_differences_where_they_are_asked_for(changes):
-    assert BASE.differences(replace(BASE, **changes), step=False) == list(changes)
+def test_external_sync_is_followed_with_its_output(fake: FakeLight, strobe: Pair) -> None:
+    fake.fields['mode'] = 2
+    strobe.run(2.0)
+    for brightness in (10.0, 90.0, 20.0):
+        fake.fields['brightness'] = brightness
+        strobe.run(2.0)
+        assert strobe.recorder.changes[-1] == (Cause.LIGHT, {'brightness': brightness})
 
 
-def test_a_light_of_unknown_mode_is_sent_internal_control():
-    assert UNKNOWN.params() == (1.0, 50.0, 1.0, 25.0)
-    assert SYNCED.params() == (2.0, 50.0, 1.0, 25.0)
+@pytest.mark.parametrize(('change', 'cause'), [
+    ({'brightness': 30.0}, Cause.REQUEST), ({'strobe_period': 2.0}, Cause.LIGHT)],
+    ids=['ours that takes effect late', 'by another sender meanwhile'])
+def test_a_change_during_a_failed_command_is_followed_after_it(
+    fake: FakeLight, strobe: Pair, change: dict[str, Any], cause: Cause,
+) -> None:
+    fake.results[CONFIGURE] = None
+    answer = strobe.ask_configure(brightness=30)
+    fake.fields |= change
+    assert not strobe.wait_for(answer).success
+    strobe.run(2.0)
+    assert strobe.recorder.changes[1:] == [(cause, change)]
 
 
-def test_a_description_has_units_and_can_be_partial():
-    assert BASE.describe() == ('mode internal_control, brightness 50 %, strobe_period 1 s, '
-                               'strobe_duty_cycle 25 %')
-    assert BASE.describe(['strobe_period']) == 'strobe_period 1 s'
+def test_small_steps_add_up_to_a_change(fake: FakeLight, strobe: Pair) -> None:
+    for _ in range(5):
+        fake.fields['brightness'] -= 0.4
+        strobe.run(1.0)
+    assert confirmed(strobe).brightness == 78.0
+    assert [cause for cause, _ in strobe.recorder.changes].count(Cause.LIGHT) == 2
 
 
-@pytest.mark.parametrize('step', [True, False])
-@pytest.mark.parametrize(('flags', 'brightness', 'names'), [
-    (0, 25.0, ['brightness']),
-    (THROTTLED, 25.0, []),
-    (SHUT_DOWN, 0.0, []),
-    (THERMISTOR, 25.0, ['brightness']),
-    (THROTTLED, 75.0, ['brightness']),
+# Streams of setpoints
+
+def publish(pair: Pair, *values: float, rate: float = 0.0) -> None:
+    for value in values:
+        pair.light.set_brightness(value, pair.now)
+        pair.turn()
+        if rate:
+            pair.run(1 / rate)
+
+
+def most_in_flight(pair: Pair) -> int:
+    """Return how many configurations were unanswered at most."""
+    events = [(at, 1) for at, _ in pair.commands_at(CONFIGURE)]
+    events += [(at, -1) for at, _, message in pair.near.received
+               if isinstance(message, CommandAck) and message.command == CONFIGURE]
+    most = level = 0
+    # At one moment the acknowledgement comes first: the next command waits for it.
+    for _, step in sorted(events):
+        level += step
+        most = max(most, level)
+    return most
+
+
+@pytest.mark.parametrize('rate', [1, 10, 100, 1000, 10_000])
+@pytest.mark.parametrize('latency', [0.0005, 0.01, 0.1])
+def test_one_command_is_in_flight_at_any_rate_and_the_newest_setpoint_wins(
+    rate: float, latency: float,
+) -> None:
+    values = [float(1 + i % 97) for i in range(200)]
+    pair = Pair(there=Faults(latency=latency)).settle()
+    at = pair.now
+    publish(pair, *values, rate=rate)
+    # As fast as the line.
+    assert len(sent(pair)) >= min(200, 0.9 * (pair.now - at) / (2 * latency) - 1)
+    pair.run(1.0)
+    assert most_in_flight(pair) == 1
+    assert pair.lamp.configuration.brightness == values[-1]
+    assert pair.recorder.failed_setpoints == []
+
+
+def test_a_setpoint_is_sent_once_with_the_other_fields_as_confirmed(pair: Pair) -> None:
+    pair.configure(strobe_period=2)
+    publish(pair, *[40.0] * 100, rate=100)
+    pair.run(1.0)
+    assert sent(pair)[1:] == [(1, 40, 2, 50)]
+    assert confirmed(pair).brightness == 40.0
+
+
+@pytest.mark.parametrize(('values', 'light', 'then', 'last'), [
+    # It takes 30 and cannot say so: it may be at 30 or at 100.
+    ([30.0], {'results': {CONFIGURE: None}, 'stream': 0.0,
+              'fields': {'brightness': 30.0}}, ACCEPTED, 100.0),
+    # It has accepted 40 and shows 100.
+    ([40.0], {'applies': False}, ACCEPTED, 40.0),
+    # 30 is accepted, not done, and superseded by 40, which is refused.
+    ([30.0], {'applies': False}, [DENIED, ACCEPTED], 30.0),
+], ids=['not acknowledged', 'not done', 'superseded'])
+def test_a_setpoint_is_sent_again_where_the_light_may_have_another_value(
+    fake: FakeLight, faked: Pair, values: list[float], light: dict[str, Any], then: Any,
+    last: float,
+) -> None:
+    fake.results |= light.get('results', {})
+    fake.applies = light.get('applies', True)
+    publish(faked, *values)
+    fake.fields |= light.get('fields', {})
+    fake.stream = light.get('stream', 1.0)
+    faked.run(0.1 if isinstance(then, list) else 1.5)
+    fake.applies = True
+    fake.results[CONFIGURE] = then
+    if isinstance(then, list):
+        publish(faked, 40.0)
+        faked.run(0.1)
+    publish(faked, last)
+    faked.run(1.0)
+    assert fake.fields['brightness'] == last
+
+
+def test_a_setpoint_that_is_under_way_is_not_sent_again(fake: FakeLight, faked: Pair) -> None:
+    fake.apply_after = 0.2
+    publish(faked, 40.0, 50.0, 40.0)
+    faked.run(2.0)
+    assert sent(faked) == [(1, 40, 0, 0)]
+    assert confirmed(faked).brightness == 40.0
+
+
+def test_the_last_setpoint_is_verified(fake: FakeLight, faked: Pair) -> None:
+    fake.applies = False
+    publish(faked, 30.0, 40.0)
+    faked.run(2.0)
+    (message,) = faked.recorder.failed_setpoints
+    assert 'brightness 40 % not confirmed: MAV_RESULT_ACCEPTED, but' in message
+
+
+def test_a_stream_goes_on_after_a_failure(fake: FakeLight, faked: Pair) -> None:
+    fake.results[CONFIGURE] = [MavResult.FAILED, ACCEPTED]
+    publish(faked, 30.0, 40.0)
+    faked.run(0.5)
+    assert faked.recorder.failed_setpoints[0].startswith('refused: MAV_RESULT_FAILED')
+    assert fake.fields['brightness'] == 40.0
+
+
+def test_a_setpoint_does_not_wait_for_a_lost_light(fake: FakeLight, faked: Pair) -> None:
+    fake.results[CONFIGURE] = None
+    publish(faked, 30.0, 40.0)
+    faked.close()
+    assert any('the link is not open' in one for one in faked.recorder.failed_setpoints)
+    faked.run(5.0)
+    fake.results[CONFIGURE] = ACCEPTED
+    faked.open()
+    faked.run(5.0)
+    assert fake.fields['brightness'] == 100.0
+
+
+def test_a_setpoint_before_the_first_status_fails_with_the_reason() -> None:
+    pair = Pair(mute()).settle()
+    publish(pair, 40.0)
+    assert 'has not reported its configuration yet' in pair.recorder.failed_setpoints[0]
+    pair.run(1.0)
+    assert sent(pair) == []
+
+
+def test_a_setpoint_waits_for_a_set_and_does_not_end_it(fake: FakeLight, faked: Pair) -> None:
+    fake.apply_after = 0.3
+    answer = faked.ask_configure(mode='external_sync')
+    publish(faked, 40.0)
+    assert faked.wait_for(answer).success
+    faked.run(1.0)
+    assert (confirmed(faked).mode, confirmed(faked).brightness) == (Mode.EXTERNAL_SYNC, 40.0)
+
+
+def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked: Pair) -> None:
+    fake.results[CONFIGURE] = [None, None, None, ACCEPTED]
+    faked.light.set_desired({'strobe_period': 2.0}, faked.now)
+    publish(faked, *[value % 100 / 1.0 for value in range(400)], rate=50)
+    assert fake.fields['strobe_period'] == 2.0
+
+
+# Overrides
+
+def overriding(fake: FakeLight, settings: Settings | None = None, **values: Any) -> Pair:
+    """Return a pair whose light must be configured as soon as it is found."""
+    return Pair(fake, settings=settings,
+                on_light=lambda light: light.set_desired(values, START))
+
+
+def successes(pair: Pair) -> list[bool]:
+    return [success for success, _ in pair.recorder.restorations]
+
+
+@pytest.mark.parametrize(('values', 'commands', 'success', 'text'), [
+    ({'brightness': 30.0, 'strobe_period': 2.0}, [(1, 30, 2, 7)], [True], ''),
+    ({'brightness': 30.0, 'strobe_period': 20.0}, [(1, 30, 0, 7)], [False, True],
+     'strobe_period 20 s is outside what the light reports'),
+    ({'strobe_period': 20.0}, [], [False], 'strobe_period 20 s is outside'),
 ])
-def test_a_hot_light_may_be_dimmer_but_not_brighter(flags, brightness, names, step):
-    reported = replace(BASE, brightness=brightness)
-    assert unexpected_differences(BASE, reported, flags, step=step) == names
+def test_overrides_within_the_limits_are_sent_as_one_command(
+    fake: FakeLight, values: dict[str, Any], commands: list[Any], success: list[bool], text: str,
+) -> None:
+    fake.fields['strobe_duty_cycle'] = 7.0
+    pair = overriding(fake, **values).settle(30.0)
+    assert sent(pair) == commands
+    assert successes(pair) == success
+    assert text in pair.recorder.restorations[0][1]
+    fake.fields['brightness'] = 5.0
+    pair.run(2.0)
+    assert confirmed(pair).brightness == 5.0
 
 
-@pytest.mark.parametrize('step', [True, False])
-def test_a_light_that_does_not_say_its_mode_does_not_contradict(step):
-    assert unexpected_differences(BASE, UNKNOWN, 0, step=step) == []
+def test_overrides_are_sent_once_however_late_the_light_is_found(fake: FakeLight) -> None:
+    fake.silent = True
+    pair = overriding(fake, brightness=30.0).settle(600.0)
+    for silent in (False, True, False):
+        fake.silent = silent
+        pair.run(30.0)
+    assert sent(pair) == [(1, 30, 0, 0)]
 
 
-def test_a_mode_that_was_unknown_is_news_but_no_contradiction():
-    assert unexpected_differences(UNKNOWN, BASE, 0, step=True) == []
-    assert unexpected_differences(UNKNOWN, BASE, 0, step=False) == ['mode']
+@pytest.mark.parametrize('result', [DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_LONG_ONLY])
+def test_overrides_that_are_refused_are_reported_once_and_not_sent_again(
+    fake: FakeLight, result: MavResult,
+) -> None:
+    fake.results[CONFIGURE] = result
+    pair = overriding(fake, brightness=30.0).settle(60.0)
+    assert len(sent(pair)) == 1
+    (success, message), = pair.recorder.restorations
+    assert not success
+    assert result.name in message
+    assert result.name in pair.snapshot.discrepancy
 
 
-def test_under_external_sync_the_output_may_be_anything():
-    shown = replace(SYNCED, brightness=3.0, strobe_period=0.2, strobe_duty_cycle=77.0)
-    assert unexpected_differences(SYNCED, shown, 0, step=True) == []
+@pytest.mark.parametrize('result', [
+    None, MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS, MavResult.FAILED])
+def test_overrides_that_fail_otherwise_are_sent_until_they_succeed(
+    fake: FakeLight, result: MavResult | None,
+) -> None:
+    fake.results[CONFIGURE] = result
+    pair = overriding(fake, brightness=30.0).settle(20.0)
+    assert pair.recorder.restorations == []
+    assert pair.snapshot.discrepancy
+    fake.results[CONFIGURE] = ACCEPTED
+    pair.run(RESTORE_INTERVAL + 1.0)
+    assert successes(pair) == [True]
+    assert pair.snapshot.discrepancy == ''
 
 
-def test_leaving_external_sync_is_a_difference():
-    assert unexpected_differences(SYNCED, BASE, 0, step=True) == ['mode']
+def test_overrides_that_are_accepted_and_not_shown_are_given_up_until_a_restart(
+    fake: FakeLight,
+) -> None:
+    # A light that clamps: it takes 100 % and shows 80 %.
+    fake.applies = False
+    fake.fields['brightness'] = 80.0
+    pair = overriding(fake, brightness=100.0).settle(60.0)
+    (success, message), = pair.recorder.restorations
+    assert not success
+    assert 'shows brightness 80 %' in message
+    assert confirmed(pair).brightness == 80.0
+    given_up = len(sent(pair))
+    assert given_up <= 5
+    fake.restart(pair.now, brightness=20.0)
+    pair.run(60.0)
+    assert len(sent(pair)) == 2 * given_up
+    assert successes(pair) == [False, False]
+
+
+def test_a_field_that_was_set_meanwhile_is_not_overridden(fake: FakeLight) -> None:
+    fake.results[CONFIGURE] = None
+    pair = overriding(fake, brightness=30.0, strobe_period=2.0).settle(1.5)
+    fake.results[CONFIGURE] = ACCEPTED
+    assert pair.configure(brightness=70).success
+    pair.run(10.0)
+    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (70.0, 2.0)
+
+
+def test_complete_overrides_reach_a_light_that_sends_no_status() -> None:
+    pair = overriding(mute(), mode=Mode.EXTERNAL_SYNC, brightness=30.0, strobe_period=0.0,
+                      strobe_duty_cycle=0.0).settle(20.0)
+    assert sent(pair) == [(2, 30, 0, 0)]
+
+
+def test_overrides_that_wait_for_a_status_are_reported_once(fake: FakeLight) -> None:
+    fake.fields['strobe_duty_cycle'] = float('nan')
+    pair = overriding(fake, brightness=60.0).settle(30.0)
+    (success, message), = pair.recorder.restorations
+    assert not success
+    assert message.startswith('brightness not sent: the light has not reported its configuration')
+    assert pair.snapshot.discrepancy == message
+    fake.fields['strobe_duty_cycle'] = 0.0
+    pair.run(3.0)
+    assert fake.fields['brightness'] == 60.0
+
+
+# Restarts
+
+@pytest.fixture
+def agreed(fake: FakeLight) -> Pair:
+    """Return a client and a light that has accepted overrides and a set since."""
+    pair = overriding(fake, brightness=30.0).settle()
+    assert pair.configure(strobe_period=2, strobe_duty_cycle=40).success
+    pair.enable(True)
+    return pair
+
+
+def test_after_a_restart_the_configuration_is_sent_and_the_light_stays_off(
+    fake: FakeLight, agreed: Pair,
+) -> None:
+    at = agreed.now
+    fake.restart(at)
+    agreed.run(60.0)
+    assert sent(agreed, since=at) == [(1, 30, 2, 40)]
+    assert successes(agreed) == [True, True]
+    assert agreed.commands(ON_OFF, since=at) == []
+    assert fake.fields['enable'] == 0
+    fake.fields['brightness'] = 66.0
+    agreed.run(2.0)
+    assert agreed.recorder.changes[-1] == (Cause.LIGHT, {'brightness': 66.0})
+
+
+def test_after_a_restart_a_light_that_kept_its_configuration_is_sent_nothing(
+    fake: FakeLight, agreed: Pair,
+) -> None:
+    at, kept = agreed.now, dict(fake.fields)
+    fake.restart(agreed.now, **kept)
+    agreed.run(10.0)
+    assert sent(agreed, since=at) == []
+
+
+def test_a_second_restart_while_the_configuration_is_restored_is_noticed(
+    fake: FakeLight, agreed: Pair,
+) -> None:
+    fake.apply_after = 0.3
+    for seconds in (0.1, 10.0):
+        fake.restart(agreed.now)
+        agreed.run(seconds)
+    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (30.0, 2.0)
+
+
+def test_a_field_set_while_the_configuration_is_restored_keeps_its_value(
+    fake: FakeLight, agreed: Pair,
+) -> None:
+    fake.results[CONFIGURE] = [None] * 8 + [ACCEPTED]
+    fake.restart(agreed.now)
+    agreed.run(1.2)
+    agreed.configure(brightness=70)
+    agreed.run(20.0)
+    assert agreed.configure(brightness=70).success
+    agreed.run(10.0)
+    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (70.0, 2.0)
+
+
+@pytest.mark.parametrize('is_stream', [False, True])
+def test_setting_all_values_to_be_restored_ends_the_restoration(
+    fake: FakeLight, is_stream: bool,
+) -> None:
+    pair = Pair(fake).settle()
+    assert pair.configure(brightness=30).success
+    fake.results[CONFIGURE] = None
+    fake.restart(pair.now)
+    pair.run(1.2)
+    fake.results[CONFIGURE] = ACCEPTED
+    assert pair.configure(**{name: value for name, value in ALL.items()
+                             if not is_stream or name != 'brightness'}).success
+    if is_stream:
+        publish(pair, 70.0)
+        pair.run_until(lambda: confirmed(pair).brightness == 70.0)
+    # Before the next status another sender dims it, which must be followed.
+    fake.fields['brightness'] = 20.0
+    pair.run(5.0)
+    assert confirmed(pair).brightness == 20.0
+
+
+def test_a_light_that_refuses_the_restored_configuration_is_followed(
+    fake: FakeLight, agreed: Pair,
+) -> None:
+    fake.results[CONFIGURE] = DENIED
+    fake.restart(agreed.now)
+    agreed.run(10.0)
+    assert successes(agreed)[-1] is False
+    assert agreed.snapshot.discrepancy
+    assert confirmed(agreed).brightness == 100.0
+
+
+def test_a_light_that_restarts_is_followed_where_restoring_is_switched_off(
+    fake: FakeLight,
+) -> None:
+    pair = overriding(fake, Settings(restore_configuration=False), brightness=30.0).settle()
+    fake.restart(pair.now)
+    pair.run(10.0)
+    assert len(sent(pair)) == 1
+    assert pair.recorder.changes[-1] == (Cause.LIGHT, {'brightness': 100.0})

@@ -96,6 +96,7 @@ class FakeLight(Endpoint):
         """Restart with the default settings, or others."""
         self.boot = now if self.boot is not None else None
         self.fields = {**DEFAULT_STATUS, **fields}
+        self._to_apply.clear()
         self._status_due = self.heartbeat.due = now
 
     def delay_status(self, seconds: float) -> None:

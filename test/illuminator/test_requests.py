@@ -1,0 +1,526 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Requests to a light: each has one answer, in time, and succeeds only if the light shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import random
+import re
+from typing import Any
+
+from illuminator_ros.illuminator.group import enable_all
+from illuminator_ros.illuminator.light import PROGRESS_LIMIT, REFRESH_LIMIT
+from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    INFORMATION_ID,
+    MavCmd,
+    MavResult,
+    result_name,
+)
+from illuminator_ros.payload.identity import Identity
+from illuminator_ros.payload.request import MAX_WAITING, Result
+import pytest
+from support.back_to_back import BRIDGE, Pair
+from support.fake_light import FakeLight
+from support.faulty_wire import Faults
+from support.records import Answer
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+REQUEST = MavCmd.REQUEST_MESSAGE
+ACCEPTED, DENIED, IN_PROGRESS, REJECTED = (
+    MavResult.ACCEPTED, MavResult.DENIED, MavResult.IN_PROGRESS, MavResult.TEMPORARILY_REJECTED)
+# The end of a message: tries and time.
+TIMING = re.compile(r' \((\d+) (?:try|tries), (?:(\d+) ms|(\d+\.\d\d) s)\)$')
+NO_STATUS: dict[str, Any] = {'stream': 0.0, 'answers': set()}
+
+
+def timing(message: str) -> tuple[int, float]:
+    """Return the tries and the time, s, that a message ends with."""
+    match = TIMING.search(message)
+    assert match, message
+    tries, ms, seconds = match.groups()
+    return int(tries), float(seconds) if ms is None else int(ms) / 1000
+
+
+def change(fake: FakeLight, **attributes: Any) -> None:
+    """Set attributes of a light; ``fields`` and ``results`` are added to those it has."""
+    for name, value in attributes.items():
+        setattr(fake, name, {**getattr(fake, name), **value} if isinstance(value, dict) else value)
+
+
+# On and off
+
+@pytest.mark.parametrize(('on', 'light', 'success', 'text'), [
+    (True, {}, True, 'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+    (True, {'fields': {'error_status': 1}}, True,
+     'on, confirmed by ILLUMINATOR_STATUS, but thermal throttling: MAV_RESULT_ACCEPTED'),
+    (True, {'fields': {'error_status': 3}}, True,
+     'on, confirmed by ILLUMINATOR_STATUS, but thermal throttling and over temperature shutdown: '
+     'MAV_RESULT_ACCEPTED'),
+    (True, {'fields': {'error_status': 4}}, True,
+     'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+    (False, {'fields': {'error_status': 2, 'enable': 1}}, True,
+     'off, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+    (True, {'applies': False, 'fields': {'error_status': 2}}, False,
+     'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off, over temperature '
+     'shutdown'),
+    (True, {'applies': False, 'fields': {'enable': 2}}, False,
+     'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows neither on nor off'),
+    (True, NO_STATUS, False,
+     'on not confirmed: MAV_RESULT_ACCEPTED, but no ILLUMINATOR_STATUS came within 1.00 s'),
+    (True, {'results': {ON_OFF: None}}, False, 'no acknowledgement'),
+    *((True, {'results': {ON_OFF: result}}, False, f'refused: {result_name(result)}')
+      for result in (DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, 11, 200)),
+])
+def test_the_answer_to_a_switch_says_what_the_light_did(
+    fake: FakeLight, faked: Pair, on: bool, light: dict[str, Any], success: bool, text: str,
+) -> None:
+    change(fake, **light)
+    answer = faked.ask_enable(on)
+    result = faked.wait_for(answer)
+    assert (result.success, TIMING.sub('', result.message)) == (success, text)
+    tries, seconds = timing(result.message)
+    assert tries == len(faked.commands(ON_OFF))
+    assert seconds == pytest.approx(answer.seconds, abs=0.01)
+    assert answer.seconds <= 2.0
+
+
+def test_a_switch_succeeds_as_not_confirmed_where_the_light_never_sends_a_status() -> None:
+    fake = FakeLight()
+    change(fake, **NO_STATUS)
+    result = Pair(fake).settle().enable(True)
+    assert result.success
+    assert result.message.startswith('on, accepted, not confirmed (the light sends no '
+                                     'ILLUMINATOR_STATUS): MAV_RESULT_ACCEPTED (1 try, ')
+
+
+@pytest.mark.parametrize(('apply_after', 'seconds'), [(0.0, 0.004), (0.6, 0.754)])
+def test_a_light_that_sends_no_status_by_itself_is_asked_until_it_shows_the_change(
+    fake: FakeLight, faked: Pair, apply_after: float, seconds: float,
+) -> None:
+    change(fake, stream=0.0, apply_after=apply_after)
+    answer = faked.ask_enable(True)
+    assert faked.wait_for(answer).success
+    assert answer.seconds == pytest.approx(seconds, abs=0.02)
+
+
+def test_a_light_that_counts_in_seconds_is_confirmed_as_fast() -> None:
+    # Its statuses look up to a second older than they are.
+    fake = FakeLight(stream=0.3)
+    uptime_ms = fake.uptime_ms
+    fake.uptime_ms = lambda now: uptime_ms(now) // 1000 * 1000  # type: ignore[method-assign]
+    pair = Pair(fake).settle(20.35)
+    for on in (True, False) * 5:
+        answer = pair.ask_enable(on)
+        assert pair.wait_for(answer).success
+        assert answer.seconds < 0.01
+        pair.run(0.17)
+
+
+@pytest.mark.parametrize('lower_ms', [0, 50, 3000])
+def test_a_late_status_from_before_the_command_does_not_confirm(
+    fake: FakeLight, faked: Pair, lower_ms: int,
+) -> None:
+    faked.enable(True)
+    shown_on = fake.status(faked.now)
+    change(fake, fields={'enable': 0}, stream=0.0, applies=False)
+    faked.run(0.4)
+    faked.light.request_status(faked.now)
+    faked.run(0.1)
+    answer = faked.ask_enable(True)
+    faked.run(0.005)
+    shown_on.uptime_ms -= lower_ms
+    fake.send(shown_on)
+    assert not faked.wait_for(answer).success
+
+
+def test_a_newer_status_that_was_sent_before_the_command_does_not_confirm(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    # Another sender switches the light on and off between two received statuses. The status from
+    # in between arrives late, while we wait for it because of a late acknowledgement.
+    fake.stream = 0.0
+    faked.light.request_status(faked.now)
+    faked.run(0.31)
+    fake.fields['enable'] = 1
+    in_between = fake.status(faked.now)
+    fake.fields['enable'] = 0
+    faked.run(0.5)
+    fake.results[ON_OFF] = None
+    answer = faked.ask_enable(True)
+    fake.send(CommandAck(ON_OFF, ACCEPTED, 0, 0, *BRIDGE))
+    fake.send(in_between)
+    assert not faked.wait_for(answer).success
+
+
+def test_a_failure_says_that_only_an_older_status_came(fake: FakeLight, faked: Pair) -> None:
+    change(fake, **NO_STATUS)
+    faked.run(1.07)
+    old = fake.status(faked.now)
+    faked.run(0.5)
+    answer = faked.ask_enable(True)
+    faked.run(0.1)
+    fake.send(old)
+    assert 'but no later ILLUMINATOR_STATUS came within 1.00 s' in faked.wait_for(answer).message
+
+
+def test_a_light_that_restarts_meanwhile_does_not_confirm(fake: FakeLight, faked: Pair) -> None:
+    fake.apply_after = 0.5
+    answer = faked.ask_enable(True)
+    faked.run(0.1)
+    fake.restart(faked.now)
+    assert not faked.wait_for(answer).success
+
+
+def test_progress_is_waited_for_up_to_a_limit(fake: FakeLight, faked: Pair) -> None:
+    fake.results[ON_OFF] = None
+    answer = faked.ask_enable(True)
+    while not answer.results and faked.now < answer.asked_at + 60.0:
+        fake.send(CommandAck(ON_OFF, IN_PROGRESS, 50, 0, *BRIDGE))
+        faked.run(1.0)
+    assert not answer.result.success
+    assert 'MAV_RESULT_IN_PROGRESS at 50 %' in answer.result.message
+    assert answer.seconds == pytest.approx(PROGRESS_LIMIT)
+    assert len(faked.commands(ON_OFF)) == 1
+
+
+@pytest.mark.parametrize(('is_closed', 'reason'), [
+    (False, 'no heartbeat for 10.00 s'), (True, 'the link is not open: closed')])
+def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
+    fake: FakeLight, faked: Pair, is_closed: bool, reason: str,
+) -> None:
+    fake.silent = True
+    if is_closed:
+        faked.close()
+    faked.run(10.0 - (faked.now - faked.light.heard_at))
+    sent = len(faked.commands())
+    answers = [faked.ask_enable(True), faked.ask_configure(brightness=50), faked.ask_refresh()]
+    faked.light.set_brightness(50.0, faked.now)
+    assert {(answer.seconds, answer.result.message) for answer in answers} == {
+        (0.0, f'light 1/243 is lost: {reason}')}
+    assert faked.recorder.failed_setpoints == [f'light 1/243 is lost: {reason}']
+    assert len(faked.commands()) == sent
+
+
+# Several requests
+
+def test_off_overtakes_the_requests_before_it(pair: Pair) -> None:
+    answers = [pair.ask_enable(on) for on in (True, False, True, True, False)]
+    pair.run(5.0)
+    # Off is sent twice: the first acknowledgement may be that of on.
+    assert [bool(m.param1) for m in pair.commands(ON_OFF)] == [True, False, False, False]
+    assert [answer.result.success for answer in answers] == [False, True, False, False, True]
+
+
+def test_each_configuration_builds_on_the_one_before(pair: Pair) -> None:
+    answers = [pair.ask_configure(**{name: value}) for name, value in (
+        ('brightness', 40), ('strobe_period', 2), ('strobe_duty_cycle', 30))]
+    pair.run(2.0)
+    assert all(answer.result.success for answer in answers)
+    last = pair.commands(CONFIGURE)[-1]
+    assert (last.param2, last.param3, last.param4) == (40, 2, 30)
+
+
+def test_switches_and_configurations_do_not_wait_for_each_other(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    for kind in (ON_OFF, CONFIGURE):
+        fake.results = {kind: None}
+        answers = {ON_OFF: faked.ask_enable(True), CONFIGURE: faked.ask_configure(brightness=50)}
+        slow = answers.pop(kind)
+        assert all(faked.wait_for(quick).success for quick in answers.values())
+        assert not slow.results
+        faked.run(5.0)
+
+
+def test_requests_above_the_limit_are_refused_at_once_and_the_others_answered(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[ON_OFF] = DENIED
+    answers = [faked.ask_enable(True) for _ in range(MAX_WAITING + 3)]
+    assert [answer for answer in answers if answer.results] == answers[MAX_WAITING:]
+    assert answers[-1].result.message == '32 requests are waiting for light 1/243 already'
+    faked.run(10.0)
+    assert [len(answer.results) for answer in answers] == [1] * len(answers)
+    fake.results.clear()
+    assert faked.enable(True).success
+
+
+def test_requests_fail_with_the_link_and_are_not_sent_later(fake: FakeLight, faked: Pair) -> None:
+    fake.results |= {ON_OFF: None, CONFIGURE: None}
+    answers = [faked.ask_enable(True) for _ in range(5)]
+    answers += [faked.ask_configure(brightness=value) for value in (10, 20, 30)]
+    faked.run(0.1)
+    faked.close()
+    faked.run(0.01)
+    assert answers[0].result.message.startswith('the link was lost (1 try, ')
+    assert 'light 1/243 is lost' in answers[1].result.message
+    assert not any(answer.result.success for answer in answers)
+    faked.run(5.0)
+    at = faked.now
+    faked.open()
+    faked.run(5.0)
+    assert faked.commands(ON_OFF, CONFIGURE, since=at) == []
+
+
+def test_many_lights_are_served_at_once_and_a_dead_one_delays_no_other() -> None:
+    addresses = [Address(1, component) for component in range(100, 130)]
+    pair = Pair([IlluminatorProperties(address=address) for address in addresses],
+                there=Faults(latency=0.05)).settle()
+    pair.device.receive = lambda *message: None  # type: ignore[method-assign]
+    dead, *alive = [pair.ask_enable(True, light) for light in pair.controller.lights.values()]
+    pair.run(0.25)
+    assert [answer.result.success for answer in alive] == [True] * 29
+    assert not pair.wait_for(dead).success
+
+
+@pytest.mark.parametrize('kind', [ON_OFF, CONFIGURE])
+def test_an_answer_may_start_the_next_request(pair: Pair, kind: MavCmd) -> None:
+    log: list[bool] = []
+
+    def ask(now: float) -> None:
+        if kind == ON_OFF:
+            pair.light.enable(len(log) % 2 == 0, now, done)
+        else:
+            pair.light.configure({'brightness': 10 * len(log)}, now, done)
+
+    def done(result: Result, now: float) -> None:
+        log.append(result.success)
+        if len(log) < 6:
+            ask(now)
+
+    ask(pair.now)
+    pair.run(2.0)
+    assert log == [True] * 6
+
+
+def test_an_answer_to_a_request_that_waited_may_start_another(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[CONFIGURE] = None
+    log: list[bool] = []
+    faked.ask_configure(brightness=1)
+    faked.light.configure(
+        {'brightness': 2}, faked.now, lambda result, now: faked.light.configure(
+            {'brightness': 3}, now, lambda result, now: log.append(result.success)))
+    faked.run(0.9)
+    fake.results.clear()
+    faked.run(1.0)
+    assert log == [True]
+    assert fake.fields['brightness'] == 3.0
+
+
+def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> None:
+    def done(result: Result, now: float) -> None:
+        raise RuntimeError('as the test says')
+
+    pair.light.enable(True, pair.now, done)
+    answer = pair.ask_enable(True)
+    with pytest.raises(RuntimeError):
+        pair.run(5.0)
+    assert pair.wait_for(answer).success
+    assert pair.enable(True).success
+
+
+# Cancelling
+
+def test_cancelling_ends_each_request_once_and_sends_nothing_that_waited(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results |= {ON_OFF: IN_PROGRESS, CONFIGURE: None}
+    answers = [faked.ask_enable(True), faked.ask_enable(True), faked.ask_configure(brightness=50)]
+    faked.light.set_brightness(60.0, faked.now)
+    faked.light.set_desired({'strobe_period': 1.0}, faked.now)
+    faked.run(0.1)
+    sent = len(faked.commands(ON_OFF, CONFIGURE))
+    faked.light.cancel(faked.now)
+    assert [(answer.result.success, answer.result.message) for answer in answers] == [
+        (False, 'cancelled')] * 3
+    faked.run(60.0)
+    assert [len(answer.results) for answer in answers] == [1, 1, 1]
+    assert len(faked.commands(ON_OFF, CONFIGURE)) == sent
+
+
+def test_after_cancelling_the_next_request_is_sent_at_once(fake: FakeLight, faked: Pair) -> None:
+    fake.results[ON_OFF] = [IN_PROGRESS, ACCEPTED]
+    faked.ask_enable(True)
+    faked.run(0.1)
+    faked.light.cancel(faked.now)
+    answer = faked.ask_enable(False)
+    assert faked.wait_for(answer).success
+    assert answer.seconds < 0.1
+
+
+# The time of a set
+
+SET_LIMIT = 0.9
+PROGRESS = CommandAck(CONFIGURE, IN_PROGRESS, 1, 0, *BRIDGE)
+LIGHTS: dict[str, dict[str, Any]] = {
+    'silent': {'silent': True},
+    'no acknowledgement': {'results': {CONFIGURE: None}},
+    'no progress': {'results': {CONFIGURE: IN_PROGRESS}},
+    'endless progress': {
+        'results': {CONFIGURE: None}, 'stream': 0.1, 'status': lambda now: PROGRESS},
+    'always rejected': {'results': {CONFIGURE: REJECTED}},
+    'accepted at the fourth try': {'results': {CONFIGURE: [REJECTED] * 3 + [ACCEPTED]}},
+    'COMMAND_INT only': {'results': {CONFIGURE: MavResult.COMMAND_INT_ONLY}},
+    'not done': {'applies': False},
+    'done late': {'apply_after': 0.7},
+    'no status any more': {'stream': 0.0, 'answers': {INFORMATION_ID}},
+    'no answer to requests': {'stream': 0.0, 'results': {REQUEST: None}},
+    'denied': {'results': {CONFIGURE: DENIED}},
+}
+LINES = {
+    'good': Faults(), 'slow': Faults(latency=0.4), 'lossy': Faults(drop=0.5),
+    'late': Faults(delay=0.5), 'torn': Faults(corrupt=0.5),
+    'bad': Faults(drop=0.3, duplicate=0.3, reorder=0.3, delay=0.3, corrupt=0.3)}
+
+
+@pytest.mark.parametrize('line', LINES)
+@pytest.mark.parametrize('light', LIGHTS)
+@pytest.mark.parametrize('command_timeout', [0.05, 0.5, 10.0])
+def test_each_set_is_answered_once_and_in_time(
+    light: str, line: str, command_timeout: float,
+) -> None:
+    fake = FakeLight()
+    pair = Pair(fake, there=LINES[line], command_timeout=command_timeout, seed=light)
+    pair.run_until(lambda: pair.controller.lights and pair.snapshot.configuration)
+    draw = random.Random(light)
+    change(fake, **LIGHTS[light])
+    answers = []
+    for _ in range(12):
+        answers.append(pair.ask_configure(brightness=draw.uniform(0, 100)))
+        pair.run(draw.choice([0.0, 0.01, 0.1, 0.5, 0.849, 0.85, 0.851, 1.0]))
+    pair.run(SET_LIMIT)
+    assert [len(answer.results) for answer in answers] == [1] * len(answers)
+    assert max(answer.seconds for answer in answers) <= SET_LIMIT
+
+
+def test_a_set_that_was_not_sent_in_time_says_so(fake: FakeLight, faked: Pair) -> None:
+    fake.results[CONFIGURE] = None
+    first, second = faked.ask_configure(brightness=1), faked.ask_configure(brightness=2)
+    faked.run(SET_LIMIT)
+    assert first.result.message.startswith('no acknowledgement')
+    assert second.result.message == 'not sent: earlier requests took too long'
+    assert {message.param2 for message in faked.commands(CONFIGURE)} == {1.0}
+
+
+# Refresh
+
+def test_a_refresh_requests_status_and_identity_and_takes_both(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    change(fake, identity=Identity(serial_number='T-2'), fields={'brightness': 12.0})
+    at = faked.now
+    result = faked.wait_for(faked.ask_refresh())
+    assert result.success
+    assert result.message == ('ILLUMINATOR_STATUS: received, '
+                              'COMPONENT_INFORMATION_BASIC: received (4 ms)')
+    assert {message.param1 for message in faked.commands(REQUEST, since=at)} == {
+        STATUS_ID, INFORMATION_ID}
+    assert faked.light.status is not None
+    assert faked.light.status.brightness == 12.0
+    assert faked.snapshot.identity == Identity(serial_number='T-2')
+
+
+@pytest.mark.parametrize(('light', 'success', 'status', 'identity'), [
+    ({'answers': {STATUS_ID}}, True, 'received', 'acknowledged, but not sent'),
+    ({'stream': 0.0, 'results': {REQUEST: MavResult.UNSUPPORTED}}, False,
+     'MAV_RESULT_UNSUPPORTED', 'refused: MAV_RESULT_UNSUPPORTED'),
+    ({'stream': 0.0, 'answers': {INFORMATION_ID}}, False, 'nothing came', 'received'),
+    (NO_STATUS, False, 'nothing came', 'acknowledged, but not sent'),
+    *(({**NO_STATUS, 'results': {REQUEST: result}}, False, '', '')
+      for result in (None, IN_PROGRESS, REJECTED)),
+])
+def test_a_refresh_ends_once_and_in_time_with_the_reason(
+    fake: FakeLight, faked: Pair, light: dict[str, Any], success: bool, status: str,
+    identity: str,
+) -> None:
+    change(fake, **light)
+    answers = [faked.ask_refresh() for _ in range(300)]
+    faked.run(REFRESH_LIMIT + 0.1)
+    assert {answer.result.success for answer in answers} == {success}
+    assert f'ILLUMINATOR_STATUS: {status}' in answers[0].result.message
+    assert f'COMPONENT_INFORMATION_BASIC: {identity}' in answers[0].result.message
+    assert max(answer.seconds for answer in answers) <= REFRESH_LIMIT
+
+
+def test_the_limit_of_a_refresh_holds_whatever_the_timeout_of_commands(fake: FakeLight) -> None:
+    pair = Pair(fake, command_timeout=10.0).settle()
+    change(fake, stream=0.0, results={REQUEST: None})
+    assert pair.wait_for(pair.ask_refresh()).message == (
+        'ILLUMINATOR_STATUS: nothing came, COMPONENT_INFORMATION_BASIC: nothing came (5.00 s)')
+
+
+def test_a_refresh_ends_when_the_link_is_lost(pair: Pair) -> None:
+    answer = pair.ask_refresh()
+    pair.close()
+    pair.run(0.1)
+    assert not answer.result.success
+    assert 'the link was lost' in answer.result.message
+
+
+# All lights at once
+
+@pytest.fixture
+def three() -> Pair:
+    """Return a client and three lights that know each other."""
+    return Pair([IlluminatorProperties(Address(1, one)) for one in (243, 244, 245)]).settle()
+
+
+def ask_all(pair: Pair) -> Answer:
+    answer = Answer(pair.now)
+    enable_all(list(pair.controller.lights.values()), True, pair.now, answer,
+               name=lambda light: f'lamp {light.address}')
+    pair.turn()
+    return answer
+
+
+def deafen(pair: Pair) -> None:
+    pair.device.receive = lambda *message: None  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(('prepare', 'success', 'texts'), [
+    (lambda pair: None, True, ['3 of 3 on', 'lamp 1/243: on, confirmed by', 'lamp 1/244: on, ',
+                               'lamp 1/245: on, ']),
+    (deafen, False, ['2 of 3 on', 'lamp 1/243: no acknowledgement (4 tries', 'lamp 1/244: on, ',
+                     'lamp 1/245: on, ']),
+    (lambda pair: pair.controller.lights[Address(1, 244)].lose('gone', pair.now), True,
+     ['2 of 2 on', 'lamp 1/243: on, ', 'lamp 1/244: light 1/244 is lost', 'lamp 1/245: on, ']),
+    (Pair.close, False, [f'lamp 1/{one}: light 1/{one} is lost: ' for one in (243, 244, 245)]),
+], ids=['all', 'one fails', 'one is lost', 'all are lost'])
+def test_the_answer_of_all_lights_names_the_outcome_of_each(
+    three: Pair, prepare: Callable[[Pair], None], success: bool, texts: list[str],
+) -> None:
+    prepare(three)
+    at = three.now
+    result = three.wait_for(ask_all(three))
+    assert result.success is success
+    parts = result.message.split('; ')
+    assert [part[:len(text)] for part, text in zip(parts, texts, strict=True)] == texts
+    # In parallel: as long as the slowest takes.
+    assert three.now - at < 2.1
+    assert len({m.target_component for m in three.commands(ON_OFF, since=at)
+                }) == int(texts[0][5] if texts[0][0].isdigit() else 0)
+
+
+def test_without_a_light_a_request_to_all_fails_at_once() -> None:
+    answer = Answer(0.0)
+    enable_all([], True, 0.0, answer, name=str)
+    assert answer.result == Result(False, 'no light has been heard yet')
