@@ -196,38 +196,6 @@ def test_a_restart_resets_the_settings_and_keeps_the_temperature():
     assert bench.shown() == (1, 100.0, 0, 0)
 
 
-# The tests of the developer guide's emulator, by their names there: the commands before, the
-# command, its result, and the state that the light reports then: enable or its configuration.
-GUIDE = {
-    'on_off_lowerbound': ([], (ON_OFF, -1), DENIED, 0),
-    'on_off_upperbound': ([], (ON_OFF, 2), DENIED, 0),
-    'turning_on': ([], (ON_OFF, 1), ACCEPTED, 1),
-    'turning_off': ([(ON_OFF, 1)], (ON_OFF, 0), ACCEPTED, 0),
-    'mode_internal_control': ([(CONFIGURE, 2, 100, 0, 0)], (CONFIGURE, 1, 100, 0, 0), ACCEPTED,
-                              (1, 100, 0, 0)),
-    'mode_external_sync': ([], (CONFIGURE, 2, 100, 0, 0), ACCEPTED, (2, 100, 0, 0)),
-    'mode_lowerbound': ([], (CONFIGURE, -1, 100, 0, 0), DENIED, (1, 100, 0, 0)),
-    'mode_upperbound': ([], (CONFIGURE, 3, 100, 0, 0), DENIED, (1, 100, 0, 0)),
-    'brightness': ([], (CONFIGURE, 1, 50, 0, 0), ACCEPTED, (1, 50, 0, 0)),
-    'brightness_lowerbound': ([], (CONFIGURE, 1, -1, 0, 0), DENIED, (1, 100, 0, 0)),
-    'brightness_upperbound': ([], (CONFIGURE, 1, 101, 0, 0), DENIED, (1, 100, 0, 0)),
-    'strobe': ([(CONFIGURE, 1, 100, 0.5, 25)], (CONFIGURE, 1, 100, 1, 50), ACCEPTED,
-               (1, 100, 1, 50)),
-    'strobe_period_lowerbound': ([], (CONFIGURE, 1, 100, -1, 50), DENIED, (1, 100, 0, 0)),
-    'strobe_duty_lowerbound': ([], (CONFIGURE, 1, 100, 1, -1), DENIED, (1, 100, 0, 0)),
-    'strobe_duty_upperbound': ([], (CONFIGURE, 1, 100, 1, 101), DENIED, (1, 100, 0, 0)),
-}
-
-
-@pytest.mark.parametrize(('before', 'command', 'result', 'state'), GUIDE.values(), ids=GUIDE)
-def test_the_light_passes_the_tests_of_the_developer_guide(before, command, result, state):
-    bench = LightBench()
-    for step in before:
-        assert bench.result(*step) == ACCEPTED
-    assert bench.result(*command) == result
-    assert state == (bench.shown() if isinstance(state, tuple) else bench.status().enable)
-
-
 def test_a_light_that_is_on_heats_and_dims_and_recovers():
     bench = LightBench(thermal=HOT, status_interval=0.0)
     bench.now = 100.0

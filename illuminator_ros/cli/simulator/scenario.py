@@ -179,7 +179,7 @@ def _given(options: argparse.Namespace, kind: SimulatedType[Any]) -> dict[str, A
     result = {}
     for name, setting in kind.all_settings.items():
         if name != 'fault' and (text := getattr(options, name)) is not None:
-            with _place(f'--{name.replace("_", "-")}'):
+            with _place(f'argument --{name.replace("_", "-")}'):
                 result[name] = setting.read(text)
     return result
 
