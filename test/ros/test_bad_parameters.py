@@ -19,6 +19,7 @@ import math
 from pathlib import Path
 import re
 import subprocess
+from typing import Any, cast
 
 import pytest
 from support.embedded import refusal
@@ -106,7 +107,7 @@ def test_invalid_command_line_ends_the_start_with_status_2_and_one_line(
     ({'signing_mode': 'require'}, 'signing_key_file: no key file is given'),
 ])
 def test_invalid_parameter_is_refused_with_its_name_value_and_range(
-    ros: Ros, given: dict[str, object], reason: str,
+    ros: Ros, given: dict[str, Any], reason: str,
 ) -> None:
     assert re.search(reason, refusal(ros.context, **given))
 
@@ -119,7 +120,7 @@ def test_misspelt_names_are_warned_about_and_parameters_of_other_nodes_are_not(
     misspelt = {'brightnes': 'brightness', 'conection_url': 'connection_url',
                 'target_sytem': 'target_system', 'strobe_periode': 'strobe_period'}
     with running_bridge(ros.domain, free_port(), '--params-file', str(file),
-                        **dict.fromkeys(misspelt, 1)) as bridge:
+                        **cast(dict[str, Any], dict.fromkeys(misspelt, 1))) as bridge:
         for wrong, right in misspelt.items():
             bridge.wait_for(
                 f"parameter '{wrong}' is unknown and ignored; did you mean '{right}'?")
@@ -130,7 +131,7 @@ def test_misspelt_names_are_warned_about_and_parameters_of_other_nodes_are_not(
     {'signing_mode': 'off'}, {'signing_mode': "'off'"},
     {'heartbeat_timeout': 2, 'status_interval': 2, 'command_timeout': 2}])
 def test_off_as_yaml_reads_it_and_integers_for_doubles_are_accepted(
-    ros: Ros, given: dict[str, object],
+    ros: Ros, given: dict[str, Any],
 ) -> None:
     with running_bridge(ros.domain, free_port(), **given) as bridge:
         assert bridge.running

@@ -32,10 +32,8 @@ STEADY = {'enable': 1, 'mode': 1, 'strobe_period': 0.0, 'strobe_duty_cycle': 0.0
           'error_status': 0}
 # %; a brightness that was not there before identifies a beam.
 LEVELS = itertools.count(60.0, 0.5)
-THROTTLED = 1
 # s; so slow that the tests' clock hardly moves it on by itself.
 HALF = 4.0
-STROBE = {'strobe_period': 2 * HALF, 'strobe_duty_cycle': 50.0}
 
 
 @pytest.fixture(scope='module')
@@ -87,17 +85,6 @@ def test_beam_is_a_cone_along_x_in_the_frame_of_the_light_for_late_and_volatile_
     assert shown(ros.subscribe(Marker, '/illuminator/beam', STREAM).wait())
 
 
-def test_opacity_follows_the_brightness_and_an_error_is_red(
-    light: ServedLight, beam: Recorder,
-) -> None:
-    light.report(brightness=40.0)
-    marker = beam.wait(lambda marker: shown(marker) and marker.color.a == pytest.approx(0.2))
-    assert min(marker.color.r, marker.color.g, marker.color.b) > 0.7
-
-    light.report(error_status=THROTTLED)
-    beam.wait(lambda marker: (marker.color.r, marker.color.g, marker.color.b) == (1.0, 0.0, 0.0))
-
-
 def test_beam_is_deleted_while_the_light_is_off_or_lost(
     light: ServedLight, beam: Recorder,
 ) -> None:
@@ -109,15 +96,6 @@ def test_beam_is_deleted_while_the_light_is_off_or_lost(
 
     light.fake.silent = True
     pass_time_until(lambda: any(map(gone, beam.messages)))
-
-
-def test_strobe_is_drawn_steady_and_dimmer(
-    light: ServedLight, beam: Recorder,
-) -> None:
-    light.report(brightness=100.0, strobe_period=0.5, strobe_duty_cycle=50.0)
-
-    beam.wait(lambda marker: shown(marker) and marker.color.a == pytest.approx(0.25), count=2)
-    assert not any(map(gone, beam.messages))
 
 
 def test_beam_is_published_again_before_viewers_drop_it(

@@ -15,6 +15,7 @@
 """The shape, the colour and the opacity of a beam."""
 
 import math
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,7 +27,7 @@ from support.fake_light import status_message
 EXTERNAL_SYNC = 2
 
 
-def beam_of(*reports: dict[str, float]) -> Beam:
+def beam_of(*reports: dict[str, Any]) -> Beam:
     """Return the beam of a light that is on and sends these statuses."""
     beam = Beam()
     for report in reports:
@@ -77,7 +78,7 @@ def test_cone_is_closed_with_its_apex_at_the_origin_and_normals_pointing_outward
     ([strobe(0.02, 30.0, brightness=50.0)], (pytest.approx(0.15 * MAX_ALPHA), False)),
 ])
 def test_beam_has_the_look_of_the_last_plausible_status(
-    reports: list[dict[str, float]], look: tuple[float, bool],
+    reports: list[dict[str, Any]], look: tuple[float, bool],
 ) -> None:
     beam = beam_of(*reports)
 

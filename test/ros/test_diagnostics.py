@@ -155,15 +155,6 @@ def test_throttled_light_has_the_agreed_configuration_beside_the_reported_one(
                               'strobe_duty_cycle 0 %')
 
 
-def test_implausible_value_is_left_out(light: ServedLight, recorder: Recorder) -> None:
-    light.report(brightness=math.nan)
-
-    lamp = wait_for(recorder, 'lamp', lambda values: 'brightness_percent' not in values)
-
-    light.report(brightness=90.0)
-    assert 'mode' in lamp
-
-
 def test_link_values_count_frames_and_bytes(light: ServedLight, recorder: Recorder) -> None:
     before = wait_for(recorder, 'link')
 

@@ -14,22 +14,19 @@
 
 """``~/enable`` succeeds only if the light has accepted the command and shows it."""
 
-import math
 import re
 import socket
-from typing import Any
 
 import pytest
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
-from support.light import Address, eventually, MavCmd, MavResult, ON_OFF, ServedLight
+from support.light import MavResult, ON_OFF, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until, SPEED
 
 ONCE = r'\(1 try, \d+ ms\)'
 # s for which each try is waited for at most.
 A_TRY = 0.5
-STATUS = 440
 
 
 @pytest.fixture
@@ -71,21 +68,6 @@ def test_refusal_is_reported_with_the_name_of_its_result(
     assert re.fullmatch(rf'refused: {re.escape(name)} {ONCE}', response.message)
 
 
-@pytest.mark.parametrize('first', [MavResult.TEMPORARILY_REJECTED, None])
-def test_command_that_is_rejected_for_now_or_lost_is_sent_again(
-    ros: Ros, off: ServedLight, first: MavResult | None,
-) -> None:
-    off.fake.results[ON_OFF] = [first, MavResult.ACCEPTED]
-    call = ros.start_enable()
-    off.wait_for(ON_OFF)
-    ros.catch_up()
-
-    CLOCK.forward(A_TRY)
-
-    assert call.result().success
-    assert 'MAV_RESULT_ACCEPTED (2 tries, ' in call.result().message
-
-
 def test_silent_light_fails_after_all_tries_which_are_numbered(
     ros: Ros, off: ServedLight,
 ) -> None:
@@ -114,70 +96,6 @@ def test_accepted_command_fails_if_the_status_contradicts_it(
     assert re.fullmatch(
         r'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off '
         r'\(1 try, 1\.\d\d s\)', call.result().message)
-
-
-def test_accepted_command_fails_if_no_status_follows(ros: Ros, off: ServedLight) -> None:
-    off.fake.stream = 0.0
-    off.fake.pushes = False
-    off.fake.answers.discard(STATUS)
-    call = ros.start_enable()
-    # The bridge asks for the status once the command is acknowledged.
-    off.wait_for(MavCmd.REQUEST_MESSAGE)
-
-    CLOCK.forward(1.0)
-
-    assert not call.result().success
-    assert re.search(
-        r'but no ILLUMINATOR_STATUS came within 1\.\d\d s', call.result().message)
-
-
-def test_change_within_a_second_of_the_acknowledgement_is_a_success(
-    ros: Ros, off: ServedLight,
-) -> None:
-    off.fake.apply_after = 0.9
-    call = ros.start_enable()
-    off.wait_for(ON_OFF)
-    ros.catch_up()
-    assert not call.answered
-
-    CLOCK.forward(0.9)
-
-    assert call.result().success
-
-
-@pytest.mark.parametrize('result', [MavResult.ACCEPTED, MavResult.FAILED])
-def test_command_in_progress_is_awaited_and_not_sent_again(
-    ros: Ros, off: ServedLight, result: MavResult,
-) -> None:
-    off.fake.results[ON_OFF] = None
-    call = ros.start_enable()
-    off.wait_for(ON_OFF)
-    off.acknowledge(ON_OFF, MavResult.IN_PROGRESS, progress=50)
-    ros.catch_up()
-    off.forget()
-
-    CLOCK.forward(5 * A_TRY)
-    ros.catch_up()
-    assert not call.answered
-    off.report(enable=int(result == MavResult.ACCEPTED))
-    off.acknowledge(ON_OFF, result)
-
-    assert call.result().success is (result == MavResult.ACCEPTED)
-    assert f'MAV_RESULT_{result.name}' in call.result().message
-    assert off.commands(ON_OFF) == []
-
-
-def test_acknowledgement_from_another_component_does_not_count(
-    ros: Ros, off: ServedLight,
-) -> None:
-    off.fake.results[ON_OFF] = None
-    call = ros.start_enable()
-    off.wait_for(ON_OFF)
-
-    off.acknowledge(ON_OFF, MavResult.ACCEPTED, source=Address(1, 1))
-    off.acknowledge(ON_OFF, MavResult.DENIED)
-
-    assert call.result().message.startswith('refused: MAV_RESULT_DENIED')
 
 
 def test_two_callers_each_get_the_answer_to_their_own_request(
@@ -251,29 +169,3 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
             assert no_light_messages(own_ros) == {
                 f'no light connected: udpin://127.0.0.1:{port} is not open: '
                 f'cannot listen on 127.0.0.1:{port}: Address already in use'}
-
-
-def test_light_that_never_sends_a_status_is_believed_and_the_answer_says_so(
-    own_ros: Ros, port: int,
-) -> None:
-    light = ServedLight(port, stream=0.0)
-    light.fake.pushes = False
-    light.fake.answers.clear()
-
-    def is_asked_for_its_status_after_the_command() -> bool:
-        received: list[Any] = list(light.fake.received)
-        first = next((number for number, message in enumerate(received)
-                      if message.command == ON_OFF), math.inf)
-        return any(message.command == MavCmd.REQUEST_MESSAGE and message.param1 == STATUS
-                   for number, message in enumerate(received) if number > first)
-
-    with running_bridge(own_ros.domain, port) as bridge, light:
-        bridge.wait_for('connected')
-
-        call = own_ros.start_enable()
-        eventually(is_asked_for_its_status_after_the_command)
-        CLOCK.forward(1.0)
-
-        assert call.result().success
-        assert 'accepted, not confirmed' in call.result().message
-        assert len(light.commands(ON_OFF)) == 1

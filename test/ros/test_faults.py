@@ -20,11 +20,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.ros.publishers import LightPublishers
+from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsPublisher
 from illuminator_ros.ros.node import PayloadNode
 from illuminator_ros.ros.parameter_services import ParameterServices
 import pytest
 from rcl_interfaces.srv import ListParameters
+from rclpy.parameter import Parameter
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support.embedded import embedded_bridge
@@ -37,12 +39,38 @@ from support.waiting import eventually
 
 
 @pytest.fixture(scope='module')
-def light(domain: int, ros: Ros) -> Iterator[ServedLight]:
-    """Return a light that has reported its configuration to a bridge in this process."""
+def served(domain: int, ros: Ros) -> Iterator[tuple[Bridge, ServedLight]]:
+    """Return a bridge in this process, and a light that has reported its configuration to it."""
     light = ServedLight(port := free_port())
-    with embedded_bridge(domain, port), light:
+    with embedded_bridge(domain, port, beam_range=5.0) as bridge, light:
         Parameters(ros).wait(mode='internal_control')
-        yield light
+        yield bridge, light
+
+
+@pytest.fixture
+def light(served: tuple[Bridge, ServedLight]) -> ServedLight:
+    return served[1]
+
+
+def test_queue_of_a_state_topic_holds_one_message_and_that_of_a_stream_ten(
+    served: tuple[Bridge, ServedLight],
+) -> None:
+    depths = {publisher.topic_name: publisher.qos_profile.depth
+              for publisher in served[0].node.publishers}
+
+    streams = {topic: depths[topic] for topic in ('/illuminator/temperature', '/diagnostics')}
+    assert set(streams.values()) == {10}
+    assert {depth for topic, depth in depths.items()
+            if topic.startswith('/illuminator/') and topic not in streams} == {1}
+
+
+def test_parameter_of_the_light_that_is_set_past_the_services_is_refused(
+    served: tuple[Bridge, ServedLight],
+) -> None:
+    [result] = served[0].node.set_parameters([Parameter('brightness', value=9.0)])
+
+    assert not result.successful
+    assert result.reason == 'brightness: only the parameter services reach the device'
 
 
 class Fault:

@@ -17,7 +17,6 @@
 import math
 
 import pytest
-from std_msgs.msg import Float32
 from support.light import CONFIGURE, ServedLight
 from support.processes import Program
 from support.recording import Recorder
@@ -86,45 +85,3 @@ def test_report_that_is_no_change_makes_no_line_no_event_and_no_command(
     assert events.messages == []
     assert bridge.count('was changed') == lines
     assert light.commands(CONFIGURE) == []
-
-
-def test_throttled_brightness_is_published_while_the_parameter_stays(
-    ros: Ros, light: ServedLight, parameters: Parameters, events: Recorder,
-) -> None:
-    light.report(brightness=40.0, error_status=THROTTLING)
-
-    ros.subscribe(Float32, '/illuminator/brightness').wait_value(40.0)
-    assert parameters.get('brightness') == [80.0]
-
-
-@pytest.mark.parametrize(('steps', 'value', 'shown'), [(0.0, 60.1, 60.1), (1.0, 33.3, 33.0)])
-def test_set_is_one_command_and_no_change_even_if_the_light_rounds_it(
-    ros: Ros, light: ServedLight, parameters: Parameters, bridge: Program, events: Recorder,
-    steps: float, value: float, shown: float,
-) -> None:
-    lines = bridge.count('was changed')
-    light.fake.steps = steps
-
-    [result] = parameters.set(brightness=value)
-    light.fake.steps = 0.0
-    for _ in range(3):
-        light.report()
-    ros.catch_up()
-
-    assert result.successful
-    assert parameters.get('brightness') == [shown]
-    assert len(light.commands(CONFIGURE)) == 1
-    assert bridge.count('was changed') == lines
-
-
-def test_set_after_a_change_by_another_sender_keeps_that_change(
-    light: ServedLight, parameters: Parameters, events: Recorder,
-) -> None:
-    parameters.set(brightness=50.0)
-    light.report(brightness=20.0)
-    parameters.wait(brightness=20.0)
-
-    parameters.set(strobe_duty_cycle=1.0)
-
-    assert parameters.get('brightness', 'strobe_duty_cycle') == [20.0, 1.0]
-    assert light.fake.fields['brightness'] == 20.0

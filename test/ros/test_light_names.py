@@ -17,6 +17,7 @@
 from collections.abc import Callable, Iterator
 import contextlib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from std_msgs.msg import Float32
@@ -38,7 +39,7 @@ def start(own_ros: Ros) -> Iterator[Start]:
     with contextlib.ExitStack() as stack:
         def run_all(
             *arguments: str, sources: tuple[Address, ...] = (FIRST, SECOND),
-            unserved: tuple[Address, ...] = (), **parameters: object,
+            unserved: tuple[Address, ...] = (), **parameters: Any,
         ) -> tuple[Program, list[ServedLight]]:
             port = free_port()
             bridge = stack.enter_context(running_bridge(

@@ -15,6 +15,7 @@
 """The effect of the parameters of the link, and of use_sim_time."""
 
 import re
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
@@ -31,7 +32,7 @@ STATUS = 440.0
 @pytest.mark.parametrize(('given', 'address'), [
     ({}, Address(1, 194)), ({'system_id': 7, 'component_id': 42}, Address(7, 42))])
 def test_bridge_sends_from_its_address_and_leaves_the_status_interval_alone(
-    own_ros: Ros, port: int, given: dict[str, int], address: Address,
+    own_ros: Ros, port: int, given: dict[str, Any], address: Address,
 ) -> None:
     with running_bridge(own_ros.domain, port, **given), ServedLight(port) as light:
         Parameters(own_ros).wait(brightness=100.0)

@@ -15,7 +15,6 @@
 """Lights that go and return, components that are none, and frames that harm nothing."""
 
 from collections.abc import Iterator
-import random
 import socket
 
 from illuminator_ros.mavlink.messages import heartbeat
@@ -74,20 +73,6 @@ def test_light_that_was_lost_through_a_power_cycle_is_configured_again(
         Parameters(own_ros).wait(brightness=31.0)
 
 
-def test_silence_shorter_than_the_timeout_is_not_a_loss(
-    own_ros: Ros, port: int, bridge: Program,
-) -> None:
-    light = ServedLight(port)
-    with light:
-        bridge.wait_for('connected')
-    CLOCK.forward(5.0)
-    with light:
-        own_ros.subscribe(Float64, '/illuminator/uptime').wait(count=3)
-
-        assert own_ros.enable().success
-    assert (bridge.count('lost'), bridge.count('connected')) == (0, 1)
-
-
 def test_request_to_a_light_that_is_lost_meanwhile_is_answered(
     own_ros: Ros, port: int, bridge: Program,
 ) -> None:
@@ -112,20 +97,6 @@ def test_port_in_use_is_one_line_until_it_is_free(own_ros: Ros, port: int) -> No
             bridge.wait_for('link open')
 
             assert bridge.count('link not open') == 1
-
-
-def test_garbage_from_a_stranger_does_not_disturb_the_light(
-    own_ros: Ros, port: int, bridge: Program,
-) -> None:
-    noise = random.Random(1)
-    with (ServedLight(port) as light,
-          socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger):
-        bridge.wait_for('connected')
-        for size in range(1000):
-            stranger.sendto(b'\xfd' + noise.randbytes(size % 300), ('127.0.0.1', port))
-
-        assert own_ros.enable().success
-        assert light.fake.fields['enable'] == 1
 
 
 def test_component_that_sends_only_statuses_is_a_light_and_an_autopilot_is_not(

@@ -15,7 +15,7 @@
 """The monitor in a ROS graph: which lights it finds, what it shows and asks of them."""
 
 from collections.abc import Iterator
-import threading
+from typing import Any
 
 from illuminator_ros.cli.monitor.graph import lights_among, TOPICS, type_name
 from illuminator_ros.cli.monitor.key_bindings import (
@@ -24,18 +24,15 @@ from illuminator_ros.cli.monitor.key_bindings import (
     Request,
     strobe,
     switch,
-    switch_off,
 )
 from illuminator_ros.cli.monitor.model import Light, Outcome, State
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
-from std_srvs.srv import SetBool
-from support.light import Address, CONFIGURE, eventually, MavResult, ServedLight
+from support.light import Address, CONFIGURE, ServedLight
 from support.monitors import Watching, watching
 from support.ports import free_port
 from support.ros import Ros, running_bridge, STATE
 from support.slow import pass_time_until
-from support.waiting import PATIENCE
 
 VALUES = {'temperature': 61.5, 'mode': 'external_sync', 'connected': True, 'enabled': True,
           'brightness': 30.0, 'strobe_period': 0.5, 'strobe_duty_cycle': 20.0}
@@ -125,27 +122,6 @@ def test_steps_add_up_and_a_strobe_is_one_command(light: ServedLight, monitor: W
         1.0, 50.0)
 
 
-def test_refused_set_shows_its_reason_and_keeps_the_setpoint(
-    light: ServedLight, monitor: Watching,
-) -> None:
-    light.fake.results[CONFIGURE] = MavResult.DENIED
-    monitor.ask(darker)
-
-    assert 'MAV_RESULT_DENIED' in monitor.outcome('brightness 40 %', Outcome.FAILED)
-    assert monitor.light().setpoint == 50.0
-
-
-def test_off_is_done_while_a_set_is_not_answered(light: ServedLight, monitor: Watching) -> None:
-    light.fake.results[CONFIGURE] = None
-    monitor.ask(darker)
-    monitor.outcome('brightness 40 %', Outcome.PENDING)
-
-    monitor.ask(switch_off)
-
-    monitor.outcome('off', Outcome.DONE)
-    pass_time_until(lambda: not monitor.light().wanted, step=0.1)
-
-
 def test_two_monitors_show_the_same(ros: Ros, monitor: Watching) -> None:
     with watching(ros) as other:
         other.wait(lambda light: light.setpoint == 50.0)
@@ -174,37 +150,6 @@ class FakeBridge:
             self._node.destroy_publisher(publisher)
 
 
-def test_missing_service_is_reported_at_once_and_a_silent_one_after_a_time(
-    own_ros: Ros,
-) -> None:
-    release = threading.Event()
-    own_ros.node.create_service(
-        SetBool, '/dead/enable', lambda request, response: release.wait(PATIENCE) and response)
-    FakeBridge(own_ros, '/dead')
-    FakeBridge(own_ros, '/mute')
-
-    def asked() -> bool:
-        # Until the service has been found, the request fails at once.
-        monitor.ask(switch_off, '/dead')
-        action = monitor.light('/dead').action
-        return action is not None and action.outcome is Outcome.PENDING
-
-    def given_up() -> bool:
-        action = monitor.light('/dead').action
-        return action is not None and 'no answer from /dead' in action.answer
-
-    with watching(own_ros) as monitor:
-        try:
-            for name in ('/mute', '/dead'):
-                monitor.wait(lambda light: light.value('enabled'), name)
-            monitor.ask(switch_off, '/mute')
-            assert '/mute/enable' in monitor.outcome('off', Outcome.FAILED, '/mute')
-            eventually(asked)
-            pass_time_until(given_up)
-        finally:
-            release.set()
-
-
 def test_light_that_leaves_is_marked_can_be_cleared_and_can_return(own_ros: Ros) -> None:
     with watching(own_ros) as monitor:
         first = FakeBridge(own_ros, '/one')
@@ -222,7 +167,7 @@ def test_light_that_leaves_is_marked_can_be_cleared_and_can_return(own_ros: Ros)
 
 def test_bridges_of_one_node_name_in_two_namespaces_are_distinct(own_ros: Ros) -> None:
     ports = [free_port(), free_port()]
-    often = {'diagnostics_period': 0.1}
+    often: Any = {'diagnostics_period': 0.1}
     with (running_bridge(own_ros.domain, ports[0], '-r', '__ns:=/uav1', **often),
           running_bridge(own_ros.domain, ports[1], '-r', '__ns:=/uav2', **often),
           ServedLight(ports[0], brightness=10.0),

@@ -14,7 +14,7 @@
 
 """Which requests of the monitor wait for which, with services that answer when a test says so."""
 
-from typing import Any
+from typing import Any, cast
 
 from illuminator_ros.cli.monitor.graph import ANSWER_LIMIT, Requests
 from illuminator_ros.cli.monitor.key_bindings import dim, strobe, switch
@@ -22,6 +22,7 @@ from illuminator_ros.cli.monitor.model import Fleet, Outcome
 import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 from std_srvs.srv import SetBool
@@ -56,7 +57,7 @@ class Bench:
         self.fleet.seen(['/bow'], 0.0)
         self.fleet.take('/bow', 'enabled', False, 0.0)
         self.fleet.agreed('/bow', 50.0)
-        self.requests = Requests(self, '/bow', self.fleet, lambda: self.now)
+        self.requests = Requests(cast(Node, self), '/bow', self.fleet, lambda: self.now)
         self.enable = self.clients['/bow/enable']
         self.setter = self.clients['/bow/set_parameters_atomically']
         self.getter = self.clients['/bow/get_parameters']

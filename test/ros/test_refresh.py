@@ -23,7 +23,7 @@ from support.light import MavCmd, MavResult, ServedLight
 from support.processes import Program
 from support.recording import Call
 from support.ros import Ros
-from support.slow import CLOCK, pass_time_until
+from support.slow import CLOCK
 
 STATUS, INFORMATION = 440, 396
 REQUEST = MavCmd.REQUEST_MESSAGE
@@ -56,17 +56,6 @@ def test_both_messages_are_asked_for_and_published_or_logged(
     assert {command.param1 for command in light.commands(REQUEST)} == {STATUS, INFORMATION}
     recorder.wait_value(12.0)
     bridge.wait_for('light 1/243 is other maker, serial number T-2')
-
-
-def test_light_without_identity_is_a_success(ros: Ros, light: ServedLight) -> None:
-    light.fake.answers.discard(INFORMATION)
-    call = start(ros)
-    pass_time_until(lambda: call.answered, step=0.1)
-
-    light.fake.answers.add(INFORMATION)
-    assert call.result().success
-    assert ('ILLUMINATOR_STATUS: received, COMPONENT_INFORMATION_BASIC: acknowledged, but not '
-            'sent') in call.result().message
 
 
 @pytest.mark.parametrize(('result', 'reason'), [

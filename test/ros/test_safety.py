@@ -80,7 +80,12 @@ def test_light_goes_off_after_silence_while_the_executor_is_blocked(own_ros: Ros
         Parameters(own_ros).wait(mode='internal_control')
         assert own_ros.enable(True).success
         blocked = threading.Event()
-        process.node.create_timer(0.001, lambda: (blocked.set(), released.wait()))
+
+        def block() -> None:
+            blocked.set()
+            released.wait()
+
+        process.node.create_timer(0.001, block)
         assert blocked.wait(PATIENCE)
 
         pass_time_until(lambda: light.fake.fields['enable'] == 0)

@@ -41,6 +41,11 @@ def says(text: str, name: str, level: bytes) -> Callable[[DiagnosticArray], bool
         for status in array.status)
 
 
+def is_of(node: str) -> Callable[[DiagnosticArray], bool]:
+    """Return a condition for arrays: they are those of a node."""
+    return lambda array: array.status[0].name == f'{node}: link'
+
+
 def test_two_bridges_of_different_addresses_share_the_lights_and_do_not_clash(
     own_ros: Ros,
 ) -> None:
@@ -68,8 +73,7 @@ def test_two_bridges_of_different_addresses_share_the_lights_and_do_not_clash(
         for count in (1, 2, 3):
             CLOCK.forward(1.0)
             for name in ('first', 'second'):
-                arrays.wait(lambda array, name=name: array.status[0].name == f'{name}: link',
-                            count=count)
+                arrays.wait(is_of(name), count=count)
         assert not any(CLASH in array.status[0].message for array in arrays.messages)
 
 
@@ -83,9 +87,10 @@ def test_two_bridges_of_one_address_both_report_the_clash(own_ros: Ros) -> None:
                 own_ros.domain, port, '-r', f'__node:={name}',
                 connection_url=f'udpout://127.0.0.1:{port}'))
         arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-        for name in ('first', 'second'):
-            clash = says(CLASH, f'{name}: link', DiagnosticStatus.ERROR)
-            pass_time_until(lambda clash=clash: any(map(clash, list(arrays.messages))))
+        clashes = [says(CLASH, f'{name}: link', DiagnosticStatus.ERROR)
+                   for name in ('first', 'second')]
+        pass_time_until(lambda: all(
+            any(map(clash, list(arrays.messages))) for clash in clashes))
 
 
 @pytest.fixture(scope='module')

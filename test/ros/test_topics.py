@@ -19,7 +19,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from support.light import ON_OFF, ServedLight
@@ -166,18 +165,6 @@ def test_connected_is_false_before_a_light_is_heard_and_published_on_change_only
             uptime.wait(count=6)
 
         assert recorder.values == [False, True, False, True]
-
-
-@pytest.mark.parametrize('topic', [*STATUS_TOPICS, 'connected', 'temperature'])
-def test_state_topics_are_latched_and_streams_are_not(
-    ros: Ros, light: ServedLight, topic: str,
-) -> None:
-    ros.find_publisher(f'/illuminator/{topic}')
-    [info] = ros.node.get_publishers_info_by_topic(f'/illuminator/{topic}')
-
-    assert info.qos_profile.reliability is ReliabilityPolicy.RELIABLE
-    assert info.qos_profile.durability is (
-        DurabilityPolicy.VOLATILE if topic == 'temperature' else DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @pytest.mark.parametrize(('arguments', 'node'), [

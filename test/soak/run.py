@@ -212,7 +212,7 @@ class Soak:
 
 def soak(seconds: float, seed: str) -> int:
     """Run it, print what was found, and return the exit status."""
-    warm_up = min(max(seconds / 4, 6.0), 120.0)
+    warm_up = min(max(seconds / 4, 3.0), 120.0)
     with own_domain() as domain, contextlib.ExitStack() as stack:
         one = Soak(seed, domain)
         stack.callback(one.close)

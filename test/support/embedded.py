@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 import contextlib
 import threading
+from typing import Any
 from unittest import mock
 
 from illuminator_ros.cli.payloads import PAYLOADS
@@ -33,7 +34,7 @@ from support.slow import SlowLink
 from support.waiting import PATIENCE
 
 
-def _node(context: Context, parameters: Mapping[str, object]) -> PayloadNode:
+def _node(context: Context, parameters: Mapping[str, Any]) -> PayloadNode:
     return PayloadNode('illuminator', context=context, parameter_overrides=[
         Parameter(name, value=value) for name, value in parameters.items()])
 

@@ -70,10 +70,10 @@ class LightBench:
     ) -> list[Any]:
         """Send a command and return the messages that answer it at once."""
         before, to = len(self.sent), target or self.component.address
-        values = [*params, *[0.0] * (7 - len(params))]
+        one, two, three, four, *_ = values = [*params, *[0.0] * (7 - len(params))]
         self.component.receive(GROUND, (
-            CommandInt(*to, 0, command, 0, 0, *values[:4], 0, 0, 0.0) if form is CommandInt
-            else CommandLong(*to, command, 0, *values)), self.now)
+            CommandInt(*to, 0, command, 0, 0, one, two, three, four, 0, 0, 0.0)
+            if form is CommandInt else CommandLong(*to, command, 0, *values)), self.now)
         self._collect()
         return [message for _, message in self.sent[before:]]
 

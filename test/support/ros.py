@@ -146,11 +146,13 @@ class Ros(SpunNode):
 
     def enable(self, on: bool = True, node: str = '/illuminator') -> SetBool.Response:
         """Switch a light on or off and return the answer."""
-        return self.start_enable(on, node).result()
+        answer: SetBool.Response = self.start_enable(on, node).result()
+        return answer
 
     def refresh(self, node: str = '/illuminator') -> Trigger.Response:
         """Have a light report again and return the answer."""
-        return self.call(Trigger, f'{node}/refresh', Trigger.Request())
+        answer: Trigger.Response = self.call(Trigger, f'{node}/refresh', Trigger.Request())
+        return answer
 
     def catch_up(self, node: str = '/illuminator') -> None:
         """Wait until a node has processed every message that its light has sent until now."""
@@ -180,9 +182,12 @@ class Parameters:
     def events(self) -> Recorder:
         """Record the node's parameter events from now on."""
         recorder = Recorder()
-        self._ros.node.create_subscription(
-            ParameterEvent, '/parameter_events',
-            lambda event: event.node == self._node and recorder.take(event), STREAM)
+
+        def take(event: ParameterEvent) -> None:
+            if event.node == self._node:
+                recorder.take(event)
+
+        self._ros.node.create_subscription(ParameterEvent, '/parameter_events', take, STREAM)
         self._ros.find_publisher('/parameter_events')
         self.get('frame_id')
         return recorder

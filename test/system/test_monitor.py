@@ -137,7 +137,8 @@ def test_dumb_terminal_gets_a_table(own_ros: Ros) -> None:
 
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
     port = free_port()
-    with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port, brightness=30.0)):
+    with (running_bridge(own_ros.domain, port, diagnostics_period=0.1) as bridge,
+          ServedLight(port, brightness=30.0)):
         bridge.wait_for('connected')
         outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
         with open('/dev/full', 'w') as full:

@@ -16,12 +16,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
+import socket
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.mavlink.signing import ticks
+from illuminator_ros.mavlink.signing_files import TimestampStore
 import pytest
 from support.ports import free_port
 from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
 from support.slow import pass_time_until
+from support.waiting import PATIENCE
 
 SECRET, OTHER_SECRET = 'correct horse', 'battery staple'
 KeyFile = Callable[[str], str]
@@ -80,6 +84,22 @@ def test_sender_without_the_key_is_not_heard_and_its_frames_are_counted(
         assert bridge.count('light 1/243 connected') == 0
 
 
+def test_bridge_signs_on_from_the_time_stamp_that_the_run_before_has_stored(
+    own_ros: Ros, key_file: KeyFile,
+) -> None:
+    key, later = key_file(SECRET), ticks(4e9)
+    TimestampStore(key, 'bridge 1/194').store(later, last=True)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as light:
+        light.bind(('127.0.0.1', 0))
+        light.settimeout(PATIENCE)
+        url = f'udpout://127.0.0.1:{light.getsockname()[1]}'
+        with running_bridge(own_ros.domain, 0, connection_url=url, signing_mode='sign',
+                            signing_key_file=key):
+            signature = light.recv(280)[-13:]
+
+    assert later < int.from_bytes(signature[1:7], 'little') < later + 1000
+
+
 def test_light_that_requires_signing_is_recognised_while_signing_is_off(
     own_ros: Ros, key_file: KeyFile,
 ) -> None:
@@ -93,4 +113,4 @@ def test_light_that_requires_signing_is_recognised_while_signing_is_off(
         pass_time_until(lambda: any(
             'commands are not answered' in array.status[0].message
             and 'signing_mode is off' in array.status[0].message
-            for array in list(diagnostics.messages)))
+            for array in list(diagnostics.messages)), step=0.02)

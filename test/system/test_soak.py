@@ -25,7 +25,7 @@ from support.processes import Program, ROOT
 
 @pytest.mark.timeout(120)
 def test_bridge_that_went_through_faults_serves_and_has_not_grown(tmp_path: Path) -> None:
-    soak = Program(sys.executable, str(ROOT / 'test/soak/run.py'), '--seconds', '8', '--seed',
+    soak = Program(sys.executable, str(ROOT / 'test/soak/run.py'), '--seconds', '6', '--seed',
                    'test', cwd=tmp_path)
     assert soak.wait(110.0) == 0, soak.log
     assert 'PROBLEM' not in soak.log
