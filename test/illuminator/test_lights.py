@@ -1,0 +1,406 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A light from its discovery to its loss: liveness, restarts, its stream and its identity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from illuminator_ros.illuminator.client import MAX_ASKED
+from illuminator_ros.illuminator.light import Settings, STATUS_TIMEOUT
+from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandInt,
+    ComponentInformationBasic,
+    decode_payload,
+    encode_payload,
+    INFORMATION_ID,
+    MavCmd,
+    MavResult,
+)
+from illuminator_ros.payload.identity import Identity, MAX_QUESTIONS, SETTLING_TIME, text
+import pytest
+from support.back_to_back import BRIDGE, Pair, START
+from support.client import Client
+from support.fake_light import FakeLight, LIGHT, status_message
+
+CONFIGURE, REQUEST = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.REQUEST_MESSAGE
+
+
+def requests_of(pair: Pair, message_id: int, since: float = 0.0) -> int:
+    """Return how often a message was requested."""
+    return [command.param1 for command in pair.commands(REQUEST, since=since)].count(message_id)
+
+
+def without_clock(stream: float = 1.0) -> FakeLight:
+    light = FakeLight(stream=stream)
+    light.boot = None
+    return light
+
+
+# Liveness
+
+@pytest.mark.parametrize('timeout', [1.1, 3.0, 7.3, 60.0])
+def test_a_light_is_lost_after_the_heartbeat_timeout_and_found_again(
+    fake: FakeLight, timeout: float,
+) -> None:
+    pair = Pair(fake, settings=Settings(heartbeat_timeout=timeout)).settle()
+    light, heard_at = pair.light, pair.light.heard_at
+    fake.silent = True
+    pair.run_until(lambda: not light.connected, within=100.0)
+    assert pair.now - heard_at == pytest.approx(timeout)
+    pair.run(10.0)
+    at = pair.now
+    pair.run(20.0)
+    assert pair.commands(since=at) == []
+    fake.silent = False
+    pair.run(1.0)
+    assert requests_of(pair, STATUS_ID, since=at)
+    assert pair.recorder.events == [
+        'connected', f'lost: no heartbeat for {timeout:.2f} s', 'connected']
+
+
+def test_a_light_is_lost_at_the_deadline_and_not_a_rounding_error_later() -> None:
+    # For some numbers heard_at + timeout - heard_at is less than the timeout.
+    client = Client(BRIDGE, Settings(heartbeat_timeout=7.3))
+    for step in range(1000):
+        client.receive(LIGHT, status_message(), 0.137 * step)
+        light = client.lights[LIGHT]
+        light.poll(light.heard_at + 7.3)
+        assert not light.connected
+
+
+def test_a_lost_link_loses_the_light_at_once_and_a_new_one_finds_it(pair: Pair) -> None:
+    pair.close()
+    assert pair.recorder.events[-1] == 'lost: the link was lost'
+    sent = len(pair.near.sent)
+    pair.run(60.0)
+    assert len(pair.near.sent) == sent
+    pair.open()
+    pair.run(0.1)
+    assert pair.recorder.events[-1] == 'connected'
+
+
+def test_a_light_is_found_before_its_next_heartbeat_when_the_link_is_open_again() -> None:
+    light = FakeLight(stream=0.0)
+    light.link_opened = lambda now: None  # type: ignore[method-assign]
+    pair = Pair(light).settle()
+    pair.close()
+    light.heartbeat.due = pair.now + 60
+    pair.open()
+    pair.run(0.1)
+    assert pair.light.connected
+
+
+def test_a_link_that_is_open_again_is_not_filled_with_requests() -> None:
+    pair = Pair([IlluminatorProperties(address=Address(1, 1 + i))
+                 for i in range(3 * MAX_ASKED)]).settle()
+    pair.close()
+    pair.open()
+    assert len(pair.commands(REQUEST, since=pair.now)) == MAX_ASKED
+
+
+# Restarts
+
+@pytest.mark.parametrize(('light', 'silence', 'restart', 'events'), [
+    (FakeLight(), 0.0, True, ['restarted']),
+    (FakeLight(), 5.0, True, ['lost', 'connected', 'restarted']),
+    (FakeLight(), 50.0, False, ['lost', 'connected']),
+    (without_clock(), 10.0, True, ['lost', 'connected', 'restarted']),
+    (without_clock(), 0.0, False, []),
+    (without_clock(0.0), 0.0, False, []),
+])
+def test_a_restart_is_one_event_after_the_light_is_heard_again(
+    light: FakeLight, silence: float, restart: bool, events: list[str],
+) -> None:
+    pair = Pair(light).settle()
+    light.silent = True
+    pair.run(silence)
+    light.silent = False
+    if restart:
+        light.restart(pair.now)
+    pair.run(60.0)
+    assert [event.partition(':')[0] for event in pair.recorder.events[1:]] == events
+    assert pair.light.restarts == events.count('restarted')
+
+
+@pytest.mark.parametrize(('heartbeat', 'status'), [(0.0, 0.5), (0.5, 0.0)])
+def test_a_light_without_a_clock_may_have_restarted_whichever_message_comes_first(
+    heartbeat: float, status: float,
+) -> None:
+    light = without_clock()
+    pair = Pair(light).settle()
+    light.silent = True
+    pair.run(10.0)
+    light.silent = False
+    light.restart(pair.now)
+    light.heartbeat.due = pair.now + heartbeat
+    light.delay_status(status)
+    pair.run(3.0)
+    assert pair.recorder.events[2:] == ['connected', 'restarted']
+
+
+def test_an_uptime_that_wraps_is_not_a_restart(fake: FakeLight) -> None:
+    fake.boot = START - 2 ** 32 / 1000 + 5.0
+    pair = Pair(fake).settle(20.0)
+    assert pair.snapshot.status
+    assert pair.snapshot.status.uptime_ms < 20_000
+    assert pair.recorder.events == ['connected']
+
+
+def test_a_late_status_is_not_published(fake: FakeLight, faked: Pair) -> None:
+    newest = faked.light.status
+    fake.send(fake.status(faked.now - 2.0))
+    faked.turn()
+    faked.run(0.01)
+    assert faked.light.status is newest
+    assert faked.recorder.statuses[-1] is newest
+
+
+@pytest.mark.parametrize(('dark', 'events'), [
+    (0.5, ['restarted']), (4.0, ['lost', 'connected', 'restarted'])],
+    ids=['too short to be lost', 'lost'])
+def test_two_hundred_power_cycles_each_restore_the_configuration_and_leave_nothing_behind(
+    fake: FakeLight, faked: Pair, dark: float, events: list[str],
+) -> None:
+    assert faked.configure(brightness=40).success
+    faked.run(10.0)
+    begun, commands = faked.now, len(faked.controller.sender)
+    faked.recorder.events.clear()
+    for _ in range(200):
+        fake.silent = True
+        faked.run(dark)
+        fake.silent = False
+        fake.restart(faked.now)
+        faked.run(1.0)
+        assert fake.fields['brightness'] == 40.0
+        faked.run(4.0)
+    assert [event.partition(':')[0] for event in faked.recorder.events] == 200 * events
+    assert len(faked.commands(CONFIGURE, since=begun)) == 200
+    assert (len(faked.controller.lights), len(faked.controller.sender)) == (1, commands)
+
+
+# The stream of statuses
+
+@pytest.mark.parametrize(('stream', 'results', 'least', 'most'), [
+    (1.0, {}, 1, 1),
+    (0.0, {}, 60 / STATUS_TIMEOUT - 2, 60 / STATUS_TIMEOUT + 3),
+    # Each request is tried four times.
+    (0.0, {REQUEST: None}, 4, 4 * (60 / STATUS_TIMEOUT + 3)),
+], ids=['it streams', 'it does not', 'it knows no requests'])
+def test_a_light_that_sends_no_status_is_asked_for_one_at_a_limited_rate(
+    stream: float, results: dict[int, Any], least: float, most: float,
+) -> None:
+    pair = Pair(FakeLight(stream=stream, results=results)).settle(63.5)
+    assert least <= requests_of(pair, STATUS_ID) <= most
+    if not stream and not results:
+        assert len(pair.recorder.statuses) == requests_of(pair, STATUS_ID)
+
+
+@pytest.mark.parametrize('interval', [0.0, 0.1, 0.5, 5.0])
+def test_the_interval_of_the_settings_is_requested_at_first_and_after_a_restart(
+    fake: FakeLight, interval: float,
+) -> None:
+    pair = Pair(fake, settings=Settings(status_interval=interval)).settle(30.0)
+    expected = [(STATUS_ID, pytest.approx(interval * 1e6))] if interval else []
+    assert [(command.param1, command.param2) for command in pair.commands(
+        MavCmd.SET_MESSAGE_INTERVAL)] == expected
+    assert fake.stream == pytest.approx(interval or 1.0)
+    assert requests_of(pair, STATUS_ID, since=START + 3.0) == 0
+    fake.restart(pair.now)
+    fake.stream = 1.0
+    pair.run(10.0)
+    assert fake.stream == pytest.approx(interval or 1.0)
+
+
+@pytest.mark.parametrize('timeout', [10.0, 3.0, 2.0, 1.1])
+def test_a_light_without_heartbeat_and_with_rare_statuses_is_not_lost(timeout: float) -> None:
+    light = FakeLight(heartbeat_type=None)
+    pair = Pair(light, settings=Settings(timeout, status_interval=60.0)).settle(300.0)
+    assert light.stream == 60.0
+    assert pair.recorder.events == ['connected']
+
+
+# The temperature
+
+def test_a_temperature_is_measured_from_the_first_that_is_not_0_unless_the_sensor_fails(
+    fake: FakeLight,
+) -> None:
+    fake.fields['temp_c'] = 0.0
+    pair = Pair(fake).settle()
+    seen = [pair.light.temperature]
+    for fields in ({'temp_c': -3.0}, {'temp_c': 0.0}, {'error_status': 4},
+                   {'error_status': 0, 'temp_c': float('nan')}):
+        fake.fields |= fields
+        pair.run(1.5)
+        seen.append(pair.light.temperature)
+    assert seen == [None, -3.0, 0.0, None, None]
+
+
+# The identity
+
+class Selective(FakeLight):
+    """A light that answers a request for its identity with one result, or not at all."""
+
+    def __init__(self, result: MavResult | None, **options: Any) -> None:
+        super().__init__(**options)
+        self.result = result
+
+    def receive(self, source: Any, message: Any, now: float) -> None:
+        usual = self.results
+        if getattr(message, 'param1', None) == INFORMATION_ID:
+            self.results = {REQUEST: self.result}
+        super().receive(source, message, now)
+        self.results = usual
+
+
+@pytest.mark.parametrize(('field', 'expected'), [
+    (b'torch', 'torch'), (b'torch\0rubbish', 'torch'), (b'', ''), (b'x' * 32, 'x' * 32),
+    (b' padded ', 'padded'), ('Lämp'.encode(), 'Lämp'), (b'a\x1b[31mb', 'a?[31mb'),
+    (b'\xff\xfe', '\N{REPLACEMENT CHARACTER}' * 2), (b'a\nb', 'a?b'),
+])
+def test_a_char_field_is_read_as_printable_text_up_to_its_terminator(
+    field: bytes, expected: str,
+) -> None:
+    assert text(field) == expected
+    sent = ComponentInformationBasic(0, 0, 0, b'm' * 32, field, b'1', b'2', b'n-1')
+    message = decode_payload(ComponentInformationBasic, encode_payload(sent))
+    assert Identity.from_message(message) == Identity('m' * 32, expected, '1', '2', 'n-1')
+
+
+def test_the_identity_is_requested_once_and_again_after_a_loss(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    first = fake.identity
+    faked.run(60.0)
+    assert requests_of(faked, INFORMATION_ID) == 1
+    fake.silent = True
+    faked.run(10.0)
+    fake.identity = Identity(serial_number='T-2')
+    fake.silent = False
+    faked.run(3.0)
+    assert faked.recorder.identities == [first, fake.identity]
+    assert faked.snapshot.identity == fake.identity
+
+
+@pytest.mark.parametrize(('light', 'count', 'failure'), [
+    (Selective(MavResult.DENIED), 1, 'refused: MAV_RESULT_DENIED'),
+    (Selective(MavResult.UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
+    (Selective(None), 4, 'no acknowledgement'),
+    (FakeLight(), MAX_QUESTIONS, 'acknowledged, but not sent'),
+])
+def test_an_identity_that_does_not_come_is_requested_so_often_and_the_reason_named(
+    light: FakeLight, count: int, failure: str,
+) -> None:
+    light.answers.discard(INFORMATION_ID)
+    pair = Pair(light, command_retries=3).settle(30.0)
+    assert requests_of(pair, INFORMATION_ID) == count
+    assert pair.snapshot.identity_is_settled
+    result = pair.wait_for(pair.ask_refresh())
+    assert f'COMPONENT_INFORMATION_BASIC: {failure}' in result.message
+    light.send(light.information())
+    pair.run(10.0)
+    assert pair.snapshot.identity == light.identity
+
+
+def test_a_light_that_ignores_the_request_for_its_identity_confirms_changes_as_fast() -> None:
+    pair = Pair(Selective(None, stream=0.0), command_timeout=5.0)
+    pair.run_until(lambda: pair.controller.lights and pair.light.status)
+    assert not pair.snapshot.identity_is_settled
+    answer = pair.ask_enable(True)
+    assert pair.wait_for(answer).success
+    assert answer.seconds < 0.1
+    pair.run(SETTLING_TIME)
+    assert pair.snapshot.identity_is_settled
+
+
+# Lights in the field
+
+class GuideEmulator(FakeLight):
+    """Address 255/0, acknowledges first and without a target, has no clock and no COMMAND_INT."""
+
+    def __init__(self) -> None:
+        super().__init__(Address(255, 0), min_strobe_period=0.0)
+        self.targeted = False
+        self.apply_after = 0.001
+        self.boot = None
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        if not isinstance(message, CommandInt):
+            super().receive(source, message, now)
+
+
+class ArduSub(FakeLight):
+    """The lights of an autopilot: no heartbeat as a light, and on is what has a brightness."""
+
+    def __init__(self) -> None:
+        super().__init__(Address(1, 1), heartbeat_type=12, mode_bitmask=2, brightness=0.0,
+                         temp_c=0.0, min_strobe_period=0.0, max_strobe_period=0.0)
+        self.last = 50.0
+
+    def _apply(self, message: Any, now: float) -> None:
+        if message.command == CONFIGURE:
+            self.fields['brightness'] = message.param2
+        else:
+            self.fields['brightness'] = self.last if message.param1 else 0.0
+        self.last = self.fields['brightness'] or self.last
+        self.fields['enable'] = int(self.fields['brightness'] > 0)
+
+
+def test_the_emulator_of_the_developer_guide_is_served_and_restored() -> None:
+    light = GuideEmulator()
+    pair = Pair(light).settle()
+    assert pair.light.address == Address(255, 0)
+    assert pair.enable(True).success
+    assert pair.configure(brightness=30, strobe_period=1, strobe_duty_cycle=50).success
+    pair.run(120.0)
+    assert pair.recorder.events == ['connected']
+    light.fields['brightness'] = float('nan')
+    pair.run(2.0)
+    assert pair.light.status.invalid == ('brightness nan',)
+    light.silent = True
+    pair.run(10.0)
+    light.silent = False
+    light.restart(pair.now)
+    pair.run(5.0)
+    assert light.fields['brightness'] == 30.0
+    assert not any(isinstance(message, CommandInt) for message in pair.commands())
+
+
+def test_the_lights_of_ardusub_are_served_without_a_strobe_and_a_temperature() -> None:
+    pair = Pair(ArduSub()).settle()
+    assert pair.light.address == Address(1, 1)
+    assert pair.recorder.events == ['connected']
+    assert pair.light.temperature is None
+    assert not pair.light.limits.known
+    for on, brightness in ((True, 50.0), (False, 0.0)):
+        assert pair.enable(on).success
+        assert pair.light.status.brightness == brightness
+    for brightness in (70.0, 0.0):
+        assert pair.configure(brightness=brightness).success
+        assert pair.light.status.enabled is bool(brightness)
+    result = pair.configure(brightness=70, strobe_period=1)
+    assert not result.success
+    assert 'shows strobe_period 0 s' in result.message
+
+
+def test_a_light_that_supports_its_own_two_commands_only_is_served() -> None:
+    pair = Pair(FakeLight(stream=0.5, results={
+        REQUEST: MavResult.UNSUPPORTED, MavCmd.SET_MESSAGE_INTERVAL: MavResult.UNSUPPORTED}),
+        settings=Settings(status_interval=0.1)).settle()
+    assert pair.enable(True).success
+    assert pair.configure(brightness=50).success
