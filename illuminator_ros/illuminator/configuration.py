@@ -240,8 +240,12 @@ class ConfigurationManager:
     def cancel(self, now: float) -> None:
         """End all changes, and drop the values that were not sent."""
         self._pending = None
+        self.end_requests('cancelled', now)
+
+    def end_requests(self, message: str, now: float) -> None:
+        """End all changes, except the values that must be sent in any case."""
         self._setpoint = None
-        self._queue.cancel('cancelled', now)
+        self._queue.cancel(message, now)
 
     def _drop_pending(self, names: Iterable[str]) -> None:
         """Note that fields have another value by now, or must not be sent."""

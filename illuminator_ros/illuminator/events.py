@@ -22,6 +22,8 @@ from enum import Enum
 
 from .model import Configuration, FIELDS, Limits, Status
 from ..mavlink.messages import Address
+from ..payload.arbitration import Cause as HolderCause
+from ..payload.arbitration import HolderChanged
 from ..payload.identity import Identity
 
 
@@ -164,6 +166,21 @@ class LimitExceeded(LightEvent):
 
 
 @dataclass(frozen=True)
+class LightHeld(LightEvent):
+    """Another source of commands holds a light."""
+
+    change: HolderChanged[str]
+
+
+@dataclass(frozen=True)
+class WishFailed(LightEvent):
+    """The light has not accepted the wish of the source that holds it now."""
+
+    source: str
+    message: str
+
+
+@dataclass(frozen=True)
 class ChangedByOther(LightEvent):
     """
     Another sender has changed a light that must stay as it was.
@@ -220,6 +237,8 @@ class LightSnapshot:
     :param discrepancy: how the light differs from what it has accepted, '' if it does not.
     :param limit_exceeded: how it differs from the limits that the operator has set.
     :param identity_is_settled: whether the identity is known, or will not be known soon.
+    :param holder: the source of commands that holds it, '' if none does; None without sources.
+    :param held_since: when the holder changed last.
     :param unreachable: why requests cannot reach the light, '' if they can.
     """
 
@@ -238,6 +257,8 @@ class LightSnapshot:
     identity_is_settled: bool
     shared_address: bool
     unreachable: str
+    holder: str | None = None
+    held_since: float = 0.0
 
     @property
     def limits(self) -> Limits:
@@ -256,6 +277,9 @@ class LightSnapshot:
         if self.configuration:
             events.append(ConfigurationChanged(
                 self.address, self.configuration, list(FIELDS), Cause.FIRST_STATUS))
+        if self.holder:
+            events.append(LightHeld(
+                self.address, HolderChanged(None, self.holder, HolderCause.CLAIM)))
         return events
 
 

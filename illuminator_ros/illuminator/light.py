@@ -35,6 +35,7 @@ from .events import (
     AutomaticSwitch,
     ChangedByOther,
     LightConnected,
+    LightHeld,
     LightIdentified,
     LightLost,
     LightRestarted,
@@ -43,12 +44,15 @@ from .events import (
     Origin,
     SetpointFailed,
     StatusReceived,
+    WishFailed,
 )
 from .messages import STATUS_ID
 from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
+from .sources import DEFAULT, Sources, SourceSettings
 from .status import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
+from ..payload.arbitration import Cause, HolderChanged
 from ..payload.events import RateLimit, RepeatLimit
 from ..payload.identity import Identity, IdentityQuery
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
@@ -74,6 +78,7 @@ class Settings:
     :param off_after_silence: s without a request after which a light that is on is switched off;
         0 for never.
     :param reassert: whether changes by other senders are undone.
+    :param sources: of commands, None where all are alike.
     """
 
     heartbeat_timeout: float = 3.0
@@ -82,6 +87,7 @@ class Settings:
     limits: SafetyLimits = SafetyLimits()
     off_after_silence: float = 0.0
     reassert: bool = False
+    sources: SourceSettings | None = None
 
 
 @dataclass
@@ -157,6 +163,7 @@ class Light:
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
         self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
+        self._sources = Sources(settings.sources) if settings.sources else None
         self._refreshes: list[_Refresh] = []
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
@@ -332,31 +339,118 @@ class Light:
             self._configuration.confirmed, self._configuration.discrepancy,
             self._configuration.limit_exceeded,
             self._identity_query.identity, self._identity_query.is_settled(now),
-            self._tracker.conflict.detected, self.unreachable(now))
+            self._tracker.conflict.detected, self.unreachable(now),
+            self._sources.holder if self._sources else None,
+            self._sources.since if self._sources else 0.0)
 
     # Requests
 
-    def _can_reach(self, now: float, done: Done, *, is_command: bool = True) -> bool:
+    def _can_reach(self, now: float, done: Done) -> bool:
         """Return whether the light is heard; if not, fail a request with the reason."""
-        if is_command:
-            self.was_commanded = True
-            self._requested_at = now
         if reason := self.unreachable(now):
             done(Result(False, reason), now)
         return not reason
 
-    def enable(self, on: bool, now: float, done: Done, *, detail: str = '') -> None:
+    def _may_send(
+        self, source: str, now: float, done: Done, *, enabled: bool | None = None,
+        brightness: float | None = None,
+    ) -> bool:
+        """Return whether a request of a source can be sent; if not, fail it with the reason."""
+        if refusal := self._claim(source, now, enabled=enabled, brightness=brightness):
+            done(Result(False, refusal), now)
+            return False
+        return self._can_reach(now, done)
+
+    def enable(
+        self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
+    ) -> None:
         """
         Switch the light on or off; ``done`` is called once with the result.
+
+        While a higher source holds the light, this is not sent but remembered.
 
         Off overtakes: requests to switch on that are not accepted yet are cancelled.
 
         :param detail: how it was asked for, which :class:`LightSwitched` repeats.
         """
-        if not self._can_reach(now, done):
+        if not self._may_send(source, now, done, enabled=on):
             return
         self._automatic = None
         self._switch(on, now, done, detail)
+
+    def note_request(self, now: float, source: str = '') -> None:
+        """Note that a source has commanded the light, though its command must wait."""
+        self.was_commanded = True
+        self._requested_at = now
+        if self._sources and source:
+            self._sources.renew(source, now)
+
+    def is_held_by_other(self, source: str) -> bool:
+        """Return whether another source holds the light, so that a request is not sent."""
+        return bool(self._sources and self._sources.holder and self._sources.refusal(source))
+
+    def release(self, source: str, now: float) -> None:
+        """Note that a source needs the light no more: the next lower one gets it."""
+        self.note_request(now)
+        if self._sources:
+            self._change_holder(self._sources.poll(now), now)
+            self._change_holder(self._sources.release(source, now), now)
+            self._changed(self, now)
+
+    def _claim(
+        self, source: str, now: float, *, enabled: bool | None = None,
+        brightness: float | None = None,
+    ) -> str:
+        """Take a request; return why a source may not command the light, '' if it may."""
+        self.note_request(now)
+        if self._sources is None:
+            return ''
+        self._change_holder(self._sources.poll(now), now)
+        self._change_holder(self._sources.claim(source, now), now)
+        self._sources.remember(source, enabled=enabled, brightness=brightness)
+        self._changed(self, now)
+        return self._sources.refusal(source)
+
+    def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
+        if change is None or self._sources is None:
+            return
+        self._emit(LightHeld(self.address, change))
+        if change.after is None:
+            if self._sources.settings.off_on_release:
+                self._switch_automatically(_AutomaticSwitch(
+                    False, f'on_release: {change.before} no longer holds it', now))
+            return
+        self._end_requests(f'held by {change.after}', now)
+        if change.cause is not Cause.CLAIM:
+            self._send_wish(self._sources, now)
+
+    def _end_requests(self, message: str, now: float) -> None:
+        """End the requests of a source that no longer holds the light, and their resends."""
+        if self._automatic and self._automatic.on:
+            self._automatic = None
+        self._switching.cancel(message, now)
+        self._configuration.end_requests(message, now)
+        self._commands.end_all(
+            now, CommandStatus.CANCELLED, self.address,
+            (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
+
+    def _send_wish(self, sources: Sources, now: float) -> None:
+        """Send what the source that holds the light now has asked for before."""
+        holder, wish = sources.holder, sources.wish
+
+        def done(result: Result, now: float) -> None:
+            if not result.success:
+                self._emit(WishFailed(self.address, holder, result.message))
+
+        if not self._can_reach(now, done):
+            return
+        limit = self.settings.off_after_silence or math.inf
+        # A light that went off after silence must not flash.
+        if wish.enabled is not None and (not wish.enabled or now < self._requested_at + limit):
+            self._automatic = None
+            self._switch(wish.enabled, now, done, f'{holder}, which holds the light now')
+        if wish.brightness is not None:
+            self._configuration.set_brightness(wish.brightness, now)
 
     def _switch(self, on: bool, now: float, done: Done, detail: str) -> None:
         change = Switch(on, self.instance)
@@ -383,26 +477,37 @@ class Light:
             self._switching.overtake(request, now)
         self._changed(self, now)
 
-    def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
+    def configure(
+        self, changes: Mapping[str, Any], now: float, done: Done, *, source: str = DEFAULT,
+    ) -> None:
         """
         Change some fields with one command; ``done`` is called once with the result.
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
-        if self._can_reach(now, done):
-            self._configuration.configure(changes, now, done)
+        def finished(result: Result, now: float) -> None:
+            if result.success and self._sources:
+                self._sources.remember(source, brightness=changes.get('brightness'))
+            done(result, now)
+
+        if self._may_send(source, now, done):
+            self._configuration.configure(changes, now, finished)
             self._changed(self, now)
 
-    def set_brightness(self, brightness: float, now: float) -> None:
+    def set_brightness(
+        self, brightness: float, now: float, *, source: str = DEFAULT,
+    ) -> None:
         """
         Take a setpoint of a stream: the newest wins, and one command is under way at a time.
 
         :param brightness: %, checked.
         """
         def failed(result: Result, now: float) -> None:
-            self._emit(SetpointFailed(self.address, result.message))
+            # While another source holds the light, a setpoint is remembered.
+            if not self.is_held_by_other(source):
+                self._emit(SetpointFailed(self.address, result.message))
 
-        if self._can_reach(now, failed):
+        if self._may_send(source, now, failed, brightness=brightness):
             self._configuration.set_brightness(brightness, now)
             self._changed(self, now)
 
@@ -423,9 +528,16 @@ class Light:
         self._commands.end_all(now, CommandStatus.CANCELLED, self.address)
         self._changed(self, now)
 
+    def shut_down(self, now: float, done: Done) -> None:
+        """Switch the light off at once, whatever holds it: the last request to it."""
+        self.cancel(now)
+        self._sources = None
+        if self._can_reach(now, done):
+            self._switch(False, now, done, 'shutdown')
+
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
-        if not self._can_reach(now, done, is_command=False):
+        if not self._can_reach(now, done):
             return
         refresh = _Refresh(done, now)
         self._refreshes.append(refresh)
@@ -464,6 +576,8 @@ class Light:
             self._asked_at, self._status_due = now, now + STATUS_TIMEOUT
             self._target.request_status(now)
         self._identity_query.poll(now)
+        if self._sources:
+            self._change_holder(self._sources.poll(now), now)
         if now >= self._silence_due:
             limit = self.settings.off_after_silence
             self._switch_automatically(_AutomaticSwitch(
@@ -532,6 +646,7 @@ class Light:
         refresh = min((refresh.until for refresh in self._refreshes), default=math.inf)
         return min(lost, self._question_due, refresh, self._silence_due, self._automatic_due,
                    self._identity_query.next_deadline(),
+                   self._sources.next_deadline() if self._sources else math.inf,
                    self._switching.next_deadline(),
                    self._configuration.next_deadline(connected=self.connected))
 

@@ -100,6 +100,10 @@ class Arbiter(Generic[K]):
             self._claims[source] = now
         return self._give(source, Cause.CLAIM, now) if granted else None
 
+    def is_claimed_by(self, source: K) -> bool:
+        """Return whether the claim of a source has been taken and has not ended."""
+        return source in self._claims
+
     def renew(self, source: K, now: float) -> None:
         """Note a sign of life of a source."""
         if source in self._claims:

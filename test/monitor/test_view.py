@@ -46,7 +46,7 @@ def fleet_of(*names: str) -> Fleet:
         fleet.diagnosed(name, 'link', Diagnosis(1, '12 % of the frames lost', {
             'loss_percent': '12.3', 'round_trip_p50_ms': '3.2', 'round_trip_p95_ms': '40'}), NOW)
         fleet.diagnosed(name, 'lamp', Diagnosis(1, 'dimmed because it is hot', {
-            'vendor': 'maker', 'model': 'torch', 'serial_number': 'T-1'}), NOW)
+            'vendor': 'maker', 'model': 'torch', 'holder': 'safety', 'serial_number': 'T-1'}), NOW)
     return fleet
 
 
@@ -66,7 +66,7 @@ def shown(fleet: Fleet, width: int = 132, height: int = 24, *,
 @pytest.mark.parametrize('text', [
     '/bow', 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
     'thermal throttling', 'dimmed because it is hot', 'maker torch', 'no. T-1',
-    'agreed: 90 %', 'up 5 min', '1 light: 1 ON', '30.0 to 41.5'])
+    'agreed: 90 %', 'up 5 min', 'held by safety', '1 light: 1 ON', '30.0 to 41.5'])
 def test_screen_shows_each_known_value(text: str) -> None:
     assert text in shown(fleet_of('/bow'))
 

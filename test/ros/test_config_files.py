@@ -24,6 +24,7 @@ import xml.etree.ElementTree as ET
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
+from support.embedded import refusal
 from support.graph import Interface, interface
 from support.light import Address, ServedLight
 from support.ros import Ros, running_bridge, STREAM
@@ -49,7 +50,8 @@ SHOWN = {'brightness', 'temperature', 'connected', 'enabled', 'error_flags'}
 @pytest.fixture(scope='module')
 def settings() -> dict[str, Any]:
     """With everything that makes the node do more."""
-    return {'use_sim_time': True, 'beam_range': 5.0}
+    return {'use_sim_time': True, 'beam_range': 5.0,
+            'sources': "['safety', 'operator', 'autonomy']"}
 
 
 @pytest.fixture(scope='module')
@@ -170,6 +172,20 @@ def test_policy_permits_the_operator_all_that_the_bridge_offers_but_its_internal
     assert sorted(permitted('operator', 'service', 'reply')) == sorted(
         name.replace('/tester/', '/operator/') for name in mine.services)
     assert set(mine.publishers) <= set(permitted('operator', 'topic', 'publish'))
+
+
+def test_policy_permits_a_source_its_own_names_only() -> None:
+    names = permitted('mission', 'topic', 'publish') + permitted('mission', 'service', 'request')
+
+    assert {name for name in names if name.startswith('/illuminator/')} == {
+        f'/illuminator/autonomy/{name}'
+        for name in ('cmd/brightness', 'cmd/enable', 'enable', 'release')}
+
+
+def test_example_of_sources_has_parameters_that_the_bridge_accepts(own_ros: Ros) -> None:
+    given = yaml.safe_load((CONFIG / 'sources.yaml').read_text())['/**']['ros__parameters']
+
+    assert refusal(own_ros.context, **given) == ''
 
 
 def test_aggregator_takes_all_statuses_of_all_lights_and_no_others(

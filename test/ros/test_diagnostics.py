@@ -29,15 +29,15 @@ from support.slow import CLOCK
 INFORMATION = 396
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 # The values that are text; all others are one number, or true or false.
-TEXTS = {'url', 'address', 'mode', 'agreed', 'vendor', 'model', 'software_version',
+TEXTS = {'url', 'address', 'mode', 'agreed', 'holder', 'vendor', 'model', 'software_version',
          'hardware_version', 'serial_number', 'node'}
 PARTS = ('link', 'lamp')
 Values = dict[str, str]
 
 
 @pytest.fixture(scope='module')
-def settings() -> dict[str, float]:
-    return {'diagnostics_period': 0.1}
+def settings() -> dict[str, object]:
+    return {'diagnostics_period': 0.1, 'sources': "['safety']"}
 
 
 @pytest.fixture(scope='module')
@@ -115,8 +115,10 @@ def test_hardware_id_of_a_light_without_serial_number_is_its_address_and_never_c
 
 @pytest.mark.parametrize('part', PARTS)
 def test_keys_are_those_of_the_protocol_page_and_values_parse(
-    recorder: Recorder, part: str,
+    ros: Ros, light: ServedLight, recorder: Recorder, part: str,
 ) -> None:
+    # Then the source `default` holds the light.
+    ros.enable(False)
     _, _, rest = PROTOCOL.partition(f'| value of `illuminator: {part}` |')
     rows = rest.partition('\n\n')[0].splitlines()[2:]
     documented = [key for row in rows for key in re.findall('`([^`]+)`', row.split('|')[1])]

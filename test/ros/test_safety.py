@@ -14,13 +14,16 @@
 
 """Limits, sources, the dead man's switch and changes by other senders, in the node."""
 
+import math
 import threading
 
+from diagnostic_msgs.msg import DiagnosticArray
 import pytest
-from std_msgs.msg import Float32
+from std_msgs.msg import Bool, Float32, String
+from std_srvs.srv import SetBool, Trigger
 from support.embedded import embedded_bridge, refusal
-from support.light import CONFIGURE, eventually, free_port, ServedLight
-from support.ros import Parameters, Ros, running_bridge
+from support.light import CONFIGURE, eventually, free_port, ON_OFF, ServedLight
+from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until
 from support.waiting import PATIENCE
 
@@ -28,6 +31,17 @@ from support.waiting import PATIENCE
 @pytest.mark.parametrize(('given', 'reason'), [
     ({'max_brightness': 100.5}, 'max_brightness: 100.5 % is out of range: 0 to 100 %'),
     ({'min_strobe_period': -1.0}, 'min_strobe_period: -1.0 s is out of range: 0 to 3600 s'),
+    ({'sources': ['safety', 'safety']}, "sources: 'safety' is given twice"),
+    ({'sources': ['default', 'safety', 'default']}, "sources: 'default' is given twice"),
+    ({'sources': ['1st']}, "sources: '1st' is not a valid name of a source"),
+    ({'sources': ['a__b']}, "sources: 'a__b' is not a valid name of a source"),
+    ({'sources': ['cmd']}, "sources: 'cmd' is not a valid name of a source"),
+    ({'sources': ['a'], 'source_timeout': -1.0}, 'source_timeout: -1.0 s is out of range'),
+    ({'source_timeout': 1.0}, 'source_timeout: is given, but sources is empty'),
+    ({'on_release': 'off'}, 'on_release: is given, but sources is empty'),
+    ({'on_release': 'dim'}, "on_release: 'dim' is not one of keep, off"),
+    ({'external_changes': 'fight'}, "external_changes: 'fight' is not one of follow, reassert"),
+    ({'off_after_silence': math.inf}, 'off_after_silence: inf s is out of range: 0 to 3600 s'),
     ({'max_brightness': 60, 'brightness': 80},
      'brightness 80 % is above max_brightness 60 %'),
 ])
@@ -55,6 +69,71 @@ def test_limits_are_shown_by_descriptors_refuse_parameters_and_clip_streams(own_
         bridge.wait_for('brightness 90 % is above max_brightness 60 %: the limit is sent')
         parameters.wait(brightness=60.0)
         assert max(command.param2 for command in light.commands(CONFIGURE)) == 60.0
+
+
+def ask(ros: Ros, source: str, on: bool) -> SetBool.Response:
+    """Switch the light as a source."""
+    return ros.call(SetBool, f'/illuminator/{source}/enable', SetBool.Request(data=on),
+                    node='/illuminator')
+
+
+def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
+    parameters, port = Parameters(own_ros), free_port()
+    names = "['safety', 'operator', 'default', 'autonomy']"
+
+    def release(source: str) -> str:
+        answer = own_ros.call(
+            Trigger, f'/illuminator/{source}/release', Trigger.Request(), node='/illuminator')
+        assert answer.success
+        return str(answer.message)
+
+    with (running_bridge(own_ros.domain, port, sources=names, diagnostics_period=0.1) as bridge,
+          ServedLight(port) as light):
+        parameters.wait(mode='internal_control')
+        holder = own_ros.subscribe(String, '/illuminator/source')
+        diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        assert ask(own_ros, 'safety', False).success
+
+        own_ros.publish(
+            Float32, '/illuminator/operator/cmd/brightness', 40.0, node='/illuminator')
+        refused, plain = ask(own_ros, 'autonomy', True), own_ros.enable(True)
+        [parameter] = parameters.set(brightness=30.0)
+
+        assert (refused.success, refused.message) == (False, 'held by safety')
+        assert plain.message == parameter.reason == 'held by safety'
+        diagnostics.wait(lambda array: any(
+            (value.key, value.value) == ('holder', 'safety')
+            for status in array.status for value in status.values))
+        assert [command.param1 for command in light.commands(ON_OFF)] == [0.0]
+        assert light.commands(CONFIGURE) == []
+
+        # The operator's wish has waited, then that of the plain interface, then autonomy's.
+        assert release('safety') == 'held by operator'
+        parameters.wait(brightness=40.0)
+        assert release('operator') == 'held by default'
+        eventually(lambda: light.fake.fields['enable'] == 1)
+        assert release('default') == 'held by autonomy'
+        own_ros.publish(Bool, '/illuminator/autonomy/cmd/enable', False, node='/illuminator')
+        eventually(lambda: light.fake.fields['enable'] == 0)
+        assert release('autonomy') == 'held by no source'
+
+        holder.wait(lambda message: message.data == '')
+        bridge.wait_for('light 1/243 is held by autonomy: default has released it')
+        bridge.wait_for('light 1/243 is held by no source: autonomy has released it')
+
+
+def test_silent_source_loses_the_light_while_the_executor_is_blocked(own_ros: Ros) -> None:
+    port, released, blocked = free_port(), threading.Event(), threading.Event()
+    with (embedded_bridge(own_ros.domain, port, sources=['safety'], source_timeout=5.0,
+                          on_release='off') as process, ServedLight(port) as light):
+        Parameters(own_ros).wait(mode='internal_control')
+        assert ask(own_ros, 'safety', True).success
+        process.node.create_timer(0.001, lambda: (blocked.set(), released.wait()))
+        assert blocked.wait(PATIENCE)
+
+        pass_time_until(lambda: light.fake.fields['enable'] == 0)
+
+        released.set()
 
 
 @pytest.mark.parametrize('change', ['follow', 'reassert'])

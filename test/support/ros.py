@@ -89,18 +89,18 @@ class Ros(SpunNode):
             return []
         return [f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in found]
 
-    def publisher(self, type_: Any, topic: str) -> Any:
+    def publisher(self, type_: Any, topic: str, node: str = '') -> Any:
         """Return a publisher that has been found by a subscriber in the bridge."""
         publisher = self._publishers.get(topic)
         if publisher is None:
             publisher = self._publishers[topic] = self.node.create_publisher(type_, topic, 10)
             eventually(publisher.get_subscription_count)
-            self._meet(topic.partition('/cmd/')[0])
+            self._meet(node or topic.partition('/cmd/')[0])
         return publisher
 
-    def publish(self, type_: Any, topic: str, *values: Any) -> None:
+    def publish(self, type_: Any, topic: str, *values: Any, node: str = '') -> None:
         """Publish values, one after the other."""
-        publisher = self.publisher(type_, topic)
+        publisher = self.publisher(type_, topic, node)
         for value in values:
             publisher.publish(type_(data=value))
 
@@ -118,8 +118,7 @@ class Ros(SpunNode):
             pass
         self.node.destroy_client(client)
 
-    def _client(self, type_: Any, service: str) -> Any:
-        node = service.rpartition('/')[0]
+    def _client(self, type_: Any, service: str, node: str) -> Any:
         client, met = self._clients.get(service, (None, set()))
         now = self._incarnations(node)
         if client is None or not now or not now <= met:
@@ -136,9 +135,10 @@ class Ros(SpunNode):
                 for info in self.node.get_publishers_info_by_topic('/rosout')
                 if f'{info.node_namespace.rstrip("/")}/{info.node_name}' == node}
 
-    def start(self, type_: Any, service: str, request: Any) -> Call:
-        """Call a service, once it is there, without waiting for the answer."""
-        return Call(self._client(type_, service).call_async(request))
+    def start(self, type_: Any, service: str, request: Any, node: str = '') -> Call:
+        """Call a service of a node, once it is there, without waiting for the answer."""
+        node = node or service.rpartition('/')[0]
+        return Call(self._client(type_, service, node).call_async(request))
 
     def start_enable(self, on: bool = True, node: str = '/illuminator') -> Call:
         """Begin to switch a light on or off."""
@@ -167,9 +167,11 @@ class Ros(SpunNode):
             for node in others:
                 self.catch_up(node)
 
-    def call(self, type_: Any, service: str, request: Any, timeout: float = PATIENCE) -> Any:
-        """Call a service and return its answer."""
-        return self.start(type_, service, request).result(timeout)
+    def call(
+        self, type_: Any, service: str, request: Any, timeout: float = PATIENCE, node: str = '',
+    ) -> Any:
+        """Call a service of a node and return its answer."""
+        return self.start(type_, service, request, node).result(timeout)
 
 
 class Parameters:

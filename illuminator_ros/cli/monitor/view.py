@@ -296,11 +296,13 @@ def _facts(light: Light, view: ViewState) -> str:
     if agreed is not None and agreed != light.value('brightness'):
         shines += f' (agreed: {agreed:g} %)'
     up = light.value('uptime')
+    holder = light.lamp.values.get('holder', '') if light.lamp else ''
     silence = light.silence(view.now)
     return ', '.join(filter(None, (
         identity.strip(), serial and f'no. {serial}', shines,
         strobe(light.value('strobe_period'), light.value('strobe_duty_cycle')),
-        str(light.value('mode') or ''), '' if up is None else f'up {age(up)}',
+        str(light.value('mode') or ''), holder and f'held by {holder}',
+        '' if up is None else f'up {age(up)}',
         f'nothing heard for {age(silence)}' if silence > 2 else '')))
 
 

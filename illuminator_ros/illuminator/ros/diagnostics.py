@@ -153,6 +153,9 @@ def _lamp_values(light: LightSnapshot, now: float) -> dict[str, Value]:
             'uptime_s': status.uptime_ms / 1000.0,
             'status_s_ago': now - light.status_at,
         }
+    if light.holder is not None:
+        values['holder'] = light.holder or 'none'
+        values['held_s'] = now - light.held_since if light.holder else None
     if light.configuration:
         values['agreed'] = light.configuration.describe()
     if identity is not None:

@@ -22,7 +22,7 @@ import itertools
 from typing import Any
 
 from rclpy.node import Node
-from std_msgs.msg import Bool, Float32
+from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import SetBool, Trigger
 
 from .beam import BeamPublisher
@@ -33,12 +33,13 @@ from ..client import IlluminatorClient
 from ..events import AnyLightEvent
 from ..light import Light
 from ..model import checked, InvalidValue, SafetyLimits
+from ..sources import DEFAULT
 from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
-from ...ros.node import CommandTopic, NodeInterface, RequestService
+from ...ros.node import CommandTopic, NodeInterface, Publication, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import DeviceParameters, ParameterError
 from ...ros.payload import Host
@@ -75,21 +76,23 @@ class LightNode:
         self._client = client
         self._started = host.link.clock()
         self._hardware_id = ''
-        self._switching = LatestOnly(self._switch)
         limits = client.settings.limits
         parameters = DeviceParameters(node, device_parameters(limits))
         self._overrides = _checked(parameters.overrides(), limits)
+        sources = client.settings.sources
         interface = NodeInterface(
-            node, host.link, log, publications=PUBLICATIONS,
+            node, host.link, log,
+            publications=(*PUBLICATIONS, *([Publication('source', String)] if sources else ())),
             services=(
-                RequestService('enable', SetBool, self._enable),
+                *(self._enable_service(source) for source in self._ways()),
+                *(self._release_service(source) for source in (sources.names if sources else ())),
                 RequestService('refresh', Trigger, self._refresh, limit=MAX_REFRESHES),
                 *services),
             commands=(
-                CommandTopic('cmd/enable', Bool, self._switching.offer),
-                CommandTopic('cmd/brightness', Float32, self._set_brightness,
-                             functools.partial(checked, 'brightness')),
+                *(topic for source in self._ways() for topic in self._command_topics(source)),
                 *commands))
+        if sources:
+            interface.publish('source', '')
         ParameterServices(
             node, host.link, log, parameters, self._check_value, self._configure)
         self._publishers = LightPublishers(
@@ -136,26 +139,72 @@ class LightNode:
     def _light(self) -> Light | None:
         return self._client.lights.get(self.address) if self.address else None
 
+    # Sources
+
+    def _ways(self) -> dict[str, str]:
+        """Return the prefix of the names of each source's topics and services."""
+        sources = self._client.settings.sources
+        return {DEFAULT: ''} | {
+            name: f'{name}/' for name in (sources.names if sources else ()) if name != DEFAULT}
+
+    def _enable_service(self, source: str) -> RequestService:
+        def enable(request: SetBool.Request, now: float, answer: Answer) -> None:
+            self._request_enable(source, request.data, now, f'{prefix}service', answer)
+
+        prefix = self._ways()[source]
+        return RequestService(f'{prefix}enable', SetBool, enable)
+
+    def _release_service(self, source: str) -> RequestService:
+        def release(request: Trigger.Request, now: float, answer: Answer) -> None:
+            light = self._light()
+            if light is None:
+                answer(False, self.absence(now))
+            else:
+                light.release(source, now)
+                answer(True, f'held by {light.snapshot(now).holder or "no source"}')
+
+        return RequestService(f'{source}/release', Trigger, release)
+
+    def _command_topics(self, source: str) -> tuple[CommandTopic, CommandTopic]:
+        prefix = self._ways()[source]
+        switching = LatestOnly(functools.partial(self._switch, source, prefix))
+
+        def enable(on: bool, now: float) -> None:
+            if light := self._light():
+                # The switch before may be under way for longer than the source may be silent.
+                light.note_request(now, source)
+            switching.offer(on, now)
+
+        return (
+            CommandTopic(f'{prefix}cmd/enable', Bool, enable),
+            CommandTopic(f'{prefix}cmd/brightness', Float32,
+                         functools.partial(self._set_brightness, source, prefix),
+                         functools.partial(checked, 'brightness')))
+
     # Requests
 
-    def _enable(self, request: SetBool.Request, now: float, answer: Answer) -> None:
-        self._request_enable(request.data, now, 'service', answer)
-
-    def _request_enable(self, on: bool, now: float, way: str, answer: Answer) -> None:
+    def _request_enable(
+        self, source: str, on: bool, now: float, way: str, answer: Answer,
+    ) -> None:
         light = self._light()
         if light is None:
             answer(False, self.absence(now))
         else:
             light.enable(on, now, lambda result, now: answer(result.success, result.message),
-                         detail=way)
+                         detail=way, source=source)
 
-    def _switch(self, on: bool, now: float, ended: Callable[[float], None]) -> None:
+    def _switch(
+        self, source: str, prefix: str, on: bool, now: float, ended: Callable[[float], None],
+    ) -> None:
         def answer(success: bool, message: str) -> None:
-            if not success:
-                self._log.warning(f'~/cmd/enable: {message}', 'cmd/enable')
+            light = self._light()
+            # A source that repeats its wish while a higher one holds the light is not at fault.
+            if not success and not (light and light.is_held_by_other(source)):
+                topic = f'{prefix}cmd/enable'
+                self._log.warning(f'~/{topic}: {message}', topic)
             ended(self._host.link.clock())
 
-        self._request_enable(on, now, 'topic', answer)
+        self._request_enable(source, on, now, f'{prefix}topic', answer)
 
     def _refresh(self, request: Trigger.Request, now: float, answer: Answer) -> None:
         light = self._light()
@@ -164,12 +213,13 @@ class LightNode:
         else:
             light.refresh(now, lambda result, now: answer(result.success, result.message))
 
-    def _set_brightness(self, brightness: float, now: float) -> None:
+    def _set_brightness(self, source: str, prefix: str, brightness: float, now: float) -> None:
         light = self._light()
         if light is None:
-            self._log.warning(f'~/cmd/brightness: {self.absence(now)}', 'cmd/brightness')
+            topic = f'{prefix}cmd/brightness'
+            self._log.warning(f'~/{topic}: {self.absence(now)}', topic)
         else:
-            light.set_brightness(brightness, now)
+            light.set_brightness(brightness, now, source=source)
 
     # The value of a parameter is of any type.
     def _check_value(self, name: str, value: Any) -> None:

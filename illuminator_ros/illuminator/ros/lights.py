@@ -204,8 +204,7 @@ class Lights(ServedPayload):
                                                f'{result.message}')
 
         for light in lights:
-            light.cancel(now)
-            light.enable(False, now, functools.partial(done, light.address), detail='shutdown')
+            light.shut_down(now, functools.partial(done, light.address))
         return {light.address: f'light {light.address} may still be on: no confirmation'
                 for light in lights}
 

@@ -33,6 +33,7 @@ from ..events import (
     ConfigurationChanged,
     ConfigurationRestored,
     LightConnected,
+    LightHeld,
     LightIdentified,
     LightLost,
     LightRestarted,
@@ -42,6 +43,7 @@ from ..events import (
     SetpointClipped,
     SetpointFailed,
     StatusReceived,
+    WishFailed,
 )
 from ..model import (
     Configuration,
@@ -52,6 +54,7 @@ from ..model import (
     shortest,
     Status,
 )
+from ...payload.arbitration import Cause as HolderCause
 from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.log import NodeLog
@@ -73,6 +76,12 @@ PUBLICATIONS = (
     Publication('temperature', Temperature, STREAM_QOS),
     Publication('connected', Bool),
 )
+# Why a source no longer holds a light.
+_REASONS = {
+    HolderCause.CLAIM: ', which has taken it from {}',
+    HolderCause.RELEASE: ': {} has released it',
+    HolderCause.SILENCE: ': {} was silent for source_timeout',
+}
 _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 
@@ -115,6 +124,8 @@ class LightPublishers:
             LimitExceeded: self._limit_exceeded,
             AutomaticSwitch: self._automatic_switch,
             ChangedByOther: self._changed_by_other,
+            LightHeld: self._held,
+            WishFailed: self._wish_failed,
         }
         interface.publish('connected', False)
 
@@ -183,6 +194,18 @@ class LightPublishers:
             way = event.detail if event.origin is Origin.REQUEST else event.origin.value
             self._log.info(f'light {event.address} was switched {"on" if event.on else "off"} by '
                            f'{way or "a request"}{_left_out(event.left_out)}', 'switched')
+
+    def _held(self, event: LightHeld) -> None:
+        change = event.change
+        reason = _REASONS[change.cause] if change.before else ''
+        self._log.info(f'light {event.address} is held by {change.after or "no source"}'
+                       f'{reason.format(change.before)}', 'holder')
+        self._interface.publish('source', change.after or '')
+        self._check_diagnostics()
+
+    def _wish_failed(self, event: WishFailed) -> None:
+        self._log.warning(f'light {event.address} is not as {event.source} has asked for before: '
+                          f'{event.message}', 'wish')
 
     def _automatic_switch(self, event: AutomaticSwitch) -> None:
         on = 'on' if event.on else 'off'

@@ -1,0 +1,114 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sources of the commands to one light: which of them holds it, and what each wants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+import math
+
+from ..payload.arbitration import Arbiter, HolderChanged, Policy
+
+# The source of a request that names none.
+DEFAULT = 'default'
+
+
+@dataclass(frozen=True)
+class SourceSettings:
+    """
+    The sources of commands.
+
+    :param names: the highest first; :data:`DEFAULT` is one of them.
+    :param timeout: s of silence after which a source no longer holds a light; infinity for never.
+    :param off_on_release: whether a light is switched off when no source holds it any more.
+    """
+
+    names: tuple[str, ...]
+    timeout: float = math.inf
+    off_on_release: bool = False
+
+
+@dataclass(frozen=True)
+class Wish:
+    """
+    The last values that a source has asked for, None for those that it has not.
+
+    :param brightness: %.
+    """
+
+    enabled: bool | None = None
+    brightness: float | None = None
+
+
+class Sources:
+    """Decides which source holds a light, and remembers what each has asked for. No I/O."""
+
+    def __init__(self, settings: SourceSettings) -> None:
+        self.settings = settings
+        self._arbiter: Arbiter[str] = Arbiter(
+            Policy.PRIORITY, settings.names.index, lease=settings.timeout, remembers=True)
+        self._wishes: dict[str, Wish] = {}
+
+    @property
+    def holder(self) -> str:
+        """Return the source that holds the light, '' if none does."""
+        return self._arbiter.holder or ''
+
+    @property
+    def since(self) -> float:
+        """Return when the holder changed last, s."""
+        return self._arbiter.since
+
+    @property
+    def wish(self) -> Wish:
+        """Return what the holder has asked for."""
+        return self._wishes.get(self.holder, Wish())
+
+    def claim(self, source: str, now: float) -> HolderChanged[str] | None:
+        """Take a request of a source, which holds the light from then on if it may."""
+        return self._arbiter.claim(source, now)
+
+    def remember(self, source: str, *, enabled: bool | None = None,
+                 brightness: float | None = None) -> None:
+        """Remember values that a source has asked for, as long as it claims the light."""
+        if self._arbiter.is_claimed_by(source):
+            old = self._wishes.get(source, Wish())
+            self._wishes[source] = replace(
+                old, enabled=old.enabled if enabled is None else enabled,
+                brightness=old.brightness if brightness is None else brightness)
+
+    def refusal(self, source: str) -> str:
+        """Return why a source may not command the light, '' if it may."""
+        return '' if source == self.holder else f'held by {self.holder}'
+
+    def renew(self, source: str, now: float) -> None:
+        """Note a sign of life of a source."""
+        self._arbiter.renew(source, now)
+
+    def release(self, source: str, now: float) -> HolderChanged[str] | None:
+        """Take the light from a source that needs it no more."""
+        self._wishes.pop(source, None)
+        return self._arbiter.release(source, now)
+
+    def poll(self, now: float) -> HolderChanged[str] | None:
+        """Take the light from a source that is silent."""
+        change = self._arbiter.poll(now)
+        for source in [one for one in self._wishes if not self._arbiter.is_claimed_by(one)]:
+            del self._wishes[source]
+        return change
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return self._arbiter.next_deadline()

@@ -1,0 +1,233 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sources share a light: the highest that claims it holds it, and only its wish is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import random
+
+from illuminator_ros.illuminator.events import LightHeld, WishFailed
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.sources import SourceSettings
+from illuminator_ros.mavlink.messages import MavCmd, MavResult
+from illuminator_ros.payload.arbitration import Cause
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
+from support.faulty_wire import Faults
+from support.records import Answer
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+NAMES = ('safety', 'operator', 'default', 'autonomy')
+TIMEOUT, SILENCE = 2.3, 6.0
+
+
+class Shared:
+    """A light that sources share, and what they ask of it."""
+
+    def __init__(self, *, light: FakeLight | None = None, timeout: float = TIMEOUT,
+                 off_on_release: bool = False, seed: int = 0, **faults: float) -> None:
+        self.light = light or FakeLight(brightness=50.0)
+        self.pair = Pair(self.light, seed=seed, there=Faults(**faults), settings=Settings(
+            sources=SourceSettings(NAMES, timeout, off_on_release),
+            limits=SafetyLimits(max_brightness=80.0), off_after_silence=SILENCE))
+        self.pair.run_until(lambda: self.pair.controller.lights)
+
+    def enable(self, source: str, on: bool) -> Answer:
+        answer = Answer(self.pair.now)
+        self.pair.light.enable(on, self.pair.now, answer, source=source)
+        self.pair.turn()
+        return answer
+
+    def dim(self, source: str, brightness: float) -> None:
+        self.pair.light.set_brightness(brightness, self.pair.now, source=source)
+        self.pair.turn()
+
+    def release(self, source: str) -> None:
+        self.pair.light.release(source, self.pair.now)
+        self.pair.turn()
+
+    @property
+    def holder(self) -> str | None:
+        return self.pair.snapshot.holder
+
+    def sent(self, kind: MavCmd, since: float = 0.0) -> list[float]:
+        return [command.param1 if kind is ON_OFF else command.param2
+                for command in self.pair.commands(kind, since=since)]
+
+
+def test_a_request_of_a_lower_source_is_refused_and_not_sent() -> None:
+    shared = Shared()
+    shared.enable('safety', False)
+    shared.pair.run(1.0)
+    sent = len(shared.pair.commands(ON_OFF))
+
+    answer = shared.enable('autonomy', True)
+    shared.dim('autonomy', 20.0)
+    configured = shared.pair.ask_configure(brightness=30.0)
+
+    assert (answer.result.success, answer.result.message) == (False, 'held by safety')
+    assert configured.result.message == 'held by safety'
+    assert (len(shared.pair.commands(ON_OFF)), shared.pair.commands(CONFIGURE)) == (sent, [])
+
+
+# How safety's hold ends, and why the light has another holder then.
+ENDS: dict[Cause, Callable[[Shared], None]] = {
+    Cause.RELEASE: lambda shared: shared.release('safety'),
+    Cause.SILENCE: lambda shared: shared.pair.run(TIMEOUT - 0.9),
+}
+
+
+@pytest.mark.parametrize(('cause', 'end'), ENDS.items())
+def test_the_wish_of_the_next_source_is_sent_once_when_the_hold_of_a_higher_one_ends(
+        cause: Cause, end: Callable[[Shared], None]) -> None:
+    shared = Shared()
+    shared.enable('safety', False)
+    shared.pair.run(1.0)
+    shared.enable('autonomy', True)
+    shared.dim('autonomy', 20.0)
+    before = shared.pair.now
+    end(shared)
+    shared.pair.run(0.5)
+
+    assert shared.holder == 'autonomy'
+    assert (shared.sent(ON_OFF, before), shared.sent(CONFIGURE, before)) == ([1.0], [20.0])
+    [held] = [one.change for one in shared.pair.recorder.others
+              if isinstance(one, LightHeld)][-1:]
+    assert (held.before, held.after, held.cause) == ('safety', 'autonomy', cause)
+
+
+@pytest.mark.parametrize(('off', 'enabled'), [(False, 1), (True, 0)])
+def test_a_light_that_no_source_holds_stays_or_goes_off_as_configured(
+        off: bool, enabled: int) -> None:
+    shared = Shared(off_on_release=off)
+    shared.enable('operator', True)
+    shared.pair.run(1.0)
+    shared.release('operator')
+    shared.pair.run(2.0)
+
+    assert shared.holder == ''
+    assert shared.light.fields['enable'] == enabled
+
+
+def test_a_takeover_ends_the_requests_of_the_lower_source_and_their_resends() -> None:
+    shared = Shared(light=FakeLight(
+        brightness=50.0, results={ON_OFF: None, CONFIGURE: None}))
+    shared.pair.settle()
+    answer = shared.enable('autonomy', True)
+    shared.dim('autonomy', 20.0)
+    taken_over_at = shared.pair.now
+    shared.dim('operator', 40.0)
+    shared.pair.run(1.5)
+
+    assert answer.result.message == 'held by operator'
+    assert shared.sent(ON_OFF, taken_over_at + 0.01) == []
+    assert set(shared.sent(CONFIGURE, taken_over_at + 0.01)) == {40.0}
+
+
+def test_a_wish_that_the_light_refuses_is_reported() -> None:
+    shared = Shared()
+    shared.enable('safety', False)
+    shared.pair.run(1.0)
+    shared.enable('autonomy', True)
+    shared.light.results[ON_OFF] = MavResult.DENIED
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert [one.source for one in shared.pair.recorder.others if isinstance(one, WishFailed)] == [
+        'autonomy']
+
+
+def test_the_last_switch_before_the_end_is_sent_whatever_holds_the_light() -> None:
+    shared = Shared(timeout=TIMEOUT)
+    shared.enable('safety', True)
+    shared.enable('autonomy', True)
+    shared.pair.run(1.0)
+    answer = Answer(shared.pair.now)
+    shared.pair.light.shut_down(shared.pair.now, answer)
+    shared.pair.run(TIMEOUT + 1.0)
+
+    assert answer.result.success
+    assert shared.sent(ON_OFF)[-1] == 0.0
+
+
+class Model:
+    """The rules, written once more in the plainest way."""
+
+    def __init__(self) -> None:
+        self.heard: dict[str, float] = {}
+
+    def expire(self, now: float) -> None:
+        self.heard = {name: at for name, at in self.heard.items() if now < at + TIMEOUT}
+
+    @property
+    def holder(self) -> str:
+        return min(self.heard, key=NAMES.index, default='')
+
+
+@pytest.mark.parametrize('seed', range(60))
+def test_the_highest_source_wins_within_one_turn_and_only_its_wish_is_sent(seed: int) -> None:
+    draw = random.Random(seed)
+    shared = Shared(seed=seed, drop=draw.choice((0.0, 0.3)), duplicate=draw.choice((0.0, 0.2)),
+                    delay=draw.choice((0.0, 0.3)), reorder=0.1)
+    pair, model = shared.pair, Model()
+    # Each source has brightnesses of its own, by which its frames are known.
+    of_source = {name: 10.0 * (index + 1) for index, name in enumerate(NAMES)}
+    wishes: dict[str, list[bool]] = {name: [] for name in NAMES}
+    alive = dict.fromkeys(NAMES, True)
+    allowed, checked, last_heard = '', len(pair.near.sent), pair.now
+
+    for _ in range(120):
+        source = draw.choice(NAMES)
+        act = draw.choices(('enable', 'dim', 'release', 'die', 'revive', 'wait'),
+                           (6, 6, 2, 1, 1, 4))[0]
+        if act in ('die', 'revive'):
+            alive[source] = act == 'revive'
+        elif alive[source] and act != 'wait':
+            last_heard = pair.now
+            model.expire(pair.now)
+            if act == 'release':
+                model.heard.pop(source, None)
+            else:
+                model.heard[source] = pair.now
+            if act == 'enable':
+                wishes[source].append(on := draw.random() < 0.5)
+                shared.enable(source, on)
+            elif act == 'dim':
+                shared.dim(source, of_source[source] + draw.randrange(9))
+            else:
+                shared.release(source)
+        until = pair.now + draw.choice((0.0, 0.05, 1.0, 3.0)) * draw.random()
+        while True:
+            model.expire(pair.now)
+            assert shared.holder == model.holder
+            # A light that no source holds keeps the wish of the last one.
+            allowed = model.holder or allowed
+            for at, message in pair.near.sent[checked:]:
+                command = getattr(message, 'command', None)
+                if command == CONFIGURE:
+                    assert message.param2 // 10 == of_source[allowed] // 10, (at, allowed)
+                elif command == ON_OFF:
+                    silent = at >= last_heard + SILENCE and not message.param1
+                    assert silent or bool(message.param1) in wishes[allowed], (at, allowed)
+            checked = len(pair.near.sent)
+            if not pair.step(until):
+                break
+
+    pair.mend()
+    pair.run(SILENCE + 5.0)
+    assert shared.light.fields['enable'] == 0
