@@ -77,6 +77,10 @@ _log = logging.getLogger(__name__)
 _frame_log = logging.getLogger('illuminator_ros')
 
 
+class LinkThreadError(RuntimeError):
+    """The thread of a link cannot be started; the message names the link and says why."""
+
+
 class Link:
     """
     Runs an endpoint over a connection URL in a thread of its own, and reopens what is lost.
@@ -166,10 +170,17 @@ class Link:
     # From any thread
 
     def start(self) -> None:
-        """Start the thread."""
+        """
+        Start the thread.
+
+        :raises LinkThreadError: if that fails; it may be tried again.
+        """
         with self._starting:
             if not self._stopping.is_set():
-                self._thread.start()
+                try:
+                    self._thread.start()
+                except RuntimeError as error:
+                    raise LinkThreadError(f'{self._label}: {error} for the link') from None
 
     def stop(self, timeout: float = 1.0) -> None:
         """

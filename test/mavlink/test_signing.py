@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import hashlib
+import hmac
 from typing import Any
 
 from hypothesis import given
@@ -124,7 +125,7 @@ def test_signatures_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatc
         compared.extend((len(one), len(other)))
         return one == other
 
-    monkeypatch.setattr(module.hmac, 'compare_digest', compare)
+    monkeypatch.setattr(hmac, 'compare_digest', compare)
     assert checker().accepts(signed(STAMP), NOW)
     assert not checker().accepts(signed(STAMP, key=WRONG_KEY), NOW)
     assert compared == [6] * 4

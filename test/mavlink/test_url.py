@@ -134,7 +134,7 @@ WRONG: dict[str, tuple[str, str]] = {
     'udpbcast::14550': ("':14550'", 'no host'),
     'udp://@?ids=1,240': ("'?ids=1,240'", 'system_id and component_id'),
     'tcp://10.0.0.2:5760/path': ("'/path'", 'not supported'),
-    'tcpin://': ("''", 'no port'),
+    'tcpin://': ('', 'it names no port'),
     '/dev/ttyACM0': ("'/dev/ttyACM0'", 'MAVROS would take 57600 and pymavlink 115200'),
     # Where MAVROS connects to this machine, MAVSDK listens.
     'tcp://:5762': ("':5762'", 'tcpout://localhost:5762 or tcpin://0.0.0.0:5762'),

@@ -109,11 +109,3 @@ def only(data: bytes) -> Frame:
 def decoded(data: bytes) -> list[Frame]:
     """Return the frames that a stream holds which ends with the data."""
     return Decoder().feed(data + FILLER)
-
-
-AUTOPILOT = Address(7, 1)
-
-
-def foreign_frame(sequence: int = 0, source: Address = AUTOPILOT) -> bytes:
-    """Return a frame with a message that no endpoint here handles: ATTITUDE."""
-    return raw_v2(30, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import os
 import threading
 import time
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from illuminator_ros.illuminator.events import AnyLightEvent, LightConnected, LightLost
 from illuminator_ros.illuminator.light import Light, Settings
@@ -29,7 +29,7 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
-from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.url import parse_url, Url
 from illuminator_ros.payload.request import Result
 from support.client import Client
@@ -37,7 +37,9 @@ from support.messages import HANDLED
 from support.waiting import eventually, Log, PATIENCE
 
 BRIDGE = Address(1, 194)
-OPENER = 'mavlink-open'
+CONNECTOR = 'mavlink-open'
+E = TypeVar('E', bound=Endpoint)
+T = TypeVar('T')
 
 
 class Talker(Endpoint):
@@ -45,15 +47,15 @@ class Talker(Endpoint):
     A peer that sends heartbeats and keeps received messages.
 
     :ivar heard: source and message, in order.
-    :ivar greetings: how often a new peer was greeted.
+    :ivar greetings: when a new peer was greeted, s.
     :ivar turns: how often the link's thread has gone round.
     """
 
     messages = tuple(HANDLED.values())
 
-    def __init__(self, source: Address = BRIDGE, mav_type: int = 18) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.heartbeat = HeartbeatTimer(source, mav_type)
+        self.heartbeat = HeartbeatTimer(BRIDGE, 18)
         self.heard: Log[tuple[Address, Any]] = Log()
         self.greetings: Log[float] = Log()
         self.closings: Log[float] = Log()
@@ -66,7 +68,7 @@ class Talker(Endpoint):
     def link_closed(self, now: float, reason: str) -> None:
         self.closings.append(now)
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Message, now: float) -> None:
         self.heard.append((source, message))
 
     def poll(self, now: float) -> None:
@@ -76,32 +78,32 @@ class Talker(Endpoint):
         self.turns += 1
         return self.heartbeat.due
 
-    def wait_for(self, source: Address, since: int = 0) -> Any:
-        """Return the first message of a source, of those from a position on."""
-        return self.heard.wait_for(lambda entry: entry[0] == source, since=since)[1]
+    def wait_heard(self, count: int = 1) -> Address:
+        """Wait for the count-th message, and return its source."""
+        return self.heard.wait_for(lambda entry: True, count=count)[0]
 
 
-class LiveLink:
+class EndpointLink(Generic[E]):
     """
     A link and its events.
 
     :param on_event: called with each event, after it was noted.
-    :ivar events: what the link has reported.
+    :ivar events: the events that the link has reported.
     """
 
     def __init__(
-        self, url: str | Url, endpoint: Endpoint | None = None, *,
-        on_event: Callable[[LinkEvent], None] = lambda event: None, **options: Any,
+        self, url: str | Url, endpoint: E, *,
+        on_event: Callable[[LinkEvent], object] = lambda event: None, **options: Any,
     ) -> None:
-        self.endpoint: Any = endpoint or Talker()
+        self.endpoint = endpoint
         self.events: Log[LinkEvent] = Log()
-        parsed = parse_url(url) if isinstance(url, str) else url
 
         def note(event: LinkEvent) -> None:
             self.events.append(event)
             on_event(event)
 
-        self.link = Link(parsed, self.endpoint, label=str(url), on_event=note, **options)
+        self.link = Link(parse_url(url) if isinstance(url, str) else url, endpoint,
+                         label=str(url), on_event=note, **options)
         self.link.start()
 
     def wait_open(self, count: int = 1) -> LinkEvent:
@@ -116,74 +118,95 @@ class LiveLink:
         """Return for each event whether it was an opening."""
         return [event.is_open for event in self.events]
 
-    def ask(self, function: Callable[[float], Any], within: float = PATIENCE) -> Any:
-        """Return what a function returns in the link's thread."""
-        answers: Log[Any] = Log()
+    def ask(self, function: Callable[[float], T]) -> T:
+        """Return the result of a function that the link's thread calls."""
+        answers: Log[T] = Log()
         self.link.call(lambda now: answers.append(function(now)))
-        return answers.wait_for(lambda answer: True, within=within)
+        return answers.wait_for(lambda answer: True)
 
     def state(self) -> LinkSnapshot:
         """Return the link at this moment."""
-        snapshot: LinkSnapshot = self.ask(self.link.snapshot)
-        return snapshot
+        return self.ask(self.link.snapshot)
 
     def stop(self) -> None:
         """End it, and wait for its threads."""
         self.link.stop(PATIENCE)
 
-    def has_ended(self) -> bool:
-        """Return whether the link's thread has ended."""
-        return not self.link.is_running()
+
+class LiveLink(EndpointLink[Talker]):
+    """A link with a :class:`Talker`, if no other endpoint is given."""
+
+    def __init__(self, url: str | Url, endpoint: Talker | None = None, **options: Any) -> None:
+        super().__init__(url, endpoint or Talker(), **options)
+
+    def send(self, *messages: Message) -> None:
+        """Send messages, in one turn of the thread."""
+        self.ask(lambda now: self.endpoint.outgoing.extend((BRIDGE, one) for one in messages))
 
 
-class Lights(LiveLink):
+class Lights(EndpointLink[Any]):
     """A simulated light on a link, which has just been switched on."""
 
     def __init__(self, url: str, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(url, simulated_lights([IlluminatorProperties()], clock()), clock=clock)
 
 
-class Bridge(LiveLink):
+class Bridge(EndpointLink[Client]):
     """
     The drone's side on a link, without ROS.
 
     :param settings: such as how long a light is waited for.
-    :ivar lights: what happened to lights: ``connected`` or ``lost``, and the light.
+    :ivar lights: ``connected`` or ``lost``, and the light, in order.
     """
 
     def __init__(self, url: str, settings: Settings | None = None, **options: Any) -> None:
         self.lights: Log[tuple[str, Light]] = Log()
-        self._client = Client(
+        client = Client(
             BRIDGE, settings or Settings(), command_timeout=PATIENCE / 10, command_retries=9)
-        self._client.events.subscribe(self._take)
-        super().__init__(url, self._client, **options)
+        client.events.subscribe(self._take)
+        super().__init__(url, client, **options)
 
     def _take(self, event: AnyLightEvent) -> None:
         if isinstance(event, LightConnected | LightLost):
             kind = 'connected' if isinstance(event, LightConnected) else 'lost'
-            self.lights.append((kind, self._client.lights[event.address]))
+            self.lights.append((kind, self.endpoint.lights[event.address]))
 
     def wait_connected(self, count: int = 1) -> Light:
         """Return the light that was connected the count-th time."""
         return self.lights.wait_for(lambda entry: entry[0] == 'connected', count=count)[1]
 
     def enable(self, on: bool, light: Light | None = None) -> Result:
-        """Switch a light on or off, and return what became of it."""
+        """Switch a light on or off, and return the result."""
         results: Log[Result] = Log()
         one = light or self.wait_connected()
         self.link.call(lambda now: one.enable(on, now, lambda result, now: results.append(result)))
         return results.wait_for(lambda result: True)
 
 
-def wait_for_openers() -> None:
-    """Wait until no thread is trying to open anything."""
-    for thread in threading.enumerate():
-        if thread.name == OPENER:
-            thread.join(PATIENCE)
+L = TypeVar('L', bound=EndpointLink[Any])
+
+
+class Run:
+    """Keeps the links of a test, to be stopped when it ends."""
+
+    def __init__(self) -> None:
+        self._links: list[EndpointLink[Any]] = []
+
+    def __call__(self, link: L) -> L:
+        self._links.append(link)
+        return link
+
+    def stop(self) -> None:
+        """Stop them."""
+        for link in self._links:
+            link.stop()
 
 
 def resources() -> tuple[int, int]:
-    """Return the numbers of threads and of open descriptors of this process."""
+    """Return the numbers of threads and of open descriptors, once no link tries to open."""
+    for thread in threading.enumerate():
+        if thread.name == CONNECTOR:
+            thread.join(PATIENCE)
     return threading.active_count(), len(os.listdir('/proc/self/fd'))
 
 

@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import selectors
 import socket
 import time
 from typing import Any
 
 from illuminator_ros.mavlink.transport import Channel
+from illuminator_ros.mavlink.url import Url
 from support.ports import free_port
 from support.waiting import PATIENCE
 
@@ -70,27 +72,24 @@ class OpenChannel:
         self.selector.close()
 
 
+Open = Callable[[str | Url], OpenChannel]
+
+
 def bound_socket(
     host: str = '127.0.0.1', kind: socket.SocketKind = socket.SOCK_DGRAM, port: int = 0,
 ) -> socket.socket:
     """Return a socket on a free port, whose calls block for a limited time."""
     host = host.strip('[]')
-    family = socket.AF_INET6 if ':' in host else socket.AF_INET
-    one = socket.socket(family, kind)
+    one = socket.socket(socket.AF_INET6 if ':' in host else socket.AF_INET, kind)
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(kind == socket.SOCK_STREAM))
     one.settimeout(PATIENCE)
     one.bind((host, port))
     return one
 
 
 def listening_socket(host: str = '127.0.0.1', port: int = 0) -> socket.socket:
-    """Return a TCP socket that listens, if not said otherwise on a port of these tests' own."""
-    host = host.strip('[]')
-    family = socket.AF_INET6 if ':' in host else socket.AF_INET
-    one = socket.socket(family, socket.SOCK_STREAM)
-    one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    one.settimeout(PATIENCE)
-    # A test that closes it and listens again needs the same port, reserved meanwhile.
-    one.bind((host, port or free_port(socket.SOCK_STREAM, host)))
+    """Return a TCP socket that listens, on a port that is reserved for these tests."""
+    one = bound_socket(host, socket.SOCK_STREAM, port or free_port(socket.SOCK_STREAM, host))
     one.listen()
     return one
 

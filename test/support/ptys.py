@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import contextlib
-import itertools
 import os
 from pathlib import Path
 import select
@@ -26,9 +25,7 @@ import threading
 
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.frame import Decoder
-from support.frames import frame_of
-from support.messages import decode_payload, HANDLED
+from support.frames import Codec
 from support.waiting import PATIENCE
 
 
@@ -77,54 +74,38 @@ class PtyDevice:
         except (BlockingIOError, OSError):
             return b''
 
-    def connect_light(self, clock: Callable[[], float]) -> _Light:
-        """Let a simulated light use the far end, until it is stopped."""
-        return _Light(self._far, clock)
+    def connect_light(self, clock: Callable[[], float]) -> Callable[[], None]:
+        """Let a simulated light use the far end; return a function that stops it."""
+        stopping, stop = os.pipe()
+        thread = threading.Thread(target=_run_light, args=(self._far, stopping, clock))
+        thread.start()
+
+        def end() -> None:
+            os.close(stop)
+            thread.join(PATIENCE)
+            os.close(stopping)
+
+        return end
 
 
-class _Light:
-    """A simulated light at the far end of a serial line."""
-
-    def __init__(self, line: int, clock: Callable[[], float]) -> None:
-        self._line = line
-        self._clock = clock
-        self._endpoint = simulated_lights([IlluminatorProperties()], clock())
-        self._decoder = Decoder()
-        self._stopping, self._stop = os.pipe()
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End it."""
-        os.close(self._stop)
-        self._thread.join(PATIENCE)
-        os.close(self._stopping)
-
-    def _run(self) -> None:
-        sequence = itertools.count()
-        while True:
-            now = self._clock()
-            self._endpoint.poll(now)
-            while self._endpoint.outgoing:
-                source, message = self._endpoint.outgoing.popleft()
-                with contextlib.suppress(OSError):
-                    os.write(self._line, frame_of(message, next(sequence) & 0xFF, source))
-            wait = max(self._endpoint.next_deadline() - now, 0.0)
-            ready, _, _ = select.select([self._line, self._stopping], [], [], wait)
-            if self._stopping in ready:
-                return
-            if self._line in ready:
-                self._take()
-
-    def _take(self) -> None:
-        try:
-            data = os.read(self._line, 4096)
-        except OSError:
-            # No program has the device open; a closed pseudo-terminal is always readable.
-            select.select([self._stopping], [], [], 0.01)
+def _run_light(line: int, stopping: int, clock: Callable[[], float]) -> None:
+    endpoint, codec = simulated_lights([IlluminatorProperties()], clock()), Codec()
+    while True:
+        now = clock()
+        endpoint.poll(now)
+        while endpoint.outgoing:
+            with contextlib.suppress(OSError):
+                os.write(line, codec.frame(*endpoint.outgoing.popleft()))
+        wait = max(endpoint.next_deadline() - now, 0.0)
+        ready, _, _ = select.select([line, stopping], [], [], wait)
+        if stopping in ready:
             return
-        for frame in self._decoder.feed(data):
-            if frame.message_id in HANDLED:
-                self._endpoint.receive(
-                    frame.source, decode_payload(frame.message_id, frame.payload),
-                    self._clock())
+        if line in ready:
+            try:
+                data = os.read(line, 4096)
+            except OSError:
+                # No program has the device open; a closed pseudo-terminal is always readable.
+                select.select([stopping], [], [], 0.01)
+                continue
+            for source, message in codec.messages(data):
+                endpoint.receive(source, message, clock())

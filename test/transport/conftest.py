@@ -16,25 +16,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-import selectors
+from collections.abc import Iterator
+import contextlib
+from pathlib import Path
 import socket
-from typing import Any
 
 from illuminator_ros.mavlink.transport import open_channel
 from illuminator_ros.mavlink.url import parse_url, Url
 import pytest
-from support.live_link import LiveLink, resources, wait_for_resources
-from support.open_channel import OpenChannel
+from support.live_link import resources, Run, wait_for_resources
+from support.open_channel import Open, OpenChannel
+from support.ptys import PtyDevice
 
 
 def _has_ipv6() -> bool:
-    try:
-        with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as probe:
-            probe.bind(('::1', 0))
-    except OSError:
-        return False
-    return True
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as probe:
+        probe.bind(('::1', 0))
+        return True
+    return False
 
 
 @pytest.fixture(params=['127.0.0.1', '[::1]'])
@@ -46,38 +45,30 @@ def loopback(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def run() -> Iterator[Callable[..., Any]]:
+def run() -> Iterator[Run]:
     """Return a function that keeps a link until the test ends, and then checks for leaks."""
-    threads, descriptors = resources()
-    links: list[LiveLink] = []
-
-    def keep(link: Any) -> Any:
-        links.append(link)
-        return link
-
-    yield keep
-    for link in links:
-        link.stop()
-    wait_for_resources(threads, descriptors)
+    before, one = resources(), Run()
+    yield one
+    one.stop()
+    wait_for_resources(*before)
 
 
 @pytest.fixture
-def channel() -> Iterator[Callable[[str | Url], OpenChannel]]:
+def channel() -> Iterator[Open]:
     """Return a function that opens a channel, to be closed when the test ends."""
-    opened: list[OpenChannel] = []
+    with contextlib.ExitStack() as opened:
+        def open_one(url: str | Url) -> OpenChannel:
+            one = OpenChannel(open_channel(parse_url(url) if isinstance(url, str) else url))
+            opened.callback(one.close)
+            return one
 
-    def open_one(url: str | Url) -> OpenChannel:
-        parsed = parse_url(url) if isinstance(url, str) else url
-        opened.append(OpenChannel(open_channel(parsed)))
-        return opened[-1]
-
-    yield open_one
-    for one in opened:
-        one.close()
+        yield open_one
 
 
 @pytest.fixture
-def selector() -> Iterator[selectors.BaseSelector]:
-    """Return a selector, to be closed when the test ends."""
-    with selectors.DefaultSelector() as one:
-        yield one
+def device(tmp_path: Path) -> Iterator[PtyDevice]:
+    """Return a serial device."""
+    pytest.importorskip('serial', reason='pyserial is not installed')
+    one = PtyDevice(tmp_path)
+    yield one
+    one.pull_out()

@@ -16,43 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import pytest
-from support.open_channel import OpenChannel
-
-OpenFunction = Callable[[str], OpenChannel]
+from support.open_channel import Open
 
 
-@pytest.fixture
-def three(channel: OpenFunction) -> list[OpenChannel]:
-    """Return three channels of one name."""
-    return [channel('memory://one') for _ in range(3)]
+def test_frames_reach_all_other_open_channels_of_the_name(channel: Open) -> None:
+    one, gone, another = (channel('memory://one') for _ in range(3))
+    other_name = channel('memory://other')
+    gone.close()
+    one.broadcast(b'frame')
+    assert another.receive_bytes(5) == b'frame'
+    assert (one.turn(), other_name.turn(), one.channel.dropped) == ([], [], 0)
 
 
-def test_everybody_hears_everybody_else(three: list[OpenChannel]) -> None:
-    three[0].broadcast(b'frame')
-    assert [other.receive_bytes(5) for other in three[1:]] == [b'frame', b'frame']
-
-
-def test_nobody_hears_himself(three: list[OpenChannel]) -> None:
-    three[0].broadcast(b'frame')
-    assert three[0].turn() == []
-
-
-def test_names_are_links_of_their_own(channel: OpenFunction) -> None:
-    channel('memory://one').broadcast(b'frame')
-    assert channel('memory://other').turn() == []
-
-
-def test_who_has_left_is_not_sent_to(three: list[OpenChannel]) -> None:
-    three[1].close()
-    three[0].broadcast(b'frame')
-    assert three[2].receive_bytes(5) == b'frame'
-    assert three[0].channel.dropped == 0
-
-
-def test_what_nobody_reads_is_dropped_and_counted(three: list[OpenChannel]) -> None:
-    while not three[0].channel.dropped:
-        three[0].broadcast(bytes(280))
-    assert len(three[1].turn()) > 1
+def test_frames_beyond_what_is_read_are_dropped_and_counted(channel: Open) -> None:
+    one, other = channel('memory://one'), channel('memory://one')
+    while not one.channel.dropped:
+        one.broadcast(bytes(280))
+    assert len(other.turn()) > 1

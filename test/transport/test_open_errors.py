@@ -16,64 +16,119 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import os
 from pathlib import Path
+import re
 import socket
+import sys
+from typing import Any
 
-from illuminator_ros.mavlink.transport import open_channel
-from illuminator_ros.mavlink.url import parse_url
+from illuminator_ros.mavlink.transport import open_channel, tcp
+from illuminator_ros.mavlink.url import HostPort, parse_url, UdpUrl
 import pytest
 from support.open_channel import bound_socket, listening_socket
+from support.ports import free_port
+from support.ptys import PtyDevice
 
 
 def reason(url: str) -> str:
     """Return why a URL cannot be opened."""
-    with pytest.raises(OSError) as caught:
+    with pytest.raises(OSError, match='cannot|no answer|pyserial') as caught:
         open_channel(parse_url(url))
     return caught.value.strerror or str(caught.value)
 
 
-@pytest.mark.parametrize(('scheme', 'taken_by'), [
-    ('udpin', bound_socket), ('tcpin', listening_socket)])
-def test_a_port_in_use(
-    scheme: str, taken_by: Callable[[str], socket.socket], loopback: str,
-) -> None:
-    with taken_by(loopback) as taken:
+@pytest.mark.parametrize('scheme', ['udpin', 'tcpin'])
+def test_port_in_use_is_named(scheme: str, loopback: str) -> None:
+    with (bound_socket if scheme == 'udpin' else listening_socket)(loopback) as taken:
         port = taken.getsockname()[1]
         assert reason(f'{scheme}://{loopback}:{port}') == (
             f'cannot listen on {loopback}:{port}: Address already in use')
 
 
-@pytest.mark.parametrize('scheme', ['udpin', 'tcpin'])
-def test_an_address_to_listen_on_that_is_not_ours(scheme: str) -> None:
-    assert reason(f'{scheme}://192.0.2.1:14550') == (
-        'cannot listen on 192.0.2.1:14550: Cannot assign requested address')
-
-
-@pytest.mark.parametrize('scheme', ['udpin', 'udpout', 'tcpin', 'tcpout'])
-@pytest.mark.parametrize('name', ['nobody.invalid', f'{"x" * 70}.invalid'])
-def test_a_name_that_nobody_knows(scheme: str, name: str) -> None:
-    assert reason(f'{scheme}://{name}:14550').startswith(f'cannot resolve {name!r}: ')
-
-
-def test_a_device_that_is_not_there(tmp_path: Path) -> None:
-    pytest.importorskip('serial', reason='pyserial is not installed')
-    assert reason(f'serial://{tmp_path}/nothing:57600') == (
-        f'cannot open {tmp_path}/nothing: No such file or directory')
-
-
-def test_a_file_that_is_no_device(tmp_path: Path) -> None:
-    pytest.importorskip('serial', reason='pyserial is not installed')
-    path = tmp_path / 'file'
-    path.touch()
-    assert reason(f'serial://{path}:57600').startswith(f'cannot open {path}: ')
-
-
-def test_a_device_that_belongs_to_others(tmp_path: Path) -> None:
-    pytest.importorskip('serial', reason='pyserial is not installed')
-    if os.geteuid() == 0:
+@pytest.mark.parametrize(('url', 'said'), [
+    *((f'{scheme}://192.0.2.1:14550', r'cannot listen on 192\.0\.2\.1:14550: Cannot assign .*')
+      for scheme in ('udpin', 'tcpin')),
+    *((f'{scheme}://{name}:14550', f'cannot resolve {name!r}: .+')
+      for scheme in ('udpin', 'udpout', 'tcpin', 'tcpout')
+      for name in ('no-such-host.invalid', f'{"x" * 70}.invalid')),
+    ('tcp://127.0.0.1:{port}', 'cannot connect to 127.0.0.1:{port}: Connection refused'),
+    ('serial://{path}/nothing:57600', 'cannot open {path}/nothing: No such file or directory'),
+    ('serial://{path}/file:57600', 'cannot open {path}/file: .+'),
+    ('serial://{path}/others:57600', 'cannot open {path}/others: Permission denied')])
+def test_error_names_address_or_device_and_reason(
+        tmp_path: Path, url: str, said: str) -> None:
+    if 'serial' in url:
+        pytest.importorskip('serial', reason='pyserial is not installed')
+    if 'others' in url and os.geteuid() == 0:
         pytest.skip('root may open everything')
-    path = tmp_path / 'device'
-    path.touch(mode=0)
-    assert reason(f'serial://{path}:57600') == f'cannot open {path}: Permission denied'
+    (tmp_path / 'file').touch()
+    (tmp_path / 'others').touch(mode=0)
+    values = {'port': free_port(socket.SOCK_STREAM), 'path': tmp_path}
+    assert re.fullmatch(said.format(**values), reason(url.format(**values)))
+
+
+def test_addresses_of_different_ip_versions_are_named() -> None:
+    with pytest.raises(OSError, match=r'127\.0\.0\.1:1.*\[::1\]:2.*different IP versions'):
+        open_channel(UdpUrl(HostPort('127.0.0.1', 1), HostPort('::1', 2)))
+
+
+def test_missing_pyserial_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'serial', None)
+    assert 'apt install python3-serial' in reason('serial:///dev/ttyLIGHT:57600')
+
+
+def test_serial_device_is_closed_for_other_programs_while_it_is_open(device: PtyDevice) -> None:
+    ours = open_channel(parse_url(f'serial://{device.path}:57600'))
+    assert reason(f'serial://{device.path}:57600') == (
+        f'cannot open {device.path}: it is in use by another program')
+    ours.close()
+    open_channel(parse_url(f'serial://{device.path}:57600')).close()
+
+
+def test_tcp_server_that_does_not_answer_is_given_up_in_time(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tcp, 'CONNECT_TIMEOUT', 0.05)
+    # The queue of this server is full, so that the kernel drops what comes.
+    with bound_socket(kind=socket.SOCK_STREAM) as silent:
+        silent.listen(0)
+        clients = [socket.socket() for _ in range(4)]
+        for client in clients:
+            client.setblocking(False)
+            client.connect_ex(silent.getsockname())
+        port = silent.getsockname()[1]
+        assert reason(f'tcp://127.0.0.1:{port}') == f'no answer from 127.0.0.1:{port}'
+    for client in clients:
+        client.close()
+
+
+class _Silent(socket.socket):
+    """Records how long each connecting waits, without an answer."""
+
+    waits: list[float | None] = []
+
+    def connect(self, address: Any) -> None:
+        self.waits.append(self.gettimeout())
+        raise TimeoutError
+
+
+def test_addresses_of_one_name_share_the_time_to_connect(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(socket, 'socket', _Silent)
+    monkeypatch.setattr(tcp, 'resolve', lambda address, kind: [
+        (socket.AF_INET, (host, 1)) for host in ('192.0.2.1', '192.0.2.2')])
+    assert reason('tcp://somewhere:1') == 'no answer from somewhere:1'
+    assert _Silent.waits == [pytest.approx(tcp.CONNECT_TIMEOUT / 2)] * 2
+
+
+class _Selfish(socket.socket):
+    """Connects to itself, as the kernel does if the free port that it picks is the target."""
+
+    def connect(self, address: Any) -> None:
+        self.bind(address)
+        super().connect(address)
+
+
+def test_connection_with_itself_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    monkeypatch.setattr(socket, 'socket', _Selfish)
+    assert reason(f'tcp://127.0.0.1:{port}').endswith('no program listens there')

@@ -12,157 +12,111 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""UDP channels: to whom they send, and whom they hear."""
+"""UDP channels: which peers they have, which they send to, and which they hear."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Iterator
+import contextlib
 import errno
 import socket
 from typing import Any
 
-from illuminator_ros.mavlink.transport import ChannelLost, open_channel
-from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM, RECEIVE_BUFFER
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat
+from illuminator_ros.mavlink.transport import ChannelLost, udp
+from illuminator_ros.mavlink.transport.udp import (
+    MAX_DATAGRAM,
+    MAX_PEERS,
+    PEER_EXPIRY,
+    RECEIVE_BUFFER,
+    UdpChannel,
+)
 from illuminator_ros.mavlink.url import HostPort, UdpUrl
 import pytest
-from support.open_channel import bound_socket, has_nothing, OpenChannel
+from support.frames import heartbeat_frame, LIGHT
+from support.live_link import BRIDGE, LiveLink, Run
+from support.open_channel import bound_socket, has_nothing, Open, OpenChannel
 from support.ports import free_port
 
-OpenFunction = Callable[[str | UdpUrl], OpenChannel]
+ANY_PORT = UdpUrl(HostPort('127.0.0.1', 0))
 
 
-def test_a_listening_socket_hears_everybody(channel: OpenFunction, loopback: str) -> None:
-    port = free_port(host=loopback)
-    ours = channel(f'udpin://{loopback}:{port}')
-    with bound_socket(loopback) as one, bound_socket(loopback) as other:
-        one.sendto(b'one', (loopback.strip('[]'), port))
-        other.sendto(b'other', (loopback.strip('[]'), port))
-        assert sorted(data for _, data in ours.receive(2)) == [b'one', b'other']
+@pytest.fixture
+def port(loopback: str) -> int:
+    return free_port(host=loopback)
 
 
-def test_a_socket_keeps_as_much_as_the_kernel_allows(channel: OpenFunction) -> None:
-    ours: Any = channel(UdpUrl(HostPort('127.0.0.1', 0))).channel
-    with socket.socket(type=socket.SOCK_DGRAM) as other:
-        other.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        most = other.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
-    assert ours._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) == most
+@pytest.fixture
+def sockets(loopback: str) -> Iterator[list[socket.socket]]:
+    """Return three sockets on this host."""
+    with contextlib.ExitStack() as stack:
+        yield [stack.enter_context(bound_socket(loopback)) for _ in range(3)]
 
 
-def test_a_listening_socket_sends_to_whom_it_has_checked(
-    channel: OpenFunction, loopback: str,
-) -> None:
-    port = free_port(host=loopback)
-    ours = channel(f'udpin://{loopback}:{port}')
-    with bound_socket(loopback) as good, bound_socket(loopback) as unchecked:
-        for one in (good, unchecked):
-            one.sendto(b'x', (loopback.strip('[]'), port))
-        (peer,) = (peer for peer, _ in ours.receive(2) if peer[1] == good.getsockname()[1])
-        ours.channel.heard(peer, 0.0)
-        ours.broadcast(b'frame')
-        assert good.recv(100) == b'frame'
-        assert has_nothing(unchecked)
+def send(port: int, *senders: tuple[socket.socket, bytes]) -> None:
+    """Send datagrams to the port of a channel."""
+    for sender, data in senders:
+        sender.sendto(data, (sender.getsockname()[0], port))
 
 
-def test_a_listening_socket_has_nobody_to_send_to_at_first(channel: OpenFunction) -> None:
-    assert not channel(UdpUrl(HostPort('127.0.0.1', 0))).channel.peers(0.0)
+def test_listening_channel_hears_all_and_sends_to_those_it_has_checked(
+        channel: Open, loopback: str, port: int, sockets: list[socket.socket]) -> None:
+    ours, (good, unchecked, _) = channel(f'udpin://{loopback}:{port}'), sockets
+    assert ours.channel.peers(0.0) == ()
+    send(port, (good, b'good'), (unchecked, b'unchecked'))
+    origins = {data: peer for peer, data in ours.receive(2)}
+    assert sorted(origins) == [b'good', b'unchecked']
+    ours.channel.heard(origins[b'good'], 0.0)
+    ours.broadcast(b'frame')
+    assert good.recv(100) == b'frame'
+    assert has_nothing(unchecked)
 
 
-def test_a_fixed_remote_is_sent_to_unheard(channel: OpenFunction, loopback: str) -> None:
-    with bound_socket(loopback) as remote:
-        ours = channel(f'udpout://{loopback}:{remote.getsockname()[1]}')
-        ours.broadcast(b'frame')
-        assert remote.recv(100) == b'frame'
-
-
-def test_a_fixed_remote_is_the_only_one_that_is_sent_to(
-    channel: OpenFunction, loopback: str,
-) -> None:
-    port = free_port(host=loopback)
-    with bound_socket(loopback) as remote, bound_socket(loopback) as other:
-        ours = channel(f'udp://{loopback}:{port}@{loopback}:{remote.getsockname()[1]}')
-        other.sendto(b'x', (loopback.strip('[]'), port))
-        ((peer, _),) = ours.receive()
-        assert not ours.channel.heard(peer, 0.0)
-        ours.broadcast(b'frame')
-        assert remote.recv(100) == b'frame'
-        assert has_nothing(other)
-
-
-def test_a_fixed_remote_is_heard_from_any_of_its_ports(
-    channel: OpenFunction, loopback: str,
-) -> None:
+def test_fixed_remote_is_the_only_receiver_and_is_heard_from_any_port_of_its_host(
+        channel: Open, loopback: str, port: int, sockets: list[socket.socket]) -> None:
     # The reference emulator sends from another port than it listens on.
-    port = free_port(host=loopback)
-    with bound_socket(loopback) as remote, bound_socket(loopback) as same_host:
-        ours = channel(f'udp://{loopback}:{port}@{loopback}:{remote.getsockname()[1]}')
-        same_host.sendto(b'hello', (loopback.strip('[]'), port))
-        assert ours.receive()[0][1] == b'hello'
+    remote, other, _ = sockets
+    ours = channel(f'udp://{loopback}:{port}@{loopback}:{remote.getsockname()[1]}')
+    send(port, (other, b'x'))
+    ((peer, data),) = ours.receive()
+    assert (data, ours.channel.heard(peer, 0.0)) == (b'x', False)
+    ours.broadcast(b'frame')
+    assert remote.recv(100) == b'frame'
+    assert has_nothing(other)
 
 
-def test_a_fixed_remote_on_another_host_is_the_only_host_that_is_heard(
-    channel: OpenFunction,
-) -> None:
+@pytest.mark.parametrize(('remote', 'heard'), [('127.0.0.1', True), ('192.0.2.1', False)])
+def test_host_that_is_not_the_remote_is_not_heard_but_any_loopback_address_is_this_machine(
+        channel: Open, remote: str, heard: bool) -> None:
     port = free_port()
-    ours = channel(f'udp://0.0.0.0:{port}@192.0.2.1:14550')
-    with bound_socket() as stranger:
-        stranger.sendto(b'x', ('127.0.0.1', port))
-        # It has arrived: the selector says so.
-        assert ours.selector.select(5)
-        assert ours.turn() == []
-
-
-def test_any_loopback_address_is_a_remote_on_this_machine(channel: OpenFunction) -> None:
-    port = free_port()
-    ours = channel(f'udp://0.0.0.0:{port}@127.0.0.1:14550')
+    ours = channel(f'udp://0.0.0.0:{port}@{remote}:14550')
     with bound_socket('127.0.0.2') as other:
         other.sendto(b'hello', ('127.0.0.1', port))
-        assert ours.receive()[0][1] == b'hello'
+        assert ours.selector.select(5)
+        assert [data for _, data in ours.turn()] == [b'hello'] * heard
 
 
-@pytest.mark.parametrize(('kind', 'reached'), [('until_peer', 'peer'), ('always', 'all')])
-def test_a_broadcast_goes_on_once_a_peer_is_known_only_where_that_is_asked_for(
-    channel: OpenFunction, kind: str, reached: str,
-) -> None:
-    with bound_socket('0.0.0.0') as everybody, bound_socket() as peer:
-        remote = HostPort('127.255.255.255', everybody.getsockname()[1])
-        ours = channel(UdpUrl(HostPort('', 0), remote, kind))
+@pytest.mark.parametrize(('kind', 'receiver'), [('until_peer', 1), ('always', 0)])
+def test_broadcast_ends_with_the_first_peer_unless_it_is_always_wanted(
+        channel: Open, kind: str, receiver: int) -> None:
+    with bound_socket('0.0.0.0') as all_hosts, bound_socket() as peer:
+        ours = channel(UdpUrl(
+            HostPort('', 0), HostPort('127.255.255.255', all_hosts.getsockname()[1]), kind))
         ours.broadcast(b'first')
-        assert everybody.recv(100) == b'first'
+        assert all_hosts.recv(100) == b'first'
         ours.channel.heard(peer.getsockname(), 0.0)
         ours.broadcast(b'second')
-        at, not_at = {'peer': (peer, everybody), 'all': (everybody, peer)}[reached]
-        assert at.recv(100) == b'second'
-        assert has_nothing(not_at)
-
-
-def test_addresses_of_different_ip_versions_are_refused_by_name() -> None:
-    with pytest.raises(OSError, match=r'127\.0\.0\.1:1.*\[::1\]:2.*different IP versions'):
-        open_channel(UdpUrl(HostPort('127.0.0.1', 1), HostPort('::1', 2)))
-
-
-def test_a_learnt_peer_out_of_reach_is_forgotten_and_no_loss(channel: OpenFunction) -> None:
-    ours = channel(UdpUrl(HostPort('127.0.0.1', 0)))
-    with bound_socket() as good:
-        # Nothing can be sent to port 0.
-        ours.channel.heard(('127.0.0.1', 0), 0.0)
-        ours.channel.heard(good.getsockname(), 0.0)
-        ours.broadcast(bytes(MAX_DATAGRAM), b'frame')
-        assert good.recv(MAX_DATAGRAM) == bytes(MAX_DATAGRAM)
-        assert good.recv(100) == b'frame'
-        assert ours.channel.peers(0.0) == (good.getsockname(),)
-        assert ours.channel.dropped == 2
+        both = [all_hosts, peer]
+        assert both[receiver].recv(100) == b'second'
+        assert has_nothing(both[1 - receiver])
 
 
 @pytest.mark.parametrize(('sizes', 'datagrams'), [
-    ([0], [0]),
-    ([10, 20], [30]),
-    ([MAX_DATAGRAM - 1, 1], [MAX_DATAGRAM]),
-    ([MAX_DATAGRAM - 1, 2], [MAX_DATAGRAM - 1, 2]),
-    ([280] * 12, [1400, 1400, 560]),
-])
-def test_frames_share_datagrams_that_pass_an_ethernet_whole(
-    channel: OpenFunction, sizes: list[int], datagrams: list[int],
-) -> None:
+    ([0], [0]), ([10, 20], [30]), ([MAX_DATAGRAM - 1, 1], [MAX_DATAGRAM]),
+    ([MAX_DATAGRAM - 1, 2], [MAX_DATAGRAM - 1, 2]), ([280] * 12, [1400, 1400, 560])])
+def test_frames_share_datagrams_that_ethernet_does_not_fragment(
+        channel: Open, sizes: list[int], datagrams: list[int]) -> None:
     with bound_socket() as remote:
         ours = channel(f'udpout://127.0.0.1:{remote.getsockname()[1]}')
         ours.broadcast(*map(bytes, sizes))
@@ -170,38 +124,170 @@ def test_frames_share_datagrams_that_pass_an_ethernet_whole(
         assert has_nothing(remote)
 
 
-class _FailingSocket:
-    """Fails to send, in one way."""
+class FailingSocket:
+    """Has one datagram, and then fails for one reason; a genuine socket is behind it."""
 
-    def __init__(self, reason: int) -> None:
-        self._reason = reason
+    def __init__(self, real: socket.socket, reason: int) -> None:
+        self._real, self._left = real, [(b'last', ('127.0.0.1', 14550))]
+        self._error = OSError(reason, 'as the test says')
+        self.fileno, self.close = real.fileno, real.close
+
+    def recvfrom(self, size: int) -> tuple[bytes, Any]:
+        if not self._left:
+            raise self._error
+        return self._left.pop()
 
     def sendto(self, data: bytes, peer: Any) -> int:
-        raise OSError(self._reason, 'as the test says')
-
-    def close(self) -> None:
-        pass
+        raise self._error
 
 
-def _with_failing_socket(ours: OpenChannel, reason: int) -> OpenChannel:
-    real: socket.socket = ours.channel._socket  # type: ignore[attr-defined]
-    ours.selector.unregister(real)
-    real.close()
-    ours.channel._socket = _FailingSocket(reason)  # type: ignore[attr-defined]
-    return ours
+def failing(ours: OpenChannel, reason: int) -> UdpChannel:
+    """Return the channel, whose socket now fails."""
+    assert isinstance(ours.channel, UdpChannel)
+    ours.channel._socket = FailingSocket(ours.channel._socket, reason)  # type: ignore[assignment]
+    return ours.channel
 
 
-@pytest.mark.parametrize('reason', [errno.ENOBUFS, errno.ENOMEM, errno.EAGAIN,
-                                    errno.ECONNREFUSED])
-def test_a_remote_that_cannot_be_sent_to_just_now_costs_one_frame(
-    channel: OpenFunction, reason: int,
-) -> None:
-    ours = _with_failing_socket(channel('udpout://127.0.0.1:9'), reason)
-    ours.broadcast(b'frame')
-    assert ours.channel.dropped == 1
+@pytest.mark.parametrize(('reason', 'is_loss'), [
+    (errno.ENOBUFS, False), (errno.ENOMEM, False), (errno.EAGAIN, False),
+    (errno.ECONNREFUSED, False), (errno.ENETUNREACH, True)])
+def test_remote_that_cannot_be_sent_to_costs_a_frame_or_without_a_way_the_channel(
+        channel: Open, reason: int, is_loss: bool) -> None:
+    ours = failing(channel('udpout://127.0.0.1:9'), reason)
+    with pytest.raises(ChannelLost) if is_loss else contextlib.nullcontext():
+        ours.send([b'frame'], ours.peers(0.0))
+    assert ours.dropped == (not is_loss)
 
 
-def test_a_remote_without_a_way_to_it_is_a_lost_channel(channel: OpenFunction) -> None:
-    ours = _with_failing_socket(channel('udpout://127.0.0.1:9'), errno.ENETUNREACH)
+def test_datagram_before_the_loss_of_the_channel_is_read(channel: Open) -> None:
+    coming = failing(channel(ANY_PORT), errno.ENETDOWN).receive(None)
+    assert next(coming) == (('127.0.0.1', 14550), b'last')
     with pytest.raises(ChannelLost):
-        ours.broadcast(b'frame')
+        next(coming)
+
+
+def test_learnt_peer_out_of_reach_is_forgotten_without_loss(channel: Open) -> None:
+    ours = channel(ANY_PORT)
+    with bound_socket() as good:
+        # Nothing can be sent to port 0.
+        for peer in (('127.0.0.1', 0), good.getsockname()):
+            ours.channel.heard(peer, 0.0)
+        ours.broadcast(bytes(MAX_DATAGRAM), b'frame')
+        assert [len(good.recv(MAX_DATAGRAM)) for _ in range(2)] == [MAX_DATAGRAM, 5]
+        assert (ours.channel.peers(0.0), ours.channel.dropped) == ((good.getsockname(),), 2)
+
+
+# Amounts of one read
+
+@pytest.mark.parametrize(('limits', 'sent', 'reads'), [
+    # The first datagram of a peer is alone: an answer may wait for it.
+    ({'BATCH': 4}, 'aaaaa', [(['a', 'aaa'], True), (['a'], False)]),
+    ({}, 'aaab', [(['a', 'aa', 'b'], False)]),
+    ({'BATCH_SIZE': 2}, 'aaa', [(['a', 'a'], True), (['a'], False)])])
+def test_datagrams_of_one_peer_are_read_together_up_to_a_limit(
+        channel: Open, monkeypatch: pytest.MonkeyPatch, limits: dict[str, int], sent: str,
+        reads: list[tuple[list[str], bool]]) -> None:
+    for name, limit in limits.items():
+        monkeypatch.setattr(udp, name, limit)
+    port = free_port()
+    ours = channel(f'udpin://127.0.0.1:{port}')
+    with bound_socket() as one, bound_socket() as other:
+        send(port, *((one if name == 'a' else other, name.encode()) for name in sent))
+        for pieces, more in reads:
+            assert ([data.decode() for _, data in ours.receive()], ours.channel.more) == (
+                pieces, more)
+
+
+def test_socket_keeps_as_much_as_the_kernel_allows(channel: Open) -> None:
+    (key,) = channel(ANY_PORT).selector.get_map().values()
+    with socket.socket(type=socket.SOCK_DGRAM) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+        most = other.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+    assert isinstance(key.fileobj, socket.socket)
+    assert key.fileobj.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) == most
+
+
+# Peers: heard(peer, now) -> whether it is new; peers(now)
+
+def peer(number: int) -> tuple[str, int]:
+    return '127.0.0.1', 10_000 + number
+
+
+ALL = list(range(MAX_PEERS))
+LATER = PEER_EXPIRY + 0.01
+
+
+@pytest.mark.parametrize(('heard', 'now', 'peers'), [
+    ([(1, 0.0, True), (1, 1.0, False)], 1.0, [1]), ([(1, 0.0, True)], PEER_EXPIRY, [1]),
+    ([(1, 0.0, True)], LATER, []), ([(1, 0.0, True), (1, 9.0, False)], LATER, [1]),
+    # A peer beyond the bound takes the place of an expired one only.
+    ([*((number, 0.0, True) for number in ALL), (MAX_PEERS, 1.0, False)], 1.0, ALL),
+    ([*((number, 0.0, True) for number in ALL), (MAX_PEERS, LATER, True)], LATER, [MAX_PEERS])])
+def test_peer_is_one_until_it_expires_and_takes_no_place_of_another(
+        channel: Open, heard: Iterable[tuple[int, float, bool]], now: float,
+        peers: list[int]) -> None:
+    ours = channel(ANY_PORT).channel
+    for number, time, is_new in heard:
+        assert ours.heard(peer(number), time) is is_new
+    assert ours.peers(now) == tuple(map(peer, peers))
+    assert not peers or not ours.heard(peer(peers[0]), now)
+
+
+# Peers of a link
+
+COMMAND = CommandLong(*LIGHT, 512, 0, 440, 0, 0, 0, 0, 0, 0)
+MARK = heartbeat(18)
+MARK.custom_mode = 0x12345678
+
+
+@pytest.fixture
+def bridge(run: Run) -> tuple[LiveLink, int]:
+    """Return a link that listens, and its port."""
+    port = free_port()
+    link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
+    link.wait_open()
+    return link, port
+
+
+def datagrams_until_mark(receiver: socket.socket) -> list[list[int]]:
+    """Return the message ids of each datagram, up to the one with the mark."""
+    found = []
+    while True:
+        frames = Decoder().feed(receiver.recv(65536))
+        found.append([frame.message_id for frame in frames])
+        if frames[-1].payload[:4] == MARK.custom_mode.to_bytes(4, 'little'):
+            return found
+
+
+@pytest.mark.parametrize('garbage', [
+    b'', b'hello', bytes(300), heartbeat_frame()[:-1], heartbeat_frame()[:-1] + b'\0',
+    b'\xfd' * 280])
+def test_garbage_makes_no_peer_and_a_valid_frame_one_that_is_greeted_at_once(
+        bridge: tuple[LiveLink, int], garbage: bytes) -> None:
+    link, port = bridge
+    with bound_socket() as light, bound_socket() as liar:
+        send(port, (liar, garbage), (light, heartbeat_frame()))
+        (frame,) = Decoder().feed(light.recv(300))
+        assert frame.source == BRIDGE
+        assert has_nothing(liar)
+        assert link.state().peers == 1
+
+
+@pytest.mark.parametrize(('sources', 'reached'), [
+    # Another sender with the light's address takes no command from it.
+    ((LIGHT, LIGHT), [True, True]), ((LIGHT, Address(7, 1)), [True, False]),
+    ((Address(8, 1), Address(7, 1)), [True, True])])
+def test_command_goes_where_its_target_was_heard_and_else_to_all(
+        bridge: tuple[LiveLink, int], sources: tuple[Address, Address],
+        reached: list[bool]) -> None:
+    link, port = bridge
+    with bound_socket() as first, bound_socket() as second:
+        for count, (sender, source) in enumerate(zip((first, second), sources, strict=True), 1):
+            send(port, (sender, heartbeat_frame(source)))
+            link.endpoint.wait_heard(count)
+        link.send(COMMAND, MARK)
+        datagrams = [datagrams_until_mark(one) for one in (first, second)]
+        assert [any(COMMAND.id in ids for ids in one) for one in datagrams] == reached
+        if LIGHT not in sources:
+            # Messages for the same peers share a datagram.
+            assert [one[-1] for one in datagrams] == [[COMMAND.id, MARK.id]] * 2

@@ -19,6 +19,8 @@ class Serial:
         self, port: str | None = None, baudrate: int = 9600, *, timeout: float | None = None,
         write_timeout: float | None = None, exclusive: bool | None = None, rtscts: bool = False,
     ) -> None: ...
+    baudrate: int
+    rtscts: bool
     exclusive: bool | None
     in_waiting: int
     out_waiting: int

@@ -35,7 +35,7 @@ from .options import parse
 from ..options import signing
 from ..program import discard_output
 from ..termination import SIGNALS
-from ...mavlink.link import Link
+from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
@@ -71,7 +71,11 @@ def run(args: Sequence[str] | None = None) -> int:
     except (UrlError, KeyFileError, ValueError) as error:
         _complain(str(error))
         return 2
-    return Conformance(options, checks, address, url, signs, store).run()
+    try:
+        return Conformance(options, checks, address, url, signs, store).run()
+    except LinkThreadError as error:
+        _complain(f'{error}; nothing was checked')
+        return 2
 
 
 class Conformance:

@@ -34,7 +34,7 @@ from .scenario import components, load, Scenario, SettingError, Types
 from .view import LiveView, Look, look, PlainView
 from ..options import signing
 from ..termination import Termination
-from ...mavlink.link import Link
+from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.messages import Address
 from ...mavlink.signing_files import KeyFileError
 from ...mavlink.url import parse_url, Url, UrlError
@@ -148,5 +148,9 @@ def run(
     except (UrlError, SettingError, KeyFileError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return 2
-    simulation.run(termination)
+    try:
+        simulation.run(termination)
+    except LinkThreadError as error:
+        print(f'simulator: {error}', file=sys.stderr)
+        return 1
     return 0

@@ -1,0 +1,94 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The states of a link, and the rate at which its events are reported; no I/O."""
+
+from __future__ import annotations
+
+from illuminator_ros.mavlink.link_state import (
+    EVENT_INTERVAL,
+    LinkInput,
+    LinkState,
+    LinkStatus,
+    MAX_EVENTS,
+    MAX_REASONS,
+)
+import pytest
+
+
+# The initials of the inputs -> the state, whether it counts as open, and the reported events.
+@pytest.mark.parametrize(('inputs', 'state', 'events'), [
+    ('', LinkState.OPENING, []),
+    ('o', LinkState.UNPROVEN, ['open']),
+    ('op', LinkState.OPEN, ['open']),
+    ('opc', LinkState.LOST, ['open', 'lost']),
+    ('opcop', LinkState.OPEN, ['open', 'lost', 'open']),
+    ('c', LinkState.RETRYING, ['not open']),
+    # A transport that is closed at once each time counts as open only when it is proved again.
+    ('ococo', LinkState.DOUBTFUL, ['open', 'lost']),
+    ('ocop', LinkState.OPEN, ['open', 'lost', 'open']),
+    ('opcoco', LinkState.DOUBTFUL, ['open', 'lost', 'open', 'lost']),
+    ('ops', LinkState.STOPPED, ['open'])])
+def test_state_and_events_follow_from_the_inputs(
+        inputs: str, state: LinkState, events: list[str]) -> None:
+    status, reported = LinkStatus('label', 0.0), []
+    for now, initial in enumerate(inputs):
+        (input_,) = (one for one in LinkInput if one.value[0] == initial)
+        status.take(input_, float(now), 'name', 'reason')
+        while event := status.event(float(now)):
+            reported.append(str(event).split(':')[0].removeprefix('link '))
+    assert (status.state, reported) == (state, events)
+    assert state.is_open == (status.reason == '')
+    assert status.openings == events.count('open')
+
+
+def test_reasons_for_not_opening_are_reported_once_each_up_to_a_bound() -> None:
+    status, reported = LinkStatus('label', 0.0), []
+    for number in range(2 * MAX_REASONS):
+        for _ in range(2):
+            status.failed(f'reason {number}')
+            while event := status.event(0.0):
+                reported.append(str(event))
+    assert reported == [f'link not open: label: reason {number}; trying again'
+                        for number in range(MAX_REASONS)]
+    assert status.reason == f'reason {2 * MAX_REASONS - 1}'
+
+
+def flap(status: LinkStatus, now: float, times: int) -> list[int]:
+    """Open and lose a link at one moment; return the unreported changes of each report."""
+    found = []
+    for _ in range(times):
+        for input_ in (LinkInput.OPENED, LinkInput.PROVED, LinkInput.CLOSED):
+            status.take(input_, now, 'name', 'reason')
+            while event := status.event(now):
+                found.append(event.unreported)
+    return found
+
+
+def test_reports_beyond_the_limit_are_refilled_with_time_and_count_the_rest() -> None:
+    status = LinkStatus('label', 0.0)
+    assert flap(status, 0.0, 50) == [0] * MAX_EVENTS
+    assert status.next_deadline() == EVENT_INTERVAL
+    assert status.event(EVENT_INTERVAL - 0.1) is None
+    # The newest two changes are kept, and all others counted.
+    event = status.event(EVENT_INTERVAL)
+    assert event is not None
+    assert str(event) == (
+        f'link open: name ({100 - MAX_EVENTS - 2} more changes not reported)')
+    assert status.event(EVENT_INTERVAL) is None
+    last = status.event(2 * EVENT_INTERVAL)
+    assert (last and (last.is_open, last.unreported)) == (False, 0)
+    assert status.next_deadline() == float('inf')
+    # The limit does not grow beyond its beginning.
+    assert flap(status, 1000 * EVENT_INTERVAL, 50) == [0] * MAX_EVENTS

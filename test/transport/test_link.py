@@ -1,0 +1,394 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A link in its thread: what it tells others, what faults do to it, and how it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+import logging
+import math
+from pathlib import Path
+import socket
+import threading
+from typing import Any
+
+from illuminator_ros.mavlink import connector as connector_module
+from illuminator_ros.mavlink import link as link_module
+from illuminator_ros.mavlink.link import Link, LinkThreadError
+from illuminator_ros.mavlink.link_state import LinkEvent
+from illuminator_ros.mavlink.messages import heartbeat
+from illuminator_ros.mavlink.signing import Signing, SigningMode
+from illuminator_ros.mavlink.signing_files import TimestampStore
+from illuminator_ros.mavlink.transport import open_channel, tcp
+from illuminator_ros.mavlink.url import parse_url
+import pytest
+from support.frames import heartbeat_frame, LIGHT
+from support.live_link import CONNECTOR, LiveLink, resources, Run, Talker
+from support.open_channel import listening_socket, Open, OpenChannel
+from support.ports import free_port
+from support.waiting import eventually, Log, PATIENCE
+
+URL = 'memory://link'
+
+
+@pytest.fixture
+def other(channel: Open) -> OpenChannel:
+    """Return the other side of the in-memory links here."""
+    return channel(URL)
+
+
+# Snapshots and calls
+
+def test_open_link_tells_its_name_and_counts_frames_and_bytes_both_ways(
+        run: Run, other: OpenChannel) -> None:
+    link = run(LiveLink(URL))
+    sent = other.receive()[0][1]
+    other.broadcast(heartbeat_frame() + b'xyz')
+    assert link.endpoint.wait_heard() == LIGHT
+    state = link.state()
+    assert (state.is_open, state.name, state.reason, state.openings, state.failure) == (
+        True, 'memory link', '', 1, '')
+    traffic = state.traffic
+    assert (traffic.frames_received, traffic.bytes_received) == (1, len(heartbeat_frame()) + 3)
+    assert traffic.frames_sent >= 1
+    assert traffic.bytes_sent == traffic.frames_sent * len(sent)
+    # Other threads learn of it soon, without asking.
+    eventually(lambda: link.link.state().traffic.frames_received == 1)
+
+
+def test_frames_are_logged_in_a_line_each_at_debug_level_only(
+        run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
+    for level in (logging.INFO, logging.DEBUG):
+        caplog.set_level(level, 'illuminator_ros')
+        link = run(LiveLink(URL))
+        link.wait_open()
+        other.broadcast(heartbeat_frame())
+        link.endpoint.wait_heard()
+        link.stop()
+        lines = [record.getMessage() for record in caplog.records]
+        for said in ('received from 1/243: Heartbeat(', 'sent from 1/194: Heartbeat('):
+            assert any(line.startswith(said) for line in lines) == (level == logging.DEBUG)
+
+
+# Faults of ours: each is logged, and the link goes on
+
+class Fault(Exception):
+    """The fault that a test injects."""
+
+
+class Faulty(Talker):
+    """
+    Fails in the method of this name, so often.
+
+    :param deadline: of every poll, s; None for that of the heartbeat.
+    :ivar failures: the calls that failed.
+    """
+
+    def __init__(self, method: str, times: float = 1, deadline: float | None = None) -> None:
+        super().__init__()
+        self.failures: Log[str] = Log()
+        if deadline is not None:
+            self.next_deadline = lambda: deadline  # type: ignore[method-assign]
+        genuine = getattr(self, method)
+
+        def fail(*arguments: Any) -> Any:
+            if len(self.failures) < times:
+                self.failures.append(method)
+                raise Fault(method)
+            return genuine(*arguments)
+
+        setattr(self, method, fail)
+
+
+@pytest.fixture
+def faults(monkeypatch: pytest.MonkeyPatch,
+           caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
+    """Return a function that returns all logged faults; each is logged."""
+    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 0.0)
+
+    def logged() -> list[str]:
+        assert all(record.levelno == logging.ERROR for record in caplog.records)
+        return [str(record.exc_info[1]) for record in caplog.records if record.exc_info]
+
+    return logged
+
+
+@pytest.mark.parametrize('method', ['link_opened', 'receive', 'poll', 'next_deadline'])
+def test_fault_of_the_endpoint_is_logged_and_costs_no_other_frame(
+        run: Run, other: OpenChannel, faults: Callable[[], list[str]], method: str) -> None:
+    endpoint = Faulty(method)
+    link = run(LiveLink(URL, endpoint))
+    link.wait_open()
+    other.broadcast(heartbeat_frame() + heartbeat_frame(sequence=1))
+    assert endpoint.wait_heard() == LIGHT
+    endpoint.failures.wait_for(lambda one: True)
+    assert faults() == [method]
+
+
+@pytest.mark.parametrize('failing', ['link_closed', 'opening', 'loss'])
+def test_fault_at_a_loss_or_in_a_listener_does_not_keep_a_link_lost(
+        run: Run, faults: Callable[[], list[str]], failing: str) -> None:
+    def listen(event: LinkEvent) -> None:
+        if failing == ('opening' if event.is_open else 'loss'):
+            raise Fault(failing)
+
+    endpoint = Faulty('link_closed', failing == 'link_closed')
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}', endpoint,
+                            on_event=listen))
+        for count in (1, 2):
+            with server.accept()[0] as connection:
+                connection.sendall(heartbeat_frame())
+                endpoint.wait_heard(count)
+                link.wait_open(count)
+    assert set(faults()) == {failing}
+
+
+def test_fault_in_a_call_holds_back_no_other(
+        run: Run, faults: Callable[[], list[str]]) -> None:
+    link = run(LiveLink(URL))
+    link.wait_open()
+    turns: Log[int] = Log()
+
+    def fail(now: float) -> None:
+        turns.append(link.endpoint.turns)
+        raise Fault('call')
+
+    def both(now: float) -> None:
+        link.link.call(fail)
+        link.link.call(lambda now: turns.append(link.endpoint.turns))
+
+    link.link.call(both)
+    assert turns.wait_for(lambda one: True, count=2) == turns[0]
+    assert faults() == ['call']
+
+
+def test_message_that_cannot_be_sent_costs_no_other(
+        run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
+    link = run(LiveLink(URL))
+    link.wait_open()
+    wrong, right = heartbeat(18), heartbeat(18)
+    wrong.custom_mode, right.custom_mode = -1, 0x12345678
+    link.send(wrong, right)
+    data = b''
+    while b'\x78\x56\x34\x12' not in data:
+        data += b''.join(piece for _, piece in other.receive())
+    assert len(caplog.records) == 1
+
+
+@pytest.mark.parametrize('method', ['poll', 'next_deadline'])
+def test_lasting_fault_does_not_keep_a_processor_busy_nor_fill_the_log(
+        run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
+        method: str) -> None:
+    endpoint = Faulty(method, math.inf, -math.inf)
+    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 0.001)
+    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 60.0)
+    link = run(LiveLink(URL, endpoint))
+    endpoint.failures.wait_for(lambda one: True, count=50)
+    assert len(caplog.records) == 1
+    # A thread that pauses stands still from now on.
+    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 3600.0)
+    monkeypatch.setattr(link_module, 'IDLE', 3600.0)
+    eventually(lambda: threading.Event().wait(0.05) or len(endpoint.failures))
+    before = len(endpoint.failures)
+    threading.Event().wait(0.1)
+    assert len(endpoint.failures) - before < 5
+    link.link.stop(0.0)
+
+
+@pytest.mark.parametrize('reason', [PermissionError('no room'), Fault('store')])
+def test_time_stamps_that_cannot_be_stored_do_not_end_the_link(
+        run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture, tmp_path: Path,
+        reason: Exception) -> None:
+    class Store(TimestampStore):
+
+        def store(self, *arguments: Any, **named: Any) -> None:
+            raise reason
+
+    link = run(LiveLink(URL, signing=Signing(SigningMode.SIGN, bytes(32)),
+                        store=Store('key', 'name', tmp_path)))
+    link.wait_open()
+    other.broadcast(heartbeat_frame())
+    assert link.endpoint.wait_heard() == LIGHT
+    link.stop()
+    assert caplog.records
+
+
+def test_fault_while_opening_is_logged_and_tried_again(
+        run: Run, faults: Callable[[], list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    genuine, tries = open_channel, Log[int]()
+
+    def open_second_time(url: Any) -> Any:
+        tries.append(1)
+        if len(tries) == 1:
+            raise Fault('opening')
+        return genuine(url)
+
+    monkeypatch.setattr(connector_module, 'open_channel', open_second_time)
+    run(LiveLink(URL)).wait_open()
+    assert faults() == ['opening']
+
+
+def test_connector_whose_thread_cannot_be_started_is_tried_again(
+        run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    # As with a limit on the number of processes.
+    monkeypatch.setattr(link_module, 'THREAD_RETRY_INTERVAL', 0.01)
+    genuine, failures = threading.Thread.start, Log[str]()
+
+    def start(thread: threading.Thread) -> None:
+        if thread.name == CONNECTOR and len(failures) < 2:
+            failures.append(thread.name)
+            raise RuntimeError("can't start new thread")
+        genuine(thread)
+
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        with server.accept()[0] as connection:
+            connection.sendall(heartbeat_frame())
+            link.endpoint.wait_heard()
+            monkeypatch.setattr(threading.Thread, 'start', start)
+        link.wait_lost()
+        failures.wait_for(lambda name: True, count=2)
+        server.accept()[0].close()
+
+
+def test_link_whose_thread_cannot_be_started_says_so_and_leaves_nothing(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def start(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    before = resources()
+    link = Link(parse_url(URL), Talker(), label='the label')
+    monkeypatch.setattr(threading.Thread, 'start', start)
+    with pytest.raises(LinkThreadError, match="the label: can't start new thread for the link"):
+        link.start()
+    link.stop()
+    assert resources() == before
+
+
+# The end: from any thread, at any moment, and with nothing left open (fixture "run")
+
+@pytest.mark.parametrize('url', [
+    URL, 'udpin://127.0.0.1:{port}', 'udpout://127.0.0.1:9', 'tcpin://127.0.0.1:{port}',
+    'tcp://127.0.0.1:{port}', 'serial:///dev/illuminator_ros_has_no_such_device:57600'])
+def test_link_ends_open_or_not_and_tells_so(run: Run, url: str) -> None:
+    url = url.format(port=free_port(socket.SOCK_STREAM))
+    run(LiveLink(url)).stop()
+    link = run(LiveLink(url))
+    link.events.wait_for(lambda event: True)
+    threads = [threading.Thread(target=link.stop) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE)
+    link.link.start()
+    assert (link.link.is_running(), link.link.state().is_open) == (False, False)
+    assert link.link.state().reason == 'stopped'
+
+
+def test_link_ends_in_its_own_thread_and_in_a_listener(run: Run) -> None:
+    links: Log[LiveLink] = Log()
+    one = run(LiveLink(URL))
+    other = run(LiveLink(
+        URL, on_event=lambda event: links.wait_for(lambda link: True).link.stop()))
+    one.ask(lambda now: one.link.stop())
+    links.append(other)
+    eventually(lambda: not one.link.is_running() and not other.link.is_running())
+
+
+def test_link_that_was_never_started_leaves_nothing(run: Run) -> None:
+    for _ in range(10):
+        link = Link(parse_url(URL), Talker(), label='x')
+        link.stop()
+        link.start()
+        assert not link.is_running()
+
+
+def test_link_with_traffic_ends_and_closes_its_connection(run: Run) -> None:
+    stopping = threading.Event()
+    with listening_socket() as server:
+        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        with server.accept()[0] as connection:
+            def flood() -> None:
+                with contextlib.suppress(OSError):
+                    while not stopping.is_set():
+                        connection.sendall(heartbeat_frame())
+
+            thread = threading.Thread(target=flood)
+            thread.start()
+            link.endpoint.wait_heard()
+            link.stop()
+            assert not link.link.is_running()
+            stopping.set()
+            thread.join()
+            with contextlib.suppress(ConnectionResetError):
+                while connection.recv(300):
+                    pass
+
+
+@pytest.mark.parametrize(('module', 'name', 'url', 'after'), [
+    # A name server or a host that does not answer takes long; the channel then comes late.
+    (socket, 'getaddrinfo', 'udpout://127.0.0.1:9', False),
+    (tcp, '_connect', 'tcp://127.0.0.1:{port}', False),
+    (connector_module, 'open_channel', 'udpin://127.0.0.1:{port}', True)])
+def test_link_ends_while_it_opens_and_closes_what_opens_late(
+        run: Run, monkeypatch: pytest.MonkeyPatch, module: Any, name: str, url: str,
+        after: bool) -> None:
+    begun, go_on, genuine = threading.Event(), threading.Event(), getattr(module, name)
+
+    def wait() -> None:
+        begun.set()
+        go_on.wait(PATIENCE)
+
+    def slow(*arguments: Any, **named: Any) -> Any:
+        if not after:
+            wait()
+        result = genuine(*arguments, **named)
+        if after:
+            wait()
+        return result
+
+    monkeypatch.setattr(module, name, slow)
+    link = run(LiveLink(url.format(port=free_port())))
+    assert begun.wait(PATIENCE)
+    link.stop()
+    assert not link.link.is_running()
+    go_on.set()
+
+
+def test_channel_that_was_opened_and_not_yet_taken_is_closed(
+        run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    genuine = open_channel
+    inside, go_on = threading.Event(), threading.Event()
+
+    def open_behind(url: Any) -> Any:
+        assert inside.wait(PATIENCE)
+        return genuine(url)
+
+    def hold(now: float) -> None:
+        inside.set()
+        go_on.wait(PATIENCE)
+
+    monkeypatch.setattr(connector_module, 'open_channel', open_behind)
+    link = run(LiveLink(f'udpin://127.0.0.1:{free_port()}'))
+    # The channel comes behind this call and behind the end.
+    link.link.call(hold)
+    assert inside.wait(PATIENCE)
+    resources()
+    link.link.stop(0.0)
+    go_on.set()
+    link.stop()
+    assert link.history() == []

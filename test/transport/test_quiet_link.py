@@ -1,0 +1,150 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A link with little to do: how often it greets, what it counts, and that it rests."""
+
+from __future__ import annotations
+
+import math
+import socket
+
+from illuminator_ros.mavlink import component
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.receiver import STALL
+from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
+import pytest
+from support.frames import heartbeat_frame, raw_v2
+from support.live_link import BRIDGE, LiveLink, Run, Talker
+from support.ports import free_port
+from support.ptys import PtyDevice
+from support.simulated_link import SimulatedLink
+from support.waiting import eventually
+
+PEER = ('127.0.0.1', 14550)
+AUTOPILOT = Address(7, 1)
+ATTITUDE = 30
+BEAT, NOISE = heartbeat_frame(), b'noise' + heartbeat_frame()[:-1] + b'x'
+FALSE_START = b'\xfe\xfa\x00\x01\x01\x6e'
+
+
+def foreign_frame(sequence: int, source: Address = AUTOPILOT) -> bytes:
+    """Return a frame with a message that the endpoint does not handle."""
+    return raw_v2(ATTITUDE, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)
+
+
+def simulated() -> tuple[SimulatedLink, Talker]:
+    """Return a link that was opened at 0 s, and its endpoint."""
+    endpoint = Talker()
+    return SimulatedLink(endpoint, lambda data, peer: None, now=0.0), endpoint
+
+
+# A router that has restarted forwards nothing to us until it has heard us.
+@pytest.mark.parametrize(('steps', 'greetings'), [
+    # Before the first frame, at the first frame, and not while frames come.
+    ([0.6, BEAT, 1.0], [0.0, 0.25, 0.5, 0.6]), ([BEAT, 1.4, BEAT, 1.4, BEAT, 1.4], [0.0, 0.0]),
+    ([BEAT, *[1.4, foreign_frame(0)] * 5], [0.0, 0.0]),
+    # Again after 1.5 s without a valid frame.
+    ([BEAT, 2.1], [0.0, 0.0, 1.5, 1.75, 2.0]), ([BEAT, 1.0, NOISE, 0.6], [0.0, 0.0, 1.5])])
+def test_link_greets_while_it_hears_no_valid_frame(
+        steps: list[float | bytes], greetings: list[float]) -> None:
+    link, endpoint = simulated()
+    for step in steps:
+        if isinstance(step, bytes):
+            link.receive((step, PEER))
+        else:
+            link.run(step)
+    assert list(endpoint.greetings) == greetings
+
+
+def test_frame_behind_a_false_start_is_received_when_that_is_given_up() -> None:
+    link, endpoint = simulated()
+    link.receive((BEAT + FALSE_START + BEAT, PEER))
+    link.run(STALL - 0.01)
+    assert len(endpoint.heard) == 1
+    link.run(0.02)
+    assert len(endpoint.heard) == 2
+
+
+def test_foreign_frames_keep_a_peer_and_are_counted() -> None:
+    link, endpoint = simulated()
+    for second in range(3 * int(PEER_EXPIRY)):
+        link.run(1.0)
+        link.receive((foreign_frame(second), PEER))
+    assert (link.state().peers, link.udp.peers(link.now)) == (1, (PEER,))
+    for sequence in (30, 33, 34, 34):
+        link.receive((foreign_frame(sequence), PEER))
+    counter = link.state().traffic.sources[AUTOPILOT]
+    assert (counter.received, counter.lost, counter.duplicate) == (34, 2, 1)
+    assert (link.state().traffic.frames_received, len(endpoint.heard)) == (34, 0)
+
+
+def test_every_frame_from_our_own_address_is_received() -> None:
+    link, endpoint = simulated()
+    link.receive((heartbeat_frame(BRIDGE, sequence=77), PEER))
+    link.receive((foreign_frame(78, BRIDGE) + heartbeat_frame(BRIDGE, sequence=79), PEER))
+    assert [source for source, _ in endpoint.heard] == [BRIDGE, BRIDGE]
+
+
+def rests(link: LiveLink) -> bool:
+    """Return whether the thread makes few turns during the next heartbeats."""
+    turns = []
+    for _ in range(4):
+        due = link.endpoint.heartbeat.due
+        eventually(lambda due=due: link.endpoint.heartbeat.due != due)  # type: ignore[misc]
+        turns.append(link.endpoint.turns)
+    return turns[-1] - turns[0] < 60
+
+
+@pytest.fixture
+def _fast_heartbeat(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(component, 'HEARTBEAT_INTERVAL', 0.1)
+
+
+@pytest.mark.parametrize('url', ['memory://quiet', 'udpin://127.0.0.1:{port}'])
+def test_open_link_without_traffic_rests(run: Run, url: str, _fast_heartbeat: None) -> None:
+    assert rests(run(LiveLink(url.format(port=free_port(socket.SOCK_STREAM)))))
+
+
+class _Idle(Talker):
+    """Has nothing to do."""
+
+    def next_deadline(self) -> float:
+        super().next_deadline()
+        return math.inf
+
+
+@pytest.mark.parametrize('url', [
+    'tcp://127.0.0.1:{port}', 'serial:///dev/illuminator_ros_has_no_such_device:57600'])
+def test_link_that_cannot_be_opened_rests_between_tries(run: Run, url: str) -> None:
+    link = run(LiveLink(url.format(port=free_port(socket.SOCK_STREAM)), _Idle()))
+    link.wait_lost()
+    before = link.endpoint.turns
+    for _ in range(20):
+        link.state()
+    assert link.endpoint.turns - before < 100
+
+
+def test_line_that_takes_nothing_makes_no_work_and_drops_are_counted(
+        run: Run, device: PtyDevice, _fast_heartbeat: None) -> None:
+    link = run(LiveLink(f'serial://{device.path}:57600'))
+    link.wait_open()
+
+    def fill(now: float) -> None:
+        for _ in range(3000):
+            link.endpoint.heartbeat.send(now, link.endpoint.outgoing)
+
+    link.ask(fill)
+    assert rests(link)
+    assert link.state().traffic.frames_dropped > 0
+    assert link.state().traffic.frames_sent >= 3000

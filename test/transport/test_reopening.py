@@ -1,0 +1,435 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Links and lights that are lost and return: without help, with one event each, without leaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import socket
+import threading
+from typing import Any, Protocol
+
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.mavlink import component, link_state
+from illuminator_ros.mavlink import connector as connector_module
+from illuminator_ros.mavlink import link as link_module
+from illuminator_ros.mavlink.connector import FIRST_PAUSE
+from illuminator_ros.mavlink.messages import Address, heartbeat
+from illuminator_ros.mavlink.transport import ChannelLost, open_channel
+from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
+from illuminator_ros.payload import request
+import pytest
+from support.frames import heartbeat_frame, LIGHT
+from support.live_link import (
+    Bridge,
+    Jump,
+    Lights,
+    LiveLink,
+    resources,
+    Run,
+    wait_for_resources,
+)
+from support.open_channel import bound_socket, listening_socket
+from support.ports import free_port
+from support.ptys import PtyDevice
+from support.relay import Relay
+from support.waiting import Log, PATIENCE
+
+CYCLES = 200
+
+
+class Server:
+    """A TCP server that can be restarted."""
+
+    def __init__(self) -> None:
+        self._port = free_port(socket.SOCK_STREAM)
+        self.url = f'tcp://127.0.0.1:{self._port}'
+        self._listener: socket.socket | None = None
+        self._connection: socket.socket | None = None
+
+    def come(self, data: bytes = heartbeat_frame()) -> None:
+        """Accept a connection and send something."""
+        self.listen()
+        assert self._listener is not None
+        self._connection = self._listener.accept()[0]
+        self._connection.sendall(data)
+
+    def listen(self) -> None:
+        """Listen, unless it does."""
+        if self._listener is None:
+            self._listener = listening_socket(port=self._port)
+
+    def drop(self) -> None:
+        """Close the connection."""
+        if self._connection:
+            self._connection.close()
+
+    def go(self) -> None:
+        """Close the listener first, or the link would be in its queue, and the connection."""
+        if self._listener:
+            self._listener.close()
+            self._listener = None
+        self.drop()
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    one = Server()
+    yield one
+    one.go()
+
+
+@pytest.fixture
+def _endless_probation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no channel proved for the time alone that it was open."""
+    monkeypatch.setattr(link_module, 'PROBATION', 3600.0)
+
+
+@pytest.fixture
+def pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
+    """Return a log of the pauses before tries, which take the longest that they may be."""
+    log: Log[float] = Log()
+
+    class Recorded(connector_module.Backoff):
+
+        def __init__(self) -> None:
+            super().__init__(lambda: 1.0)
+
+        def pause(self, spent: float) -> float:
+            log.append(super().pause(0.0))
+            return min(log[-1], 0.001)
+
+    monkeypatch.setattr(connector_module, 'Backoff', Recorded)
+    return log
+
+
+def test_openings_and_losses_are_reported_once_each_with_reason_and_time(
+        run: Run, server: Server, pauses: Log[float]) -> None:
+    clock = Jump()
+    times = [clock()]
+    link = run(LiveLink(server.url, clock=clock))
+    # Further tries are not reported, before the first opening and after a loss.
+    pauses.wait_for(lambda one: True, count=4)
+    for change, wait, count in ((server.come, link.wait_open, 1), (server.go, link.wait_lost, 2),
+                                (server.come, link.wait_open, 2)):
+        clock.ahead += 1000.0
+        change()
+        wait(count)
+        times.append(link.state().since)
+        pauses.wait_for(lambda one: True, count=4 if change == server.come else len(pauses) + 4)
+    name, address = f'tcp to {server.url[6:]}', server.url[6:]
+    lost = link.events[2].reason
+    assert list(map(str, link.events)) == [
+        f'link not open: {server.url}: cannot connect to {address}: Connection refused; '
+        'trying again', f'link open: {name}', f'link lost: {name}: {lost}; trying again',
+        f'link open: {name}']
+    assert lost
+    assert [int((later - times[0]) // 1000) for later in times] == [0, 1, 2, 3]
+
+
+def test_frames_drops_and_losses_are_counted_over_openings_without_those_in_between(
+        run: Run, server: Server) -> None:
+    link = run(LiveLink(server.url))
+    drops = [0]
+    for count, sequence in enumerate((10, 100), 1):
+        # The beginning of a frame is forgotten with the connection, as are the peers.
+        server.come(heartbeat_frame(sequence=sequence) + heartbeat_frame()[:9])
+        link.endpoint.wait_heard(count)
+        assert link.state().peers == 1
+        while link.state().traffic.frames_dropped == drops[-1]:
+            link.send(*[heartbeat(18)] * 10_000)
+        drops.append(link.state().traffic.frames_dropped)
+        server.go()
+        link.wait_lost(count)
+        assert (link.state().peers, link.state().failure) == (
+            0, f'{server.url} is not open: {link.state().reason}')
+    counter = link.state().traffic.sources[LIGHT]
+    assert (counter.received, counter.lost) == (2, 0)
+    assert 0 < drops[1] < drops[2]
+
+
+def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sends(
+        run: Run, server: Server, pauses: Log[float], _endless_probation: None) -> None:
+    link = run(LiveLink(server.url))
+    server.listen()
+    for _ in range(5):
+        server.come(b'')
+        server.drop()
+    server.come()
+    link.wait_open(2)
+    assert [pause for pause in pauses if pause][:4] == [0.05, 0.1, 0.2, 0.4]
+    assert link.history() == [True, False, True]
+    assert link.state().is_open
+
+
+def test_server_that_keeps_a_connection_is_open_after_the_probation(
+        run: Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, 'PROBATION', 0.2)
+    link = run(LiveLink(server.url))
+    server.come(b'')
+    server.drop()
+    server.come(b'')
+    assert link.wait_open(2)
+
+
+@pytest.mark.parametrize(('probation', 'pause'), [(0.0, 0.0), (3600.0, FIRST_PAUSE)])
+def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_after_a_pause(
+        run: Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch,
+        probation: float, pause: float) -> None:
+    monkeypatch.setattr(link_module, 'PROBATION', probation)
+    server.listen()
+    link = run(LiveLink(server.url))
+    for count in (1, 2, 3):
+        server.come()
+        link.endpoint.wait_heard(count)
+        link.ask(lambda now: None)
+        server.drop()
+    link.wait_lost(3)
+    assert [pauses[i] for i in range(3)] == [0.0, pause, pause]
+
+
+def test_remote_without_a_way_to_it_is_not_open_and_reported_once(
+        run: Run, pauses: Log[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    # The socket can be opened, but nothing can be sent.
+    def opened(url: Any) -> Any:
+        channel = open_channel(url)
+
+        def send(frames: Any, peers: Any) -> None:
+            raise ChannelLost(101, 'Network is unreachable')
+
+        monkeypatch.setattr(channel, 'send', send)
+        return channel
+
+    monkeypatch.setattr(connector_module, 'open_channel', opened)
+    link = run(LiveLink('udpout://127.0.0.1:9'))
+    pauses.wait_for(lambda one: True, count=5)
+    assert ([event.reason for event in link.events], link.state().is_open) == (
+        ['Network is unreachable'], False)
+
+
+def test_port_in_use_is_opened_once_it_is_free(run: Run) -> None:
+    with contextlib.ExitStack() as stack:
+        taken = stack.enter_context(bound_socket())
+        port = taken.getsockname()[1]
+        link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
+        link.wait_lost()
+        assert (link.state().is_open, link.state().reason, link.state().openings) == (
+            False, f'cannot listen on 127.0.0.1:{port}: Address already in use', 0)
+        stack.close()
+        link.wait_open()
+        assert link.history() == [False, True]
+
+
+def test_snapshots_read_by_other_threads_are_consistent(
+        run: Run, server: Server, pauses: Log[float]) -> None:
+    errors, ended = list[object](), threading.Event()
+    link = run(LiveLink(server.url))
+
+    def read() -> None:
+        while not ended.wait(0.0002):
+            state = link.link.state()
+            counted = sum(one.received for one in state.traffic.sources.values())
+            if state.is_open != (state.reason == '') or counted != state.traffic.frames_received:
+                errors.append(state)
+
+    readers = [threading.Thread(target=read) for _ in range(2)]
+    for reader in readers:
+        reader.start()
+    for count in range(10):
+        server.come(b''.join(
+            heartbeat_frame(Address(1 + count, 1 + number)) for number in range(20)))
+        link.endpoint.wait_heard(20 * (count + 1))
+        server.drop()
+    ended.set()
+    for reader in readers:
+        reader.join()
+    assert errors == []
+
+
+# Leaks
+
+def cycle(link: LiveLink, come: Callable[[], None], go: Callable[[], None]) -> None:
+    """Let the other side come and go, and check that no thread or descriptor is left of it."""
+    come()
+    link.endpoint.wait_heard()
+    before = resources()
+    for count in range(1, CYCLES + 1):
+        go()
+        link.wait_lost(count)
+        come()
+        link.endpoint.wait_heard(count + 1)
+    link.wait_open(CYCLES + 1)
+    wait_for_resources(*before)
+    assert link.history() == [True] + CYCLES * [False, True]
+
+
+@pytest.fixture
+def _many_events(monkeypatch: pytest.MonkeyPatch, pauses: Log[float]) -> None:
+    monkeypatch.setattr(link_state, 'MAX_EVENTS', 10 * CYCLES)
+    monkeypatch.setattr(link_module, 'PROBATION', 0.0)
+
+
+def test_200_restarts_of_a_tcp_server_leak_nothing(
+        run: Run, server: Server, _many_events: None) -> None:
+    server.listen()
+    cycle(run(LiveLink(server.url)), server.come, server.go)
+
+
+def test_200_replugs_of_a_serial_device_leak_nothing(
+        run: Run, device: PtyDevice, _many_events: None) -> None:
+    link = run(LiveLink(f'serial://{device.path}:57600'))
+    openings = 0
+
+    def come() -> None:
+        nonlocal openings
+        if openings:
+            device.plug_in()
+        openings += 1
+        # Bytes that come before are flushed.
+        link.wait_open(openings)
+        device.write(heartbeat_frame())
+
+    cycle(link, come, device.pull_out)
+
+
+def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: Run) -> None:
+    port, clock = free_port(socket.SOCK_STREAM), Jump()
+    udp, tcp = (run(LiveLink(f'{scheme}://127.0.0.1:{port}', clock=clock))
+                for scheme in ('udpin', 'tcpin'))
+    udp.wait_open()
+    tcp.wait_open()
+    before = resources()
+    for count in range(1, CYCLES + 1):
+        with socket.create_connection(('127.0.0.1', port)) as client, bound_socket() as light:
+            client.sendall(heartbeat_frame())
+            light.sendto(heartbeat_frame(), ('127.0.0.1', port))
+            for link in (udp, tcp):
+                link.endpoint.wait_heard(count)
+            # It is greeted as a new peer, however many there were before.
+            assert light.recv(300)
+        clock.ahead += PEER_EXPIRY / MAX_PEERS + 0.1
+    wait_for_resources(*before)
+    clock.ahead += PEER_EXPIRY + 1
+    assert [(link.history(), link.state().peers) for link in (udp, tcp)] == [([True], 0)] * 2
+
+
+def test_200_links_leak_nothing(run: Run) -> None:
+    port, before = free_port(), resources()
+    for _ in range(CYCLES):
+        link = LiveLink(f'udpin://127.0.0.1:{port}')
+        link.wait_open()
+        link.stop()
+    wait_for_resources(*before)
+
+
+# Lights behind a link
+
+# s after which a light is lost; a machine that stands still for a while loses none.
+SILENCE = 30.0
+
+
+class Other(Protocol):
+    """The other side of a bridge's link."""
+
+    url: str
+
+    def go(self) -> None:
+        """Disappear, unless it has already."""
+
+    def come(self) -> None:
+        """Appear."""
+
+
+class _Lights:
+    """A light over TCP, or over UDP from another port each time."""
+
+    def __init__(self, url: str, lights_url: str, clock: Jump) -> None:
+        self.url = url
+        self._lights_url, self._clock = lights_url, clock
+        self._lights: Lights | None = None
+
+    def come(self) -> None:
+        self._lights = Lights(self._lights_url, clock=self._clock)
+        self._lights.wait_open()
+
+    def go(self) -> None:
+        if self._lights:
+            self._lights.stop()
+
+
+class _SerialLight:
+
+    def __init__(self, device: PtyDevice, clock: Jump) -> None:
+        self._device, self._clock = device, clock
+        device.pull_out()
+        self.url = f'serial://{device.path}:57600'
+        self._stop: Callable[[], None] = lambda: None
+
+    def come(self) -> None:
+        self._device.plug_in()
+        self._stop = self._device.connect_light(self._clock)
+
+    def go(self) -> None:
+        self._stop()
+        self._stop = lambda: None
+        self._device.pull_out()
+
+
+class _Router:
+    """A light behind a UDP router, which goes and comes."""
+
+    def __init__(self, clock: Jump, run: Run) -> None:
+        self._relay = Relay()
+        self.come, self.go = self._relay.start, self._relay.stop
+        self.url = f'udpout://127.0.0.1:{self._relay.near_port}'
+        run(Lights(f'udpout://127.0.0.1:{self._relay.far_port}', clock=clock))
+
+
+@pytest.mark.parametrize('kind', ['tcp', 'udp', 'serial', 'router'])
+def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_each(
+        request_: pytest.FixtureRequest, run: Run, monkeypatch: pytest.MonkeyPatch,
+        kind: str) -> None:
+    # No change fails because the machine stood still behind its acknowledgement.
+    monkeypatch.setattr(request, 'CONFIRMATION_TIMEOUT', PATIENCE)
+    monkeypatch.setattr(component, 'HEARTBEAT_INTERVAL', 0.05)
+    clock, port = Jump(), free_port(socket.SOCK_STREAM)
+    other: Other
+    if kind == 'serial':
+        other = _SerialLight(request_.getfixturevalue('device'), clock)
+    elif kind == 'router':
+        other = _Router(clock, run)
+    else:
+        ours, theirs = {'tcp': ('tcp', 'tcpin'), 'udp': ('udpin', 'udpout')}[kind]
+        other = _Lights(f'{ours}://127.0.0.1:{port}', f'{theirs}://127.0.0.1:{port}', clock)
+    bridge = run(Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
+    for count in (1, 2, 3):
+        other.come()
+        light = bridge.wait_connected(count)
+        assert bridge.enable(True, light).success
+        other.go()
+        # Messages sent before are taken first; on UDP only silence shows the loss.
+        bridge.ask(lambda now: None)
+        clock.ahead += SILENCE
+        bridge.link.call(lambda now: None)
+        bridge.lights.wait_for(lambda entry: entry[0] == 'lost', count=count)
+        refused = bridge.enable(True, light)
+        assert (refused.success, 'is lost' in refused.message) == (False, True)
+    assert [what for what, _ in bridge.lights] == ['connected', 'lost'] * 3
+
+
+@pytest.fixture(name='request_')
+def _request(request: pytest.FixtureRequest) -> pytest.FixtureRequest:
+    return request
