@@ -83,9 +83,13 @@ class Bridge:
                         for kind, value in zip(kinds, values, strict=True)]
         self.component = Component(commands, self.clients)
         signing, store = parameters.signing()
-        self.link = Link(
-            parameters.url, self.component, label=parameters.connection_url,
-            on_event=self._link_event, signing=signing, store=store)
+        try:
+            self.link = Link(
+                parameters.url, self.component, label=parameters.connection_url,
+                on_event=self._link_event, signing=signing, store=store,
+                mavlink_version=parameters.mavlink_version)
+        except ValueError as error:
+            raise ParameterError(f'mavlink_version: {error}') from None
         # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()

@@ -148,6 +148,8 @@ LINK_PARAMETERS = (
     ParameterSpec('payloads', ['illuminator'], 'kinds of devices that the bridge serves'),
     ParameterSpec('system_id', 1, 'our MAVLink system id', low=1, high=255),
     ParameterSpec('component_id', 194, 'our MAVLink component id', low=1, high=255),
+    ParameterSpec('mavlink_version', 2, 'MAVLink version of sent frames; both are received',
+                  low=1, high=2),
     ParameterSpec('command_timeout', 0.5, 'longest wait for one acknowledgement', 's', 0.05,
                   60.0),
     ParameterSpec('command_retries', 3, 'resends of an unacknowledged command', low=0, high=20),
@@ -166,6 +168,7 @@ class LinkParameters:
     url: Url
     payloads: tuple[str, ...]
     address: Address
+    mavlink_version: int
     command_timeout: float
     command_retries: int
     diagnostics_period: float

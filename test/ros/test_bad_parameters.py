@@ -38,6 +38,8 @@ COMMAND_LINES = {
     ('-p', 'names:=[1]'): 'parameter names: 1 is not of the form',
     ('-p', 'signing_key_file:=KEYS/open'):
         'parameter signing_key_file: is given, but signing_mode is off',
+    ('-p', 'mavlink_version:=1'):
+        'parameter mavlink_version: ILLUMINATOR_STATUS, COMPONENT_INFORMATION_BASIC cannot be',
     ('-p', 'signing_mode:=maybe'): "parameter signing_mode: 'maybe' is",
     ('-p', 'signing_mode:=sign', '-p', 'signing_key_file:=KEYS/none'):
         "KEYS/none': No such file or directory",

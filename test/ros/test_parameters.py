@@ -30,6 +30,7 @@ DOUBLE, STRING, INTEGER, BOOL, NOT_SET = (
     ParameterType.PARAMETER_NOT_SET)
 LINK = {
     'connection_url': STRING, 'system_id': INTEGER, 'component_id': INTEGER,
+    'mavlink_version': INTEGER,
     'target_system': INTEGER, 'target_component': INTEGER, 'heartbeat_timeout': DOUBLE,
     'command_timeout': DOUBLE, 'command_retries': INTEGER, 'status_interval': DOUBLE,
     'frame_id': STRING, 'beam_range': DOUBLE, 'beam_angle': DOUBLE,
