@@ -38,11 +38,13 @@ def faked(fake: FakeLight) -> Pair:
     return Pair(fake).settle()
 
 
-def pytest_configure(config):
+def pytest_configure(config: pytest.Config) -> None:
     config.stash[LOSS_TABLE] = LossTable()
 
 
-def pytest_terminal_summary(terminalreporter, config):
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config,
+) -> None:
     table = config.stash[LOSS_TABLE]
     if table.cells:
         terminalreporter.section('commands over lossy lines')

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 import math
+from typing import Any
 
 from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
 from illuminator_ros.illuminator.light import Settings
@@ -34,7 +35,7 @@ def silenced(light: FakeLight | None = None, **faults: float) -> Pair:
                 there=Faults(**faults)).settle()
 
 
-def reasserting(**fields: object) -> tuple[FakeLight, Pair]:
+def reasserting(**fields: Any) -> tuple[FakeLight, Pair]:
     light = FakeLight(brightness=50.0, **fields)
     return light, Pair(light, settings=Settings(reassert=True)).settle()
 
@@ -60,6 +61,7 @@ def test_a_light_stays_on_as_long_as_it_is_commanded(
         act(pair)
         pair.run(SILENCE - 1.0)
 
+    assert pair.light.status
     assert pair.light.status.enabled is on
 
 
@@ -126,6 +128,7 @@ def test_a_change_by_another_sender_is_undone_unless_the_light_is_hot(
     pair.run(3.0)
 
     assert (light.fields == agreed) is undone
+    assert pair.snapshot.configuration
     assert pair.snapshot.configuration.brightness == 50.0
 
 

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from illuminator_ros.illuminator.events import (
     AnyLightEvent,
     LightConnected,
@@ -33,7 +35,7 @@ from illuminator_ros.mavlink.messages import (
     MavType,
     Message,
 )
-from illuminator_ros.payload.discovery import FORGET_AFTER, MAX_CANDIDATES, MAX_DEVICES
+from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.client import Client
@@ -47,7 +49,7 @@ FORGED = [Address(system, component) for system in (2, 3) for component in range
 class Heard(Client):
     """A client with an open link, which keeps the events."""
 
-    def __init__(self, **options: object) -> None:
+    def __init__(self, **options: Any) -> None:
         super().__init__(BRIDGE, Settings(), **options)
         self.heard: list[AnyLightEvent] = []
         self.events.subscribe(self.heard.append)
@@ -107,12 +109,14 @@ def test_forged_heartbeats_do_not_keep_a_real_light_out() -> None:
     assert pair.enable(True).success
 
 
-def test_candidates_are_bounded_and_cost_few_commands(client: Heard) -> None:
+def test_candidates_are_bounded_cost_few_commands_and_give_way_to_a_status(client: Heard) -> None:
     for source in FORGED:
         client.receive(source, ILLUMINATOR, 0.0)
     targets = {message.target_component for _, message in client.outgoing
                if hasattr(message, 'target_component')}
     assert len(targets) <= MAX_CANDIDATES
+    client.receive(LIGHT, status_message(), 0.0)
+    assert list(client.lights) == [LIGHT]
 
 
 def test_further_lights_are_ignored_when_there_are_too_many(client: Heard) -> None:
@@ -130,8 +134,10 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
     for source in FORGED[:MAX_DEVICES]:
         client.receive(source, status_message(), 0.0)
     client.lights[FORGED[0]].enable(True, 0.0, lambda result, now: None)
-    client.run(FORGET_AFTER + 10.0)
-    client.receive(LIGHT, status_message(), FORGET_AFTER + 10.0)
+    client.run(55.0)
+    assert len(client.lights) == MAX_DEVICES
+    client.run(70.0)
+    client.receive(LIGHT, status_message(), 70.0)
     assert list(client.lights) == [FORGED[0], LIGHT]
     forgotten = [event.address for event in client.heard if isinstance(event, LightForgotten)]
     assert sorted(forgotten) == FORGED[1:MAX_DEVICES]

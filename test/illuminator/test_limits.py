@@ -14,6 +14,7 @@
 """``max_brightness`` and ``min_strobe_period`` hold for each frame that is sent."""
 
 from dataclasses import replace
+from typing import Any
 
 from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
@@ -34,7 +35,7 @@ EXCEEDED = ('brightness 80 % is above max_brightness 60 %',
             'strobe_period 0.1 s is below min_strobe_period 0.34 s')
 
 
-def limited(**fields: object) -> tuple[FakeLight, Pair]:
+def limited(**fields: Any) -> tuple[FakeLight, Pair]:
     """Return a light and a client with limits that know each other."""
     light = FakeLight(**{'min_strobe_period': 0.01, 'max_strobe_period': 5.0, **fields})
     return light, Pair(light, settings=LIMITED).settle()
@@ -101,7 +102,7 @@ def test_a_stream_beyond_a_limit_is_clipped_with_one_warning_for_many_setpoints(
 def test_a_light_beyond_the_limits_is_reported_and_brought_back_once() -> None:
     light, pair = limited(brightness=80.0, strobe_period=0.1, strobe_duty_cycle=10.0)
     assert [(one.param2, one.param3) for one in pair.commands(CONFIGURE)] == [(60.0, 0.34)]
-    assert pair.snapshot.limit_exceeded.excess == ()
+    assert not pair.snapshot.limit_exceeded.excess
 
     light.fields |= {'brightness': 80.0, 'strobe_period': 0.1}
     pair.run(60.0)

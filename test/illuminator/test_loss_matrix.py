@@ -162,7 +162,9 @@ def play(line: str, share: float) -> tuple[Pair, list[Request], Judge]:
 
 
 @pytest.mark.parametrize(('line', 'share'), CELLS)
-def test_every_command_has_one_outcome_and_it_is_true(line, share, request):
+def test_every_command_has_one_outcome_and_it_is_true(
+    line: str, share: float, request: pytest.FixtureRequest,
+) -> None:
     pair, requests, judge = play(line, share)
     judgements = [judge.judge(one) for one in requests]
     untrue = [wrong for _, wrong in judgements if wrong]
@@ -173,13 +175,14 @@ def test_every_command_has_one_outcome_and_it_is_true(line, share, request):
     assert share or all(kind in ('confirmed', 'overtaken') for kind, _ in judgements)
     pair.mend()
     pair.run(QUIET)
-    for simulated in pair.other.components:
+    for simulated in pair.devices:
         light = pair.controller.lights[simulated.address]
         assert light.snapshot(pair.now).configuration == simulated.device.configuration
+        assert light.status is not None
         assert light.status.enabled == simulated.device.enabled
         assert 'restarted' not in pair.recorders[simulated.address].events
 
 
-def test_the_same_seed_does_the_same():
+def test_the_same_seed_gives_the_same_answers() -> None:
     first, second = ([one.message for one in play('all of these', 0.3)[1]] for _ in range(2))
     assert first == second

@@ -229,8 +229,8 @@ def test_off_overtakes_the_requests_before_it(pair: Pair) -> None:
 
 
 def test_each_configuration_builds_on_the_one_before(pair: Pair) -> None:
-    answers = [pair.ask_configure(**{name: value}) for name, value in (
-        ('brightness', 40), ('strobe_period', 2), ('strobe_duty_cycle', 30))]
+    answers = [pair.ask_configure(brightness=40), pair.ask_configure(strobe_period=2),
+               pair.ask_configure(strobe_duty_cycle=30)]
     pair.run(2.0)
     assert all(answer.result.success for answer in answers)
     last = pair.commands(CONFIGURE)[-1]

@@ -14,120 +14,155 @@
 
 """Requests and parameters while several lights answer from one address."""
 
+from __future__ import annotations
+
+from typing import Any
+
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
-from support.back_to_back import Pair
+from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight
 from support.shared_address import SharedAddress
 
 AUTOPILOT = Address(1, 1)
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 
 
-def two(*, second_boot=0.0, offset=0.01, **second):
+def two(
+    *, boot: float = 0.0, offset: float = 0.01, streams: tuple[float, float] = (1.0, 1.0),
+    **second: Any,
+) -> tuple[Pair, list[FakeLight]]:
     """Return a pair with two lights behind one component, the second one different."""
-    lights = [FakeLight(AUTOPILOT, heartbeat_type=None),
-              FakeLight(AUTOPILOT, heartbeat_type=None, **second)]
-    for light in lights:
-        light.pushes = True
-    lights[1].boot = second_boot
-    return Pair(SharedAddress(*lights, offset=offset))
+    lights = [FakeLight(AUTOPILOT, heartbeat_type=None, stream=streams[0]),
+              FakeLight(AUTOPILOT, heartbeat_type=None, stream=streams[1], **second)]
+    lights[0].pushes = lights[1].pushes = True
+    lights[1].boot = boot
+    return Pair(SharedAddress(*lights, offset=offset)), lights
 
 
 @pytest.fixture
-def different() -> Pair:
-    """Return two lights of which one is on and less bright, for long enough to be told."""
-    return two(enable=1, brightness=40.0).settle(6.0)
+def lights() -> list[FakeLight]:
+    return []
 
 
-def test_two_lights_that_show_the_same_are_one():
-    pair = two().settle(10.0)
-    assert not pair.snapshot.shared_address
+@pytest.fixture
+def different(lights: list[FakeLight]) -> Pair:
+    """Return two lights of which one is on and less bright, for long enough to be detected."""
+    pair, both = two(enable=1, brightness=40.0)
+    lights += both
+    return pair.settle(6.0)
+
+
+def test_two_lights_that_show_the_same_are_taken_for_one() -> None:
+    assert not two()[0].settle(10.0).snapshot.shared_address
 
 
 @pytest.mark.parametrize('offset', [0.0, 0.01, 0.5])
-def test_parameters_move_once_at_most_while_two_lights_are_told_apart(offset):
-    pair = two(enable=1, brightness=40.0, offset=offset).settle(60.0)
+def test_parameters_move_once_at_most_and_nothing_is_sent_while_lights_differ(
+    offset: float,
+) -> None:
+    pair, lights = two(enable=1, brightness=40.0, offset=offset)
+    pair.settle(60.0)
     assert [cause for cause, _ in pair.recorder.changes][1:] in ([], [Cause.LIGHT])
+    assert pair.commands(CONFIGURE, ON_OFF) == []
+    assert pair.recorder.events == ['connected']
+    assert len(pair.recorder.statuses) >= 110
+    agreed = pair.snapshot.configuration
+    for light in lights:
+        # A lost status.
+        light.delay_status(1.0)
+        pair.run(5.0)
+    assert pair.snapshot.shared_address
+    assert pair.snapshot.configuration == agreed
+    pair.close()
+    assert not pair.snapshot.shared_address
 
 
-def test_the_bridge_sends_nothing_to_make_two_lights_equal(different):
-    before = different.now
-    different.run(30.0)
-    assert different.commands(MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF) == []
-    assert different.recorder.events == ['connected']
-    assert len(different.recorder.statuses) >= 2 * (different.now - before)
-
-
-def test_lights_of_one_address_with_clocks_of_their_own_do_not_look_restarted_for_ever():
-    pair = two(second_boot=-3600.0).settle(10.0)
+def test_lights_with_different_clocks_do_not_look_restarted() -> None:
+    pair = two(boot=-3600.0)[0].settle(10.0)
     restarts = pair.light.restarts
     assert pair.snapshot.shared_address
     pair.run(60.0)
     assert pair.light.restarts == restarts <= 3
 
 
-def test_a_command_is_confirmed_once_both_lights_show_it(different):
+@pytest.mark.parametrize('obeys', [True, False])
+def test_a_switch_is_confirmed_once_both_lights_show_it(
+    different: Pair, lights: list[FakeLight], obeys: bool,
+) -> None:
+    lights[0].applies = obeys
     result = different.enable(True)
-    assert result.success
-    assert [light.fields['enable'] for light in different.other.lights] == [1, 1]
+    assert result.success is obeys
+    assert [light.fields['enable'] for light in lights] == [int(obeys), 1]
+    assert obeys or 'shows off, several lights answer as 1/1' in result.message
 
 
-def test_a_command_that_one_of_two_lights_does_not_carry_out_is_no_success(different):
-    different.other.lights[0].applies = False
-    result = different.enable(True)
-    assert not result.success
-    assert 'shows off' in result.message
-    assert 'several lights answer as 1/1' in result.message
+@pytest.mark.parametrize(('streams', 'boot'), [
+    ((1.0, 1.0), 0.0), ((1.0, 1.0), 500.0), ((1.0, 0.2), 500.0), ((0.2, 1.0), 500.0)],
+    ids=['one clock', 'equal rates', 'fast second', 'fast first'])
+def test_a_switch_fails_where_one_of_two_lights_does_not_obey(
+    streams: tuple[float, float], boot: float,
+) -> None:
+    pair, lights = two(boot=boot, streams=streams)
+    lights[0].fields['enable'] = 1
+    lights[0].pushes = lights[1].pushes = False
+    pair.settle(15.0)
+    assert pair.snapshot.shared_address
+    # The second light reports by itself only: it answers no command and no request.
+    lights[1].results = {ON_OFF: None, MavCmd.REQUEST_MESSAGE: None}
+    lights[1].applies = False
+    for _ in range(10):
+        result = pair.enable(True)
+        assert not result.success, result.message
+        pair.run(2.0)
+    assert pair.light.restarts <= 1
 
 
-def test_a_status_that_is_lost_does_not_move_the_parameters(different):
-    agreed = different.snapshot.configuration
-    for light in different.other.lights:
-        light.delay_status(1.0)
-        different.run(5.0)
-    assert different.snapshot.shared_address
-    assert different.snapshot.configuration == agreed
-
-
-def test_lights_that_were_lost_are_judged_anew(different):
-    different.close()
-    assert not different.snapshot.shared_address
-
-
-def test_a_set_makes_two_lights_one_again(different):
+def test_a_set_makes_two_lights_equal_again(different: Pair) -> None:
     result = different.configure(brightness=70.0)
-    # Within 0.85 s a second light that reports once a second may have said nothing.
+    # Within 0.85 s a second light that reports once a second may not have sent a status.
     assert 'not each of several lights that answer as 1/1' in result.message
     different.enable(True)
     different.run(6.0)
     assert not different.snapshot.shared_address
+    assert different.snapshot.configuration
     assert different.snapshot.configuration.brightness == 70.0
 
 
-def test_parameters_follow_again_once_the_lights_agree(different):
-    for light in different.other.lights:
+def test_a_setpoint_equal_to_the_parameter_is_sent(
+    different: Pair, lights: list[FakeLight],
+) -> None:
+    assert different.snapshot.configuration
+    different.light.set_brightness(different.snapshot.configuration.brightness, different.now)
+    different.run(1.0)
+    assert len({light.fields['brightness'] for light in lights}) == 1
+
+
+def test_parameters_follow_again_once_the_lights_agree(
+    different: Pair, lights: list[FakeLight],
+) -> None:
+    for light in lights:
         light.fields |= {'enable': 1, 'brightness': 55.0}
     different.run(6.0)
+    assert different.snapshot.configuration
     assert different.snapshot.configuration.brightness == 55.0
 
 
 @pytest.mark.parametrize('instance', [0, 2])
-def test_commands_carry_the_instance_of_the_light_and_0_is_all(instance):
-    sender = CommandSender(Address(1, 194))
-    light = Light(
-        AUTOPILOT, sender, Settings(), lambda event: None, lambda light, now: None,
-        instance=instance)
+def test_commands_carry_the_instance_of_the_light(instance: int) -> None:
+    sender = CommandSender(BRIDGE)
+    light = Light(AUTOPILOT, sender, Settings(), lambda event: None, lambda light, now: None,
+                  instance=instance)
     light.heard(0.0)
     light.enable(True, 0.0, lambda result, now: None)
     light.configure(
         {'mode': 'internal_control', 'brightness': 50.0, 'strobe_period': 0.0,
          'strobe_duty_cycle': 0.0}, 0.0, lambda result, now: None)
-    sent = [message for _, message in sender.outgoing]
-    switch, configure = (
-        next(one for one in sent if one.command == kind)
-        for kind in (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
-    assert (switch.param1, switch.param2) == (1.0, instance)
-    assert (configure.param1, configure.param2, configure.param5) == (1.0, 50.0, instance)
+    sent: dict[int, Any] = {
+        getattr(message, 'command', 0): message for _, message in sender.outgoing}
+    assert (sent[ON_OFF].param1, sent[ON_OFF].param2) == (1.0, instance)
+    assert (sent[CONFIGURE].param1, sent[CONFIGURE].param2, sent[CONFIGURE].param5) == (
+        1.0, 50.0, instance)

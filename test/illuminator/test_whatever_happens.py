@@ -12,12 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Users, restarts, lost links and strangers at random: nothing gets stuck, leaks or lies."""
+"""Random schedules of users, restarts, lost links and other senders end in the true state."""
+
+from __future__ import annotations
 
 from dataclasses import replace
 import random
 
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
@@ -48,7 +50,7 @@ class Chaos:
                             restore_configuration=self.draw.random() < 0.7)
         self.pair = Pair(LIGHTS, there=faults, settings=settings, seed=seed,
                          uptime=self.draw.choice((0.0, 1000.0)))
-        self.lights = self.pair.other.components
+        self.lights = self.pair.devices
         self.sets: list[Answer] = []
         self.others: list[Answer] = []
         self.is_open = True
@@ -56,11 +58,12 @@ class Chaos:
     def act(self) -> None:
         """Do one thing."""
         users = [self.enable, self.configure, self.publish, self.refresh] * 4
-        self.draw.choice([*users, self.cut, self.open, self.restart, self.strange, self.hush])()
+        self.draw.choice([*users, self.cut, self.open, self.restart, self.change, self.hush])()
         self.pair.turn()
 
-    def light(self):
-        return self.draw.choice(list(self.pair.controller.lights.values()) or [None])
+    def light(self) -> Light | None:
+        lights: list[Light | None] = [*self.pair.controller.lights.values()]
+        return self.draw.choice(lights or [None])
 
     def answer(self, answers: list[Answer]) -> Answer:
         """Return the place for another answer."""
@@ -99,8 +102,8 @@ class Chaos:
     def restart(self) -> None:
         self.draw.choice(self.lights).restart(self.pair.now)
 
-    def strange(self) -> None:
-        """Let a stranger change a light."""
+    def change(self) -> None:
+        """Let another sender change a light."""
         lamp = self.draw.choice(self.lights).device
         lamp.enabled = self.draw.random() < 0.5
         lamp.configuration = replace(
@@ -116,7 +119,7 @@ class Chaos:
 
 
 @pytest.mark.parametrize('seed', range(30))
-def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed):
+def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed: int) -> None:
     chaos = Chaos(seed)
     pair = chaos.pair
     end = pair.now + SECONDS
@@ -134,6 +137,7 @@ def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed):
         light = pair.controller.lights[simulated.address]
         assert light.connected
         assert light.snapshot(pair.now).configuration == simulated.device.configuration
+        assert light.status is not None
         assert light.status.enabled == simulated.device.enabled
         assert light.next_deadline() > pair.now
     assert pair.controller.sender.next_deadline() == float('inf')

@@ -142,10 +142,15 @@ class Pair:
         return self.recorders[self.light.address]
 
     @property
+    def devices(self) -> Sequence[SimulatedComponent[SimulatedIlluminator]]:
+        """Return the simulated lights."""
+        assert isinstance(self.other, SimulatedComponents)
+        return self.other.components
+
+    @property
     def device(self) -> SimulatedComponent[SimulatedIlluminator]:
         """Return the first simulated light."""
-        assert isinstance(self.other, SimulatedComponents)
-        return self.other.components[0]
+        return self.devices[0]
 
     @property
     def lamp(self) -> SimulatedIlluminator:
