@@ -18,14 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import struct
-from typing import Any
 
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 _HEADER = b'\0\1\0\0'
 
 
-def serializer(type_: Any) -> Callable[[Any], Any]:
+def serializer(type_: type) -> Callable[[object], object]:
     """
     Return what a publisher publishes for a value of ``data``.
 
@@ -37,8 +36,8 @@ def serializer(type_: Any) -> Callable[[Any], Any]:
     return _string if type_ is String else lambda message: message
 
 
-def _string(value: str) -> bytes:
-    text = value.encode()
+def _string(value: object) -> bytes:
+    text = str(value).encode()
     return _HEADER + struct.pack(f'<I{len(text) + 1}s', len(text) + 1, text)
 
 
@@ -54,6 +53,6 @@ def temperature(celsius: float, nanoseconds: int, frame_id: str) -> bytes:
     return _HEADER + head + bytes(-len(head) % 8) + struct.pack('<dd', celsius, 0.0)
 
 
-_PACK: dict[Any, Callable[..., bytes]] = {
+_PACK: dict[type, Callable[..., bytes]] = {
     Bool: struct.Struct('<4s?3x').pack, Float32: struct.Struct('<4sf').pack,
     UInt32: struct.Struct('<4sI').pack, Float64: struct.Struct('<4sd').pack}

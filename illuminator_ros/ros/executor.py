@@ -29,13 +29,16 @@ import functools
 import os
 import threading
 import time
-from typing import Any
+from typing import Generic, TypeVar
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.subscription import Subscription
 
 from .log import NodeLog
 
@@ -46,22 +49,25 @@ FALLBACK_PERIOD = 0.1
 CROWD = 8
 CROWD_INTERVAL = 0.008
 
-# Takes a request and the function that sends the response, from any thread. Messages and
-# entities of rclpy have no common type.
-Take = Callable[[Any, Callable[[Any], None]], None]
+Q = TypeVar('Q')
+A = TypeVar('A')
+# Sends a response; callable from any thread.
+Respond = Callable[[A], None]
+# Takes a request and the function that sends the response.
+Take = Callable[[Q, Respond[A]], None]
 
 
-class DeferredService:
+class DeferredService(Generic[Q, A]):
     """
     The callback of a service that answers later; only a :class:`NodeExecutor` calls it.
 
     :param take: called with the request, and with the function that sends the response.
     """
 
-    def __init__(self, take: Take) -> None:
+    def __init__(self, take: Take[Q, A]) -> None:
         self.take = take
 
-    def __call__(self, request: Any, response: Any) -> Any:
+    def __call__(self, request: Q, response: A) -> A:
         """Fail: another executor cannot wait for the answer."""
         raise TypeError('a deferred service needs a NodeExecutor')
 
@@ -116,13 +122,13 @@ class NodeExecutor(SingleThreadedExecutor):
             self._stale.set()
             self._wakeup.trigger()
 
-    def add_node(self, node: Any) -> bool:
+    def add_node(self, node: Node) -> bool:
         """See :meth:`Executor.add_node`."""
         added = super().add_node(node)
         self.wake()
         return added
 
-    def remove_node(self, node: Any) -> None:
+    def remove_node(self, node: Node) -> None:
         """See :meth:`Executor.remove_node`."""
         super().remove_node(node)
         self.wake()
@@ -154,14 +160,14 @@ class NodeExecutor(SingleThreadedExecutor):
             self._entities.close()
             self._entities = None
 
-    def _take_service(self, service: Any) -> Any:
+    def _take_service(self, service: Service) -> object:
         """See rclpy's Executor, whose loop calls it."""
         if not isinstance(service.callback, DeferredService):
             return super()._take_service(service)  # type: ignore[misc]
         self._serve(service)
         return None
 
-    def _serve(self, service: Any) -> None:
+    def _serve(self, service: Service) -> None:
         with service.handle:
             request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is None:
@@ -179,7 +185,9 @@ class NodeExecutor(SingleThreadedExecutor):
             respond(service.srv_type.Response())
             raise
 
-    def _respond(self, service: Any, header: Any, response: Any) -> None:
+    def _respond(
+        self, service: Service, header: _rclpy.rmw_service_info_t, response: object,
+    ) -> None:
         # The middleware waits up to 0.1 s for a client that it does not know yet. Only here: it
         # must not hold up the link's thread.
         send = functools.partial(_send, service, header, response)
@@ -202,14 +210,14 @@ class NodeExecutor(SingleThreadedExecutor):
             self._spaced.popleft()()
 
     @staticmethod
-    def _deliver(subscription: Any) -> None:
+    def _deliver(subscription: Subscription) -> None:
         with subscription.handle:
             taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
         if taken is not None:
             subscription.callback(taken[0])
 
 
-def _send(service: Any, header: Any, response: Any) -> None:
+def _send(service: Service, header: _rclpy.rmw_service_info_t, response: object) -> None:
     # The node of a forgotten device may be gone.
     with contextlib.suppress(InvalidHandle):
         service.send_response(response, header)
@@ -221,13 +229,15 @@ class _Entities:
     """A wait set and its entities, which it protects from destruction."""
 
     def __init__(
-        self, services: list[Any], subscriptions: list[Any], guards: list[Any], context: Context,
+        self, services: list[Service], subscriptions: list[Subscription],
+        guards: list[GuardCondition], context: Context,
     ) -> None:
         self._stack = contextlib.ExitStack()
         try:
-            for entity in (*services, *subscriptions, *guards):
-                self._stack.enter_context(entity.handle)
-            self._stack.enter_context(context.handle)
+            for handle in (*(one.handle for one in services),
+                           *(one.handle for one in subscriptions),
+                           *(one.handle for one in guards), context.handle):
+                self._stack.enter_context(handle)
         except InvalidHandle:
             self.close()
             raise
@@ -241,7 +251,9 @@ class _Entities:
             *((wait_set.add_guard_condition, guard.handle) for guard in guards)]
 
     @classmethod
-    def of(cls, nodes: list[Any], wakeup: GuardCondition, context: Context) -> _Entities | None:
+    def of(
+        cls, nodes: list[Node], wakeup: GuardCondition, context: Context,
+    ) -> _Entities | None:
         """Return the entities of nodes, None if not all are services and subscriptions."""
         if any(True for node in nodes
                for others in (node.timers, node.clients, node.waitables) for _ in others):
@@ -250,7 +262,7 @@ class _Entities:
                    [one for node in nodes for one in node.subscriptions],
                    [wakeup, *(one for node in nodes for one in node.guards)], context)
 
-    def wait(self, timeout: float | None) -> tuple[list[Any], list[Any]]:
+    def wait(self, timeout: float | None) -> tuple[list[Service], list[Subscription]]:
         """Wait, and return the services and subscriptions that are ready."""
         wait_set = self._wait_set
         wait_set.clear_entities()

@@ -16,15 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from rcl_interfaces.msg import LoggerLevel, SetLoggerLevelsResult
 from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
 from rclpy.node import Node
 
-from .executor import DeferredService
 from .log import LogForwarder, NodeLog
 from .parameter_services import MAX_NAMES
 
@@ -38,22 +34,26 @@ class LoggerServices:
     def __init__(self, node: Node, log: NodeLog) -> None:
         self._log = log
         self._names: set[str] = set()
-        node.create_service(GetLoggerLevels, '~/get_logger_levels', DeferredService(self._get))
-        node.create_service(SetLoggerLevels, '~/set_logger_levels', DeferredService(self._set))
+        node.create_service(GetLoggerLevels, '~/get_logger_levels', self._get)
+        node.create_service(SetLoggerLevels, '~/set_logger_levels', self._set)
 
-    def _get(self, request: Any, respond: Callable[[Any], None]) -> None:
-        names = request.names if len(request.names) <= MAX_NAMES else []
-        respond(GetLoggerLevels.Response(
-            levels=[LoggerLevel(name=name, level=_level(name)) for name in names]))
+    def _get(
+        self, request: GetLoggerLevels.Request, response: GetLoggerLevels.Response,
+    ) -> GetLoggerLevels.Response:
+        if len(request.names) <= MAX_NAMES:
+            response.levels = [
+                LoggerLevel(name=name, level=_level(name)) for name in request.names]
+        return response
 
-    def _set(self, request: Any, respond: Callable[[Any], None]) -> None:
-        levels = request.levels if len(request.levels) <= MAX_NAMES else []
-        results = []
-        for level in levels:
-            reason = self._set_one(level.name, level.level)
-            results.append(SetLoggerLevelsResult(successful=not reason, reason=reason))
-        LogForwarder.install(self._log)
-        respond(SetLoggerLevels.Response(results=results))
+    def _set(
+        self, request: SetLoggerLevels.Request, response: SetLoggerLevels.Response,
+    ) -> SetLoggerLevels.Response:
+        if len(request.levels) <= MAX_NAMES:
+            reasons = [self._set_one(level.name, level.level) for level in request.levels]
+            response.results = [SetLoggerLevelsResult(successful=not reason, reason=reason)
+                                for reason in reasons]
+            LogForwarder.install(self._log)
+        return response
 
     def _set_one(self, name: str, level: int) -> str:
         if name not in self._names and len(self._names) >= MAX_LOGGERS:

@@ -19,17 +19,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import threading
-from typing import Any
+from typing import Any, Generic, Protocol, TYPE_CHECKING, TypeVar
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from .cdr import serializer
-from .executor import DeferredService
+from .executor import A, DeferredService, Q, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
 from .log import NodeLog
 from ..mavlink.link import Link
+
+if TYPE_CHECKING:
+    # A name of typings/ only.
+    from rclpy.type_support import ServiceType
+
+T = TypeVar('T')
+# Takes success and a message.
+Answer = Callable[[bool, str], None]
 
 # Late subscribers get the last value.
 STATE_QOS = QoSProfile(
@@ -56,7 +64,7 @@ class PayloadNode(Node):
     :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """
 
-    # rclpy's own signatures are long, and differ between its versions.
+    # Any: rclpy's own signatures are long, and differ between its versions.
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, start_parameter_services=False, **options)
 
@@ -83,12 +91,12 @@ class Publication:
     """
 
     name: str
-    type: Any  # noqa: A003
+    type: type[object]  # noqa: A003
     qos: QoSProfile | None = None
 
 
 @dataclass(frozen=True)
-class RequestService:
+class RequestService(Generic[Q, A]):
     """
     A service ``~/name``.
 
@@ -99,13 +107,19 @@ class RequestService:
     """
 
     name: str
-    type: Any  # noqa: A003
-    start: Callable[[Any, float, Callable[[bool, str], None]], None]
+    type: type[ServiceType[Q, A]]  # noqa: A003
+    start: Callable[[Q, float, Answer], None]
     limit: int = MAX_PENDING
 
 
+class Data(Protocol[T]):
+    """A message of std_msgs."""
+
+    data: T
+
+
 @dataclass(frozen=True)
-class CommandTopic:
+class CommandTopic(Generic[T]):
     """
     A topic ``~/name`` that the node subscribes to.
 
@@ -116,9 +130,14 @@ class CommandTopic:
     """
 
     name: str
-    type: Any  # noqa: A003
-    take: Callable[[Any, float], None]
-    check: Callable[[Any], Any] = lambda value: value
+    type: type[Data[T]]  # noqa: A003
+    take: Callable[[T, float], None]
+    check: Callable[[T], T] = lambda value: value
+
+
+# Of any type of request, and of any type of value.
+AnyService = RequestService[Any, Any]
+AnyCommand = CommandTopic[Any]
 
 
 class NodeInterface:
@@ -126,8 +145,8 @@ class NodeInterface:
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, *,
-        publications: Iterable[Publication] = (), services: Iterable[RequestService] = (),
-        commands: Iterable[CommandTopic] = (),
+        publications: Iterable[Publication] = (), services: Iterable[AnyService] = (),
+        commands: Iterable[AnyCommand] = (),
     ) -> None:
         self._publishers = {
             one.name: (
@@ -143,7 +162,7 @@ class NodeInterface:
             node.create_subscription(
                 command.type, f'~/{command.name}', _Newest(link, log, command).offer, COMMAND_QOS)
 
-    def publish(self, name: str, value: Any) -> None:
+    def publish(self, name: str, value: object) -> None:
         """
         Publish a value; callable from any thread.
 
@@ -153,11 +172,11 @@ class NodeInterface:
         publish(serialize(value))
 
 
-def _taker(service: RequestService, calls: LinkCalls) -> Callable[[Any, Any], None]:
-    response = service.type.Response
+def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:
+    response: Callable[..., A] = service.type.Response
 
-    def take(request: Any, respond: Callable[[Any], None]) -> None:
-        def start(now: float, answer: Callable[[Any], None]) -> None:
+    def take(request: Q, respond: Respond[A]) -> None:
+        def start(now: float, answer: Callable[[A], None]) -> None:
             service.start(request, now, lambda success, message: answer(
                 response(success=success, message=message)))
 
@@ -166,17 +185,17 @@ def _taker(service: RequestService, calls: LinkCalls) -> Callable[[Any, Any], No
     return take
 
 
-class _Newest:
+class _Newest(Generic[T]):
     """Hands the newest value of a topic to the link's thread."""
 
-    def __init__(self, link: Link, log: NodeLog, command: CommandTopic) -> None:
+    def __init__(self, link: Link, log: NodeLog, command: CommandTopic[T]) -> None:
         self._link = link
         self._log = log
         self._command = command
-        self._waiting: list[Any] = []
+        self._waiting: list[T] = []
         self._lock = threading.Lock()
 
-    def offer(self, message: Any) -> None:
+    def offer(self, message: Data[T]) -> None:
         try:
             value = self._command.check(message.data)
         except ValueError as error:

@@ -23,10 +23,11 @@ device's acknowledgement without blocking, and the values of one call are one co
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from rcl_interfaces.msg import ListParametersResult, ParameterValue, SetParametersResult
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -40,11 +41,18 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_services_default, QoSProfile
 
-from .executor import DeferredService, Take
+from .executor import A, DeferredService, Q, Respond, Take
 from .link_call import LinkCalls
 from .log import NodeLog
-from .parameters import DeviceParameters
+from .parameters import DeviceParameters, Values
 from ..mavlink.link import Link
+
+if TYPE_CHECKING:
+    # A name of typings/ only.
+    from rclpy.type_support import ServiceType
+
+T = TypeVar('T')
+Messages = Sequence[ParameterMessage]
 
 # Names in one request; longer lists would delay the other services of the node.
 MAX_NAMES = 1000
@@ -53,9 +61,9 @@ QUEUE_DEPTH = 100
 
 # Sets values in the device, in the link's thread, given the time (s); calls its last argument
 # once with '' or why the values were not set.
-Configure = Callable[[Mapping[str, Any], float, Callable[[str], None]], None]
+Configure = Callable[[Values, float, Callable[[str], None]], None]
 # Raises ValueError where the device cannot take a value of a parameter, given its name.
-Check = Callable[[str, Any], object]
+Check = Callable[[str, object], object]
 
 
 class ParameterServices:
@@ -77,18 +85,17 @@ class ParameterServices:
         self._calls = LinkCalls(link, log)
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
-        services: tuple[tuple[str, Any, Take], ...] = (
-            ('describe_parameters', DescribeParameters, self._describe),
-            ('get_parameters', GetParameters, self._get),
-            ('get_parameter_types', GetParameterTypes, self._types),
-            ('list_parameters', ListParameters, self._list),
-            ('set_parameters', SetParameters, self._set),
-            ('set_parameters_atomically', SetParametersAtomically, self._set_atomically),
-        )
-        for name, type_, take in services:
+        def serve(type_: type[ServiceType[Q, A]], name: str, take: Take[Q, A]) -> None:
             node.create_service(type_, f'~/{name}', DeferredService(take), qos_profile=qos)
 
-    def _is_short(self, names: list[Any]) -> bool:
+        serve(DescribeParameters, 'describe_parameters', self._describe)
+        serve(GetParameters, 'get_parameters', self._get)
+        serve(GetParameterTypes, 'get_parameter_types', self._types)
+        serve(ListParameters, 'list_parameters', self._list)
+        serve(SetParameters, 'set_parameters', self._set)
+        serve(SetParametersAtomically, 'set_parameters_atomically', self._set_atomically)
+
+    def _is_short(self, names: Sequence[object]) -> bool:
         if len(names) <= MAX_NAMES:
             return True
         self._log.warning(f'a request for {len(names)} parameters was refused: the limit is '
@@ -98,18 +105,24 @@ class ParameterServices:
     # In the executor's thread. Where a name is unknown or the list too long, the answer is an
     # empty list, as that of rclpy and rclcpp; tools take it for "not set".
 
-    def _describe(self, request: Any, respond: Callable[[Any], None]) -> None:
+    def _describe(
+        self, request: DescribeParameters.Request, respond: Respond[DescribeParameters.Response],
+    ) -> None:
         respond(DescribeParameters.Response(
             descriptors=self._each(request.names, self._node.describe_parameter)))
 
-    def _get(self, request: Any, respond: Callable[[Any], None]) -> None:
+    def _get(
+        self, request: GetParameters.Request, respond: Respond[GetParameters.Response],
+    ) -> None:
         respond(GetParameters.Response(values=self._each(request.names, self._value)))
 
-    def _types(self, request: Any, respond: Callable[[Any], None]) -> None:
+    def _types(
+        self, request: GetParameterTypes.Request, respond: Respond[GetParameterTypes.Response],
+    ) -> None:
         respond(GetParameterTypes.Response(
             types=self._each(request.names, lambda name: self._value(name).type)))
 
-    def _each(self, names: list[str], look_up: Callable[[str], Any]) -> list[Any]:
+    def _each(self, names: list[str], look_up: Callable[[str], T]) -> list[T]:
         try:
             return [look_up(name) for name in names] if self._is_short(names) else []
         except ParameterNotDeclaredException:
@@ -121,7 +134,9 @@ class ParameterServices:
         except ParameterUninitializedException:
             return ParameterValue()
 
-    def _list(self, request: Any, respond: Callable[[Any], None]) -> None:
+    def _list(
+        self, request: ListParameters.Request, respond: Respond[ListParameters.Response],
+    ) -> None:
         """Leave out what is not set, so that the output of ``ros2 param dump`` can be loaded."""
         result = ListParametersResult()
         if self._is_short(request.prefixes):
@@ -132,7 +147,9 @@ class ParameterServices:
             result.names = [name for name in result.names if self._value(name).type]
         respond(ListParameters.Response(result=result))
 
-    def _set(self, request: Any, respond: Callable[[Any], None]) -> None:
+    def _set(
+        self, request: SetParameters.Request, respond: Respond[SetParameters.Response],
+    ) -> None:
         messages = list(request.parameters) if self._is_short(request.parameters) else []
 
         def answer(reasons: list[str]) -> None:
@@ -143,7 +160,10 @@ class ParameterServices:
 
         self._calls.ask(start, answer, lambda reason: answer([reason] * len(messages)))
 
-    def _set_atomically(self, request: Any, respond: Callable[[Any], None]) -> None:
+    def _set_atomically(
+        self, request: SetParametersAtomically.Request,
+        respond: Respond[SetParametersAtomically.Response],
+    ) -> None:
         def answer(reason: str) -> None:
             respond(SetParametersAtomically.Response(result=_result(reason)))
 
@@ -157,7 +177,7 @@ class ParameterServices:
     # In the link's thread
 
     def _set_each(
-        self, messages: list[Any], now: float, answer: Callable[[list[str]], None],
+        self, messages: Messages, now: float, answer: Callable[[list[str]], None],
     ) -> None:
         """Set each parameter for itself, those of the device all with one command."""
         reasons = [self._check(message) for message in messages]
@@ -177,7 +197,7 @@ class ParameterServices:
         else:
             done('')
 
-    def _set_all(self, messages: list[Any], now: float, answer: Callable[[str], None]) -> None:
+    def _set_all(self, messages: Messages, now: float, answer: Callable[[str], None]) -> None:
         """Set all or none. Local ones are set first: they can be rolled back."""
         local = [message for message in messages if message.name not in self._device.specs]
         reason = next(filter(None, map(self._check, messages)), '')
@@ -196,12 +216,12 @@ class ParameterServices:
             self._configure({message.name: _value(message) for message in messages
                              if message.name in self._device.specs}, now, done)
 
-    def _set_local(self, messages: list[Any]) -> str:
+    def _set_local(self, messages: Messages) -> str:
         result = self._node.set_parameters_atomically(
             [Parameter.from_parameter_msg(message) for message in messages])
         return '' if result.successful else str(result.reason)
 
-    def _check(self, message: Any) -> str:
+    def _check(self, message: ParameterMessage) -> str:
         """Return why a parameter cannot be set, '' if the device or rclpy decides that."""
         name = message.name
         if not self._node.has_parameter(name):
@@ -224,7 +244,7 @@ def _result(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=not reason, reason=reason)
 
 
-def _value(message: Any) -> Any:
+def _value(message: ParameterMessage) -> object:
     value = Parameter.from_parameter_msg(message).value
     # As people write it, for the answer that refuses it.
     return list(value) if isinstance(value, array) else value

@@ -37,6 +37,9 @@ from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, KeyFileError, TimestampStore
 from ..mavlink.url import parse_url, Url, UrlError
 
+# Values of parameters by name, each of the type of its default.
+Values = Mapping[str, Any]
+
 _TYPES: dict[type, tuple[Parameter.Type, str]] = {
     float: (Parameter.Type.DOUBLE, 'a number'),
     int: (Parameter.Type.INTEGER, 'an integer'),
@@ -64,7 +67,7 @@ class ParameterSpec:
     """
 
     name: str
-    default: Any  # a value of any type of parameter
+    default: bool | int | float | str | list[str]
     description: str
     unit: str = ''
     low: float | None = None
@@ -114,7 +117,7 @@ class ParameterSpec:
                     IntegerRange(from_value=int(self.low), to_value=int(top))]
         return descriptor
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: object) -> Any:
         """
         Return a value of this parameter's type; an integer is taken for a double.
 
@@ -133,7 +136,8 @@ class ParameterSpec:
         if self.choices and value not in self.choices:
             raise ParameterError(
                 f'{self.name}: {value!r} is not one of {", ".join(self.choices)}')
-        if self.low is not None and self.high is not None and not self.low <= value <= self.high:
+        if (self.low is not None and self.high is not None
+                and isinstance(value, float | int) and not self.low <= value <= self.high):
             unit = f' {self.unit}' if self.unit else ''
             raise ParameterError(
                 f'{self.name}: {value}{unit} is out of range: {self.low:g} to '
@@ -213,7 +217,7 @@ def declare_link_parameters(node: Node) -> LinkParameters:
 
 
 def declare_read_only(
-    node: Node, specs: Iterable[ParameterSpec], defaults: Mapping[str, Any] | None = None,
+    node: Node, specs: Iterable[ParameterSpec], defaults: Values | None = None,
 ) -> dict[str, Any]:
     """
     Declare parameters as they are given, read-only, and return their values.
@@ -287,7 +291,7 @@ class DeviceParameters:
         given = given_parameters(self._node)
         return {name: given[name].value for name in self.specs if name in given}
 
-    def show(self, values: Mapping[str, Any]) -> str:
+    def show(self, values: Values) -> str:
         """Set parameters to what the device reports; return '' or why that failed."""
         self._showing = True
         try:

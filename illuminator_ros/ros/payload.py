@@ -25,7 +25,7 @@ from rclpy.node import Node
 from .diagnostics_publisher import DiagnosticsPublisher
 from .log import NodeLog
 from .node_pool import NodePool
-from .parameters import LinkParameters, ParameterSpec
+from .parameters import LinkParameters, ParameterSpec, Values
 from ..mavlink.command import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.link import Link
@@ -51,7 +51,7 @@ class Host:
     nodes: NodePool
     diagnostics: DiagnosticsPublisher
     link_parameters: LinkParameters
-    values: Mapping[str, Any]
+    values: Values
     check_diagnostics: Callable[[], None]
 
 
@@ -88,8 +88,8 @@ class RosPayload:
     """
 
     node_name: str
-    make_client: Callable[[CommandSender, Mapping[str, Any]], Payload]
-    # The client is the one that make_client has returned.
+    make_client: Callable[[CommandSender, Values], Payload]
+    # Any: the client is the one that make_client has returned.
     serve: Callable[[Any, Host], ServedPayload]
     parameters: tuple[ParameterSpec, ...] = ()
     device_parameters: tuple[ParameterSpec, ...] = ()

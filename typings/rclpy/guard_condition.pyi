@@ -16,8 +16,10 @@ from collections.abc import Callable
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.context import Context
+from rclpy.impl.implementation_singleton import Handle
 
 class GuardCondition:
+    handle: Handle
     def __init__(
         self, callback: Callable[[], object] | None, callback_group: CallbackGroup | None,
         context: Context | None = None) -> None: ...

@@ -12,9 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+from collections.abc import Callable
+from typing import Protocol
+
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+class AnyServiceType(Protocol):
+    Request: type
+    Response: type
+
 class Service:
     srv_name: str
-    srv_type: type[object]
+    srv_type: AnyServiceType
+    handle: rclpy_implementation.Service
+    callback: Callable[[object, object], object]
     @property
     def service_name(self) -> str: ...
     # The header is what an executor has taken the request with.

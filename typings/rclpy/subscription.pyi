@@ -12,7 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+from collections.abc import Callable
+
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
 class Subscription:
+    handle: rclpy_implementation.Subscription
+    raw: bool
+    callback: Callable[[object], object]
     msg_type: type[object]
     @property
     def topic_name(self) -> str: ...

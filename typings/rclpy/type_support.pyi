@@ -12,10 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 Request = TypeVar('Request')
 Response = TypeVar('Response')
 
 # The base of the service types in these stubs only: rclpy's have none in common.
-class ServiceType(Generic[Request, Response]): ...
+class ServiceType(Generic[Request, Response]):
+    # Each service has a class of this name, which no type can tell here.
+    Response: Any

@@ -39,7 +39,15 @@ from ...payload.request import Result
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
-from ...ros.node import CommandTopic, NodeInterface, Publication, RequestService
+from ...ros.node import (
+    Answer,
+    AnyCommand,
+    AnyService,
+    CommandTopic,
+    NodeInterface,
+    Publication,
+    RequestService,
+)
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import DeviceParameters, ParameterError
 from ...ros.payload import Host
@@ -48,8 +56,6 @@ from ...ros.payload import Host
 MAX_REFRESHES = 16
 # Lights that are named where the target is not there.
 MAX_NAMED = 8
-
-Answer = Callable[[bool, str], None]
 
 
 class LightNode:
@@ -65,8 +71,8 @@ class LightNode:
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
-        geometry: BeamGeometry, *, services: tuple[RequestService, ...] = (),
-        commands: tuple[CommandTopic, ...] = (),
+        geometry: BeamGeometry, *, services: tuple[AnyService, ...] = (),
+        commands: tuple[AnyCommand, ...] = (),
     ) -> None:
         self.name = node.get_name()
         self.full_name = node.get_fully_qualified_name()
@@ -147,14 +153,14 @@ class LightNode:
         return {DEFAULT: ''} | {
             name: f'{name}/' for name in (sources.names if sources else ()) if name != DEFAULT}
 
-    def _enable_service(self, source: str) -> RequestService:
+    def _enable_service(self, source: str) -> AnyService:
         def enable(request: SetBool.Request, now: float, answer: Answer) -> None:
             self._request_enable(source, request.data, now, f'{prefix}service', answer)
 
         prefix = self._ways()[source]
         return RequestService(f'{prefix}enable', SetBool, enable)
 
-    def _release_service(self, source: str) -> RequestService:
+    def _release_service(self, source: str) -> AnyService:
         def release(request: Trigger.Request, now: float, answer: Answer) -> None:
             light = self._light()
             if light is None:
@@ -165,7 +171,7 @@ class LightNode:
 
         return RequestService(f'{source}/release', Trigger, release)
 
-    def _command_topics(self, source: str) -> tuple[CommandTopic, CommandTopic]:
+    def _command_topics(self, source: str) -> tuple[AnyCommand, AnyCommand]:
         prefix = self._ways()[source]
         switching = LatestOnly(functools.partial(self._switch, source, prefix))
 

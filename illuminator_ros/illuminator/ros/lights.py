@@ -26,7 +26,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from .light_node import Answer, LightNode
+from .light_node import LightNode
 from .parameters import (
     BeamGeometry,
     DEVICE_PARAMETERS,
@@ -50,7 +50,7 @@ from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
-from ...ros.node import CommandTopic, RequestService
+from ...ros.node import Answer, CommandTopic, RequestService
 from ...ros.parameters import misspelt
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
