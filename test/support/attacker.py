@@ -29,13 +29,13 @@ from illuminator_ros.mavlink.messages import (
     CommandInt,
     CommandLong,
     ComponentInformationBasic,
+    encode_payload,
     Heartbeat,
     LAYOUTS,
     MavType,
 )
 from illuminator_ros.mavlink.signing import MAX_TICKS, signature, ticks
 from support.frames import raw_v1, raw_v2
-from support.messages import HANDLED
 
 FLOATS = (0.0, -0.0, 1.0, 50.0, 100.0, 100.00001, -1.0, -1e-30, 1e-45, 3.4e38, -3.4e38, 25.5,
           math.nan, -math.nan, math.inf, -math.inf, 440.0, 396.0, 1e6, 0.05, 3600.5)
@@ -136,7 +136,7 @@ class Attacker:
 
     def _framed(self, message: Any, source: Address, now: float) -> bytes:
         cls = type(message)
-        payload = self._pack(message)
+        payload = encode_payload(message)
         if self._random.random() < 0.1:
             payload = (payload + self._random.randbytes(255))[:self._random.choice(LENGTHS)]
         elif self._random.random() < 0.8:
@@ -159,11 +159,6 @@ class Attacker:
         genuine = self._random.random() < 0.5 and stamp <= fresh
         frame += bytes((self._random.randrange(256),)) + stamp.to_bytes(6, 'little')
         return frame + (signature(self._key, frame) if genuine else self._random.randbytes(6))
-
-    @staticmethod
-    def _pack(message: Any) -> bytes:
-        from illuminator_ros.mavlink.messages import encode_payload
-        return encode_payload(message)
 
     def _payload(self) -> bytes:
         return self._random.randbytes(self._random.choice(LENGTHS))
@@ -199,19 +194,15 @@ class Attacker:
 
     def _any_heartbeat(self) -> Any:
         mav_type = MavType.ILLUMINATOR if self._random.random() < 0.5 else self._int(8)
-        return Heartbeat(mav_type, self._int(8), self._int(8), self._int(32), self._int(8),
-                         self._int(8))
+        return Heartbeat(mav_type, *map(self._int, (8, 8, 32, 8, 8)))
 
     def _status(self) -> Any:
-        return IlluminatorStatus(
-            self._int(32), self._int(8), self._int(8), self._int(32), self._int(8),
-            self._float(), self._float(), self._float(), self._float(), self._float(),
-            self._float())
+        return IlluminatorStatus(*map(self._int, (32, 8, 8, 32, 8)),
+                                 *(self._float() for _ in range(6)))
 
     def _information(self) -> Any:
-        return ComponentInformationBasic(
-            self._int(32), self._int(64), self._int(32), self._bytes(32), self._bytes(32),
-            self._bytes(24), self._bytes(24), self._bytes(32))
+        return ComponentInformationBasic(*map(self._int, (32, 64, 32)),
+                                         *map(self._bytes, (32, 32, 24, 24, 32)))
 
     def _ack(self) -> Any:
         return CommandAck(
@@ -229,5 +220,3 @@ class Attacker:
             self._int(8), *(self._float() for _ in range(4)), self._int(31), self._int(31),
             self._float())
 
-
-HANDLED_IDS = sorted(HANDLED)

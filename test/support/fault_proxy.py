@@ -24,6 +24,7 @@ import time
 from typing import Any
 
 from support.faulty_wire import Faults, FaultyWire
+from support.open_channel import bound_socket
 
 # Lights are distinguished by their source address; the oldest is dropped.
 MAX_LANES = 8
@@ -35,15 +36,13 @@ class _Lane:
 
     def __init__(self, light: Any, faults: Faults, seed: int) -> None:
         self.light = light
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(('127.0.0.1', 0))
-        self.to_bridge = FaultyWire(faults, seed)
-        self.to_light = FaultyWire(faults, seed + 1)
+        self.socket = bound_socket()
+        self.to_bridge, self.to_light = FaultyWire(faults, seed), FaultyWire(faults, seed + 1)
 
 
 class FaultProxy:
     """
-    Passes datagrams on, in a thread of its own, with faults that can be changed at any time.
+    Forwards datagrams, in a thread of its own, with faults that can be changed at any time.
 
     :param bridge_port: where the bridge listens.
     :ivar port: where lights send to.
@@ -51,14 +50,12 @@ class FaultProxy:
 
     def __init__(self, bridge_port: int, seed: int = 0) -> None:
         self._bridge = ('127.0.0.1', bridge_port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(('127.0.0.1', 0))
+        self._socket = bound_socket()
         self.port: int = self._socket.getsockname()[1]
         self._faults = NO_FAULTS
         self._seed = seed
         self._lanes: dict[Any, _Lane] = {}
         self._lock = threading.Lock()
-        self._wake, self._woken = socket.socketpair()
         self._ended = False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -76,16 +73,13 @@ class FaultProxy:
             for lane in self._lanes.values():
                 lane.socket.close()
             self._lanes.clear()
-        self._wake.send(b'x')
 
     def close(self) -> None:
         """End it."""
         self._ended = True
-        self._wake.send(b'x')
         self._thread.join(5.0)
         self.restart()
-        for one in (self._socket, self._wake, self._woken):
-            one.close()
+        self._socket.close()
 
     def _run(self) -> None:
         while not self._ended:
@@ -93,18 +87,16 @@ class FaultProxy:
                 lanes = list(self._lanes.values())
                 due = min((wire.next_arrival() for lane in lanes
                            for wire in (lane.to_bridge, lane.to_light)), default=1e9)
-            wait = min(max(due - time.monotonic(), 0.0), 1.0)
+            wait = min(max(due - time.monotonic(), 0.0), 0.1)
             # A lane may have been closed meanwhile.
             with contextlib.suppress(OSError, ValueError):
                 ready, _, _ = select.select(
-                    [self._socket, self._woken, *(lane.socket for lane in lanes)], [], [], wait)
+                    [self._socket, *(lane.socket for lane in lanes)], [], [], wait)
                 with self._lock:
                     self._turn(ready, lanes)
 
     def _turn(self, ready: list[socket.socket], lanes: list[_Lane]) -> None:
         now = time.monotonic()
-        if self._woken in ready:
-            self._woken.recv(4096)
         if self._socket in ready:
             data, light = self._socket.recvfrom(65536)
             self._lane(light).to_bridge.send(data, now)
@@ -118,10 +110,9 @@ class FaultProxy:
                 self._socket.sendto(data, lane.light)
 
     def _lane(self, light: Any) -> _Lane:
-        lane = self._lanes.get(light)
-        if lane is None:
+        if light not in self._lanes:
             if len(self._lanes) >= MAX_LANES:
                 self._lanes.pop(next(iter(self._lanes))).socket.close()
             self._seed += 2
-            lane = self._lanes[light] = _Lane(light, self._faults, self._seed)
-        return lane
+            self._lanes[light] = _Lane(light, self._faults, self._seed)
+        return self._lanes[light]

@@ -29,42 +29,39 @@ from support.waiting import PATIENCE
 
 class Relay:
     """
-    Passes on what comes from one side to the other, once it has heard both.
+    Forwards what comes from one side to the other, once it has heard both.
 
     :ivar near_port: and ``far_port``, where the two sides send to.
     """
 
     def __init__(self) -> None:
-        self.near_port = free_port()
-        self.far_port = free_port()
-        self._thread: threading.Thread | None = None
-        self._end: socket.socket | None = None
+        self.near_port, self.far_port = free_port(), free_port()
+        self._stack = contextlib.ExitStack()
 
     def start(self) -> None:
         """Start to forward, with no known sender."""
-        near = bound_socket(port=self.near_port)
-        far = bound_socket(port=self.far_port)
-        self._end, ended = socket.socketpair()
-        self._thread = threading.Thread(target=self._run, args=(near, far, ended))
-        self._thread.start()
+        end, ended = socket.socketpair()
+        sides = [bound_socket(port=port) for port in (self.near_port, self.far_port)]
+        thread = threading.Thread(target=_forward, args=(sides, ended))
+        thread.start()
+        self._stack.callback(thread.join, PATIENCE)
+        self._stack.callback(end.close)
 
     def stop(self) -> None:
-        """End it."""
-        if self._end is not None and self._thread is not None:
-            self._end.close()
-            self._thread.join(PATIENCE)
-            self._end = None
+        """End it, if it runs."""
+        self._stack.close()
 
-    def _run(self, near: socket.socket, far: socket.socket, ended: socket.socket) -> None:
-        others = {near: far, far: near}
-        heard: dict[socket.socket, Any] = {}
-        with near, far, ended:
-            while True:
-                ready, _, _ = select.select([near, far, ended], [], [])
-                if ended in ready:
-                    return
-                for side in ready:
-                    data, heard[side] = side.recvfrom(65536)
-                    if others[side] in heard:
-                        with contextlib.suppress(OSError):
-                            others[side].sendto(data, heard[others[side]])
+
+def _forward(sides: list[socket.socket], ended: socket.socket) -> None:
+    heard: dict[socket.socket, Any] = {}
+    with sides[0], sides[1], ended:
+        while True:
+            ready, _, _ = select.select([*sides, ended], [], [])
+            if ended in ready:
+                return
+            for side in ready:
+                data, heard[side] = side.recvfrom(65536)
+                other = sides[side is sides[0]]
+                if other in heard:
+                    with contextlib.suppress(OSError):
+                        other.sendto(data, heard[other])

@@ -21,7 +21,12 @@ import math
 import random
 from typing import Any
 
-from illuminator_ros.illuminator.events import AnyLightEvent
+from illuminator_ros.illuminator.events import (
+    AnyLightEvent,
+    ConfigurationChanged,
+    LightIdentified,
+    StatusReceived,
+)
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated import describe, simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -38,8 +43,7 @@ from illuminator_ros.payload.request import MAX_WAITING as MAX_REQUESTS
 from illuminator_ros.payload.simulated import SimulatedComponent
 from support.attacker import Attacker
 from support.client import Client
-from support.party import KEY, Party
-from support.sceptic import check_event
+from support.frames import Codec
 from support.simulated_link import SimulatedLink
 
 BRIDGE = Address(1, 194)
@@ -47,6 +51,29 @@ GENUINE = Address(1, 243)
 GENUINE_PEER = ('127.0.0.1', 20_000)
 # s after which every request has been answered.
 ANSWERED_WITHIN = 120.0
+KEY = bytes(range(32))
+
+
+def check_event(event: AnyLightEvent) -> None:
+    """Check that an event has no impossible value."""
+    match event:
+        case StatusReceived(status=status, temperature=temperature):
+            for value, low, high in (
+                    (status.brightness, 0.0, 100.0), (status.strobe_period, 0.0, 3600.0),
+                    (status.strobe_duty_cycle, 0.0, 100.0), (status.temperature, -273.2, 1000.0)):
+                assert value is None or low <= value <= high, status
+            assert status.enabled in (None, False, True), status
+            limits = status.limits
+            assert not limits.known or (
+                0 <= limits.min_strobe_period <= limits.max_strobe_period <= 3600), status
+            assert temperature is None or math.isfinite(temperature), status
+        case ConfigurationChanged(configuration=configuration):
+            assert 0 <= configuration.brightness <= 100, configuration
+            assert 0 <= configuration.strobe_period <= 3600, configuration
+            assert 0 <= configuration.strobe_duty_cycle <= 100, configuration
+        case LightIdentified(identity=identity):
+            for text in (identity.vendor, identity.model, identity.serial_number):
+                assert text.isprintable() and len(text) <= 32, identity
 
 
 class Siege:
@@ -63,13 +90,15 @@ class Siege:
         self.last: list[tuple[bytes, Any]] = []
         self._random = random.Random(repr(('siege', seed)))
         self.link = SimulatedLink(
-            self.make_endpoint(), self.take, signing=Signing(
-                mode, KEY if mode is not SigningMode.OFF else b''))
+            self.make_endpoint(), self.take, signing=self._signing())
         self.attacker = Attacker(seed, KEY, [GENUINE, BRIDGE, Address(1, 244), Address(1, 1)])
         self.get_ready()
 
+    def _signing(self, link_id: int = 0) -> Signing:
+        return Signing(self.mode, KEY, link_id)
+
     def make_endpoint(self) -> Any:
-        """Return what is attacked."""
+        """Return the endpoint that is attacked."""
         raise NotImplementedError
 
     def take(self, data: bytes, peer: Any) -> None:
@@ -145,19 +174,19 @@ class BridgeSiege(Siege):
     def get_ready(self) -> None:
         self._light = SimulatedComponent(
             describe(IlluminatorProperties(address=GENUINE)), self.link.now)
-        self._party = Party(GENUINE, self.mode)
+        self._party = Codec(self._signing(7))
         self._genuine(3.0)
         self._check_command()
 
     def take(self, data: bytes, peer: Any) -> None:
         if peer == GENUINE_PEER:
-            for message in self._party.messages(data):
-                self._light.receive(BRIDGE, message, self.link.now)
+            for source, message in self._party.messages(data):
+                self._light.receive(source, message, self.link.now)
                 self._flush()
 
     def _flush(self) -> None:
         while self._light.outgoing:
-            frame = self._party.frame(self._light.outgoing.popleft()[1], self.link.now)
+            frame = self._party.frame(*self._light.outgoing.popleft(), self.link.now)
             self.link.socket.inbox.append((frame, GENUINE_PEER))
 
     def _genuine(self, seconds: float) -> None:
@@ -240,13 +269,13 @@ class LightSiege(Siege):
             [IlluminatorProperties(address=Address(1, 243 + i)) for i in range(3)], 1000.0)
 
     def get_ready(self) -> None:
-        self._party = Party(BRIDGE, self.mode)
+        self._party = Codec(self._signing(7))
         self._acks: list[Any] = []
         self.busy()
 
     def take(self, data: bytes, peer: Any) -> None:
         if peer == GENUINE_PEER:
-            self._acks += [message for message in self._party.messages(data)
+            self._acks += [message for _, message in self._party.messages(data)
                            if hasattr(message, 'result')]
             del self._acks[:-100]
 
@@ -255,7 +284,7 @@ class LightSiege(Siege):
 
     def _command(self, command: int, *params: float) -> None:
         message = CommandLong(*GENUINE, command, 0, *[*params, 0, 0, 0, 0, 0, 0, 0][:7])
-        self.link.receive((self._party.frame(message, self.link.now), GENUINE_PEER))
+        self.link.receive((self._party.frame(BRIDGE, message, self.link.now), GENUINE_PEER))
 
     def check_bounds(self) -> None:
         super().check_bounds()

@@ -20,8 +20,9 @@ from collections.abc import Callable
 from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.frame import Decoder, encode_frame
-from illuminator_ros.mavlink.messages import Address, decode_payload, encode_payload
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import decode_payload
+from support.frames import Codec
 
 # s on the clock at the beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
@@ -41,7 +42,7 @@ class VirtualLink:
         self.now = START
         self.ends = (first, second)
         self.decoders = (Decoder(), Decoder())
-        self._sequences: dict[Address, int] = {}
+        self._codec = Codec()
         self._turns = 0
         for end in self.ends:
             end.link_opened(self.now)
@@ -77,12 +78,7 @@ class VirtualLink:
     def _carry(self, sender: Endpoint, receiver: Endpoint, decoder: Decoder) -> None:
         while sender.outgoing:
             source, message = sender.outgoing.popleft()
-            sequence = self._sequences.get(source, 0)
-            self._sequences[source] = (sequence + 1) & 0xFF
-            frames = decoder.feed(encode_frame(
-                message.id, encode_payload(message), sequence=sequence, source=source,
-                crc_extra=message.crc_extra))
-            for frame in frames:
+            for frame in decoder.feed(self._codec.frame(source, message)):
                 for cls in receiver.messages:
                     if frame.message_id == cls.id:
                         receiver.receive(
