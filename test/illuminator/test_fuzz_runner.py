@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import importlib.util
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,11 @@ from typing import Any
 import pytest
 from support.siege import LightSiege
 
+Call = Callable[..., tuple[int, str]]
+
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch) -> Any:
+def fuzz(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return the fuzzer's module, with rounds of a few inputs."""
     path = Path(__file__).parents[1] / 'fuzz' / 'run.py'
     spec = importlib.util.spec_from_file_location('fuzz_run', path)
@@ -36,40 +39,38 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Any:
     return module
 
 
-def call(run: Any, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
-    """Run the fuzzer with these arguments."""
-    monkeypatch.setattr(run.sys, 'argv', ['run.py', *arguments])
-    return int(run.main())
+@pytest.fixture
+def call(
+    fuzz: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> Call:
+    """Return a function that runs the fuzzer, and returns its exit status and output."""
+    def call(*arguments: str) -> tuple[int, str]:
+        monkeypatch.setattr(fuzz.sys, 'argv', ['run.py', *arguments])
+        return int(fuzz.main()), capsys.readouterr().out
+    return call
 
 
-def test_a_run_without_findings_is_a_success(
-    run: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert call(run, monkeypatch, '--seconds', '0.2') == 0
-    assert '0 findings' in capsys.readouterr().out
+def test_a_run_without_findings_is_a_success(call: Call) -> None:
+    status, out = call('--seconds', '0.2')
+    assert status == 0
+    assert '0 findings' in out
 
 
-def test_the_same_round_sends_the_same_input(
-    run: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:
-    totals = []
-    for _ in range(2):
-        call(run, monkeypatch, '--only', '5/3')
-        totals.append(capsys.readouterr().out.splitlines()[-1])
-    assert totals[0] == totals[1]
+def test_the_same_round_sends_the_same_input(call: Call) -> None:
+    assert len({call('--only', '5/3')[1].splitlines()[-1] for _ in range(2)}) == 1
 
 
-def test_a_finding_is_a_failure_and_says_how_to_see_it_again(
-    run: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+def test_a_finding_is_a_failure_with_the_command_that_repeats_it(
+    call: Call, fuzz: Any, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     class Weak(LightSiege):
 
         def check_service(self) -> None:
             raise AssertionError('as the test says')
 
-    monkeypatch.setattr(run, 'SIEGES', {'weak': Weak})
-    assert call(run, monkeypatch, '--only', '5/3') == 1
-    out = capsys.readouterr().out
-    assert 'as the test says' in out
-    assert 'again: python3 test/fuzz/run.py --only 5/3' in out
-    assert 'last input from' in out
+    monkeypatch.setattr(fuzz, 'SIEGES', {'weak': Weak})
+    status, out = call('--only', '5/3')
+    assert status == 1
+    for text in ('as the test says', 'again: python3 test/fuzz/run.py --only 5/3',
+                 'last input from'):
+        assert text in out

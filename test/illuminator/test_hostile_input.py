@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import itertools
 import math
 import struct
@@ -43,6 +43,7 @@ from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.payload.discovery import MAX_DEVICES
 from illuminator_ros.payload.request import MAX_WAITING, Result
 import pytest
+from support.fake_light import status_message
 from support.frames import frame_of, heartbeat_frame, raw_v2
 from support.siege import BRIDGE, BridgeSiege, GENUINE, LightSiege, Siege, SIEGES
 
@@ -114,72 +115,52 @@ def bridge() -> Iterator[BridgeSiege]:
     siege.close()
 
 
-def flood(siege: Siege, frames: Iterator[bytes] | list[bytes], *, peers: int = 1) -> None:
+def flood(siege: Siege, frames: Iterable[bytes], *, peers: int = 1) -> None:
     """Send frames, at one moment, from so many peers in turn."""
     for number, frame in enumerate(frames):
         siege.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
 
 
-def many_sources(count: int) -> list[Address]:
-    """Return addresses, none of them honest."""
+def forged(count: int) -> list[Address]:
+    """Return addresses of components that do not exist."""
     return [Address(2 + number // 250, 1 + number % 250) for number in range(count)]
 
 
-def test_a_flood_of_lights_is_bounded(bridge: BridgeSiege) -> None:
-    flood(bridge, [heartbeat_frame(source) for source in many_sources(3 * MAX_DEVICES)])
-    assert list(bridge.controller.lights) == [GENUINE]
-    bridge.check_bounds()
-    bridge.check_service()
+def unknown_ids() -> Iterator[int]:
+    return (number for number in range(1 << 20, 1 << 24) if number not in LAYOUTS)
 
 
-def test_a_flood_of_components_is_bounded(bridge: BridgeSiege) -> None:
-    flood(bridge, [heartbeat_frame(source, mav_type=2) for source in many_sources(3000)])
-    assert len(bridge.link._traffic.sources) == MAX_SOURCES
-    assert len(bridge.link._router) == MAX_ROUTES
-    assert list(bridge.controller.lights) == [GENUINE]
-    bridge.check_service()
-
-
-def test_a_flood_of_peers_is_bounded(bridge: BridgeSiege) -> None:
-    flood(bridge, [heartbeat_frame(Address(2, 1))] * 3000, peers=3000)
-    assert len(bridge.link.udp._peers) == MAX_PEERS
-    assert len(bridge.link._receiver) == MAX_DECODERS
-    assert len(bridge.link._router._ways[Address(2, 1)]) == MAX_WAYS
-    bridge.check_service()
-
-
-def test_a_flood_of_peers_that_claim_to_be_the_light_takes_it_from_nobody(
-    bridge: BridgeSiege,
+@pytest.mark.parametrize(('frames', 'peers', 'full'), [
+    ([heartbeat_frame(address) for address in forged(3 * MAX_DEVICES)], 1, {}),
+    ([heartbeat_frame(address, mav_type=2) for address in forged(3000)], 1,
+     {'sources': MAX_SOURCES, 'routes': MAX_ROUTES}),
+    ([heartbeat_frame(Address(2, 1))] * 3000, 3000,
+     {'peers': MAX_PEERS, 'decoders': MAX_DECODERS, 'ways': MAX_WAYS}),
+    ([heartbeat_frame(GENUINE)] * 3000, 3000, {'ways': MAX_WAYS}),
+    ([raw_v2(message_id, b'x', crc_extra=0, source=Address(9, 9))
+      for message_id in itertools.islice(unknown_ids(), 5000)], 1, {'sources': 1}),
+    ([frame_of(status_message(uptime_ms=number % 2 * 1_000_000), 0, GENUINE)
+      for number in range(2000)], 1, {}),
+], ids=['lights', 'components', 'peers', 'peers that claim to be the light', 'unknown messages',
+        'restarts'])
+def test_a_flood_is_bounded_and_the_genuine_light_is_served(
+    bridge: BridgeSiege, frames: list[bytes], peers: int, full: dict[str, int],
 ) -> None:
-    flood(bridge, [heartbeat_frame(GENUINE)] * 3000, peers=3000)
-    bridge.check_service()
-
-
-def test_a_flood_of_unknown_messages_leaves_nothing_behind(bridge: BridgeSiege) -> None:
-    unknown = (number for number in range(1 << 20, 1 << 24) if number not in LAYOUTS)
-    before = len(bridge.link._traffic.sources)
-    flood(bridge, [raw_v2(message_id, b'x', crc_extra=0, source=Address(9, 9))
-                   for message_id in itertools.islice(unknown, 5000)])
-    assert len(bridge.link._traffic.sources) == before
-    assert bridge.link._receiver.counters.unknown_ids >= 5000
+    flood(bridge, frames, peers=peers)
+    bridge.check_bounds()
+    sizes = bridge.sizes()
+    assert {name: sizes[name] for name in full} == full
+    assert list(bridge.controller.lights) == [GENUINE]
     bridge.check_service()
 
 
 def test_a_flood_of_signed_streams_is_bounded() -> None:
     siege = BridgeSiege('streams', SigningMode.REQUIRE)
-    attacker = siege.attacker
-    flood(siege, (attacker._signed(Heartbeat.id, bytes(9), 0, source, siege.link.now)
-                  for source in many_sources(20 * MAX_STREAMS)))
-    assert len(siege.link._signing._streams) == MAX_STREAMS
+    flood(siege, (siege.attacker.signed(Heartbeat.id, bytes(9), 0, source, siege.link.now)
+                  for source in forged(20 * MAX_STREAMS)))
+    assert siege.sizes()['streams'] == MAX_STREAMS
     siege.check_service()
     siege.close()
-
-
-def test_a_flood_of_restarts_is_bounded(bridge: BridgeSiege) -> None:
-    statuses = [status(uptime_ms=number % 2 * 1_000_000) for number in range(2000)]
-    flood(bridge, [frame_of(one, 0, GENUINE) for one in statuses])
-    bridge.check_bounds()
-    bridge.check_service()
 
 
 def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
@@ -201,32 +182,16 @@ def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
 
 # Values
 
-def status(uptime_ms: int = 100_000, **fields: Any) -> Any:
-    """Return an ILLUMINATOR_STATUS, some fields other than usual."""
-    usual = {'enable': 1, 'mode_bitmask': 3, 'error_status': 0, 'mode': 1, 'brightness': 50.0,
-             'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'temp_c': 25.0,
-             'min_strobe_period': 0.05, 'max_strobe_period': 10.0}
-    return IlluminatorStatus(uptime_ms=uptime_ms, **{**usual, **fields})
-
-
-@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 3.4e38, -3.4e38])
-@pytest.mark.parametrize(('field', 'name'), [
-    ('brightness', 'brightness'), ('strobe_period', 'strobe_period'),
-    ('strobe_duty_cycle', 'strobe_duty_cycle'), ('temp_c', 'temperature')])
-def test_no_number_beyond_belief_reaches_an_observer_as_a_value(
-    bridge: BridgeSiege, field: str, name: str, value: float,
-) -> None:
-    light = bridge.controller.lights[GENUINE]
-    flood(bridge, [frame_of(status(light.status.uptime_ms + 10, **{field: value}), 0, GENUINE)])
-    assert getattr(light.status, name) is None
-    assert field in light.status.invalid[0]
+def send_status(bridge: BridgeSiege, later_ms: int = 10, **fields: Any) -> None:
+    """Send a status in the name of the genuine light."""
+    uptime_ms = bridge.controller.lights[GENUINE].status.uptime_ms + later_ms
+    flood(bridge, [frame_of(status_message(uptime_ms, **{'enable': 1, **fields}), 0, GENUINE)])
 
 
 @pytest.mark.parametrize('low', [math.nan, -1.0, math.inf, 5.0])
-def test_limits_beyond_belief_refuse_nothing(bridge: BridgeSiege, low: float) -> None:
+def test_implausible_limits_refuse_nothing(bridge: BridgeSiege, low: float) -> None:
     light = bridge.controller.lights[GENUINE]
-    flood(bridge, [frame_of(status(light.status.uptime_ms + 10, min_strobe_period=low,
-                                   max_strobe_period=math.nan), 0, GENUINE)])
+    send_status(bridge, min_strobe_period=low, max_strobe_period=math.nan)
     assert not light.limits.known
     assert checked('strobe_period', 7.0, light.limits) == 7.0
 
@@ -234,7 +199,7 @@ def test_limits_beyond_belief_refuse_nothing(bridge: BridgeSiege, low: float) ->
 def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSiege) -> None:
     # It compares equal to 0, but sent back to the light it would be denied for ever.
     light = bridge.controller.lights[GENUINE]
-    flood(bridge, [frame_of(status(light.status.uptime_ms + 10, strobe_period=1e-45), 0, GENUINE)])
+    send_status(bridge, strobe_period=1e-45)
     assert light.snapshot(0.0).configuration.strobe_period == 0.0
     bridge.check_service()
 
@@ -247,10 +212,8 @@ def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied
     bridge.link.ask(lambda now: light.configure(
         {'mode': 'external_sync'}, now, lambda result, now: None))
     bridge.link.run(1.0)
-    internal, external = (frame_of(status(
-        light.status.uptime_ms + 10 * mode, mode=mode, strobe_period=440.0), 0, GENUINE)
-        for mode in (1, 2))
-    flood(bridge, [internal, external])
+    for mode in (1, 2):
+        send_status(bridge, mode=mode, strobe_period=440.0)
     assert light.snapshot(0.0).configuration.strobe_period == 440.0
     bridge.check_service()
 
@@ -268,5 +231,5 @@ def test_a_light_refuses_params_that_mean_nothing(command: int, param: float) ->
 
 def test_floats_survive_the_wire_as_they_are() -> None:
     # Or the tests above would be none.
-    frame = frame_of(status(brightness=math.nan))
+    frame = frame_of(status_message(brightness=math.nan))
     assert math.isnan(struct.unpack('<f', frame[18:22])[0])

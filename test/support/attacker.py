@@ -145,11 +145,11 @@ class Attacker:
         if cls.id < 256 and len(payload) < 256 and self._random.random() < 0.15:
             return raw_v1(cls.id, payload, sequence=sequence, source=source)
         if self._random.random() < 0.4:
-            return self._signed(cls.id, payload, sequence, source, now)
+            return self.signed(cls.id, payload, sequence, source, now)
         flags = self._random.choice((0,) * 20 + (2, 0x80, 0xFF))
         return raw_v2(cls.id, payload, incompat=flags, sequence=sequence, source=source)
 
-    def _signed(
+    def signed(
         self, message_id: int, payload: bytes, sequence: int, source: Address, now: float,
     ) -> bytes:
         frame = raw_v2(message_id, payload, incompat=1, sequence=sequence, source=source)

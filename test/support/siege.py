@@ -76,6 +76,12 @@ def check_event(event: AnyLightEvent) -> None:
                 assert text.isprintable() and len(text) <= 32, identity
 
 
+BOUNDS = {
+    'peers': MAX_PEERS, 'decoders': MAX_DECODERS, 'sources': MAX_SOURCES, 'routes': MAX_ROUTES,
+    'crowded routes': MAX_ROUTES, 'ways': MAX_WAYS, 'streams': MAX_STREAMS, 'outgoing': 0,
+    'sequences': 8}
+
+
 class Siege:
     """
     A link and its attacker.
@@ -112,21 +118,21 @@ class Siege:
         """Do something honest in the middle of it."""
         raise NotImplementedError
 
+    def sizes(self) -> dict[str, int]:
+        """Return the sizes of the tables that a peer can fill."""
+        link = self.link
+        return {
+            'peers': len(link.udp._peers), 'decoders': len(link._receiver),
+            'sources': len(link._traffic.sources), 'routes': len(link._router),
+            'crowded routes': len(link._router._crowded),
+            'ways': max(map(len, link._router._ways.values()), default=0),
+            'streams': len(link._signing._streams), 'outgoing': len(link.endpoint.outgoing),
+            'sequences': len(link._writer.sequences)}
+
     def check_bounds(self) -> None:
         """Check that no table has grown beyond its bound."""
-        link = self.link
-        waiting = link.endpoint.outgoing
-        for what, size, bound in (
-                ('peers', len(link.udp._peers), MAX_PEERS),
-                ('decoders', len(link._receiver), MAX_DECODERS),
-                ('sources', len(link._traffic.sources), MAX_SOURCES),
-                ('routes', len(link._router), MAX_ROUTES),
-                ('crowded routes', len(link._router._crowded), MAX_ROUTES),
-                ('ways', max(map(len, link._router._ways.values()), default=0), MAX_WAYS),
-                ('streams', len(link._signing._streams), MAX_STREAMS),
-                ('outgoing', len(waiting), 0),
-                ('sequences', len(link._writer.sequences), 8)):
-            assert size <= bound, f'{size} {what}, more than {bound}'
+        sizes = self.sizes()
+        assert {name: sizes[name] for name, bound in BOUNDS.items() if sizes[name] > bound} == {}
 
     def attack(self) -> None:
         """Send the next datagrams, and now and then do something honest."""
