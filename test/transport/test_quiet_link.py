@@ -67,6 +67,15 @@ def test_link_greets_while_it_hears_no_valid_frame(
     assert list(endpoint.greetings) == greetings
 
 
+def test_heartbeat_is_sent_once_a_second_while_a_peer_is_heard() -> None:
+    times: list[float] = []
+    link = SimulatedLink(Talker(), lambda data, peer: times.append(link.now), now=0.0)
+    for _ in range(5):
+        link.receive((BEAT, PEER))
+        link.run(1.0)
+    assert times == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+
+
 def test_frame_behind_a_false_start_is_received_when_that_is_given_up() -> None:
     link, endpoint = simulated()
     link.receive((BEAT + FALSE_START + BEAT, PEER))
