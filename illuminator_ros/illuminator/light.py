@@ -414,14 +414,14 @@ class Light:
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
         if change is None or self._sources is None:
             return
+        if change.after is not None:
+            self._end_requests(f'held by {change.after}', now)
         self._emit(LightHeld(self.address, change))
         if change.after is None:
             if self._sources.settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
-            return
-        self._end_requests(f'held by {change.after}', now)
-        if change.cause is not Cause.CLAIM:
+        elif change.cause is not Cause.CLAIM:
             self._send_wish(self._sources, now)
 
     def _end_requests(self, message: str, now: float) -> None:

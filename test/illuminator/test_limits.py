@@ -19,7 +19,7 @@ from typing import Any
 from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.model import FIELDS, float32, SafetyLimits
+from illuminator_ros.illuminator.model import float32, SafetyLimits
 from illuminator_ros.mavlink.messages import MavCmd
 import pytest
 from support.back_to_back import Pair
@@ -119,15 +119,3 @@ def test_a_limit_above_what_the_light_can_do_is_reported_and_the_light_does_not_
     assert pair.snapshot.limit_exceeded.impossible == (
         'min_strobe_period 0.34 s is above the 0.2 s that the light can do')
     assert [command.param3 for command in pair.commands(CONFIGURE)] == [0.0]
-
-
-def test_a_complete_set_of_overrides_for_a_light_without_statuses_is_clipped() -> None:
-    light = FakeLight(stream=0.0)
-    light.answers.clear()
-    pair = Pair(light, settings=LIMITED).settle()
-    pair.light.set_desired(dict(zip(FIELDS, ('internal_control', 90.0, 0.1, 10.0), strict=True)),
-                           pair.now)
-    pair.run(5.0)
-
-    assert pair.commands(CONFIGURE)
-    assert_within_limits(pair)

@@ -37,6 +37,21 @@ def test_enable_message_switches_the_light(ros: Ros, light: ServedLight, on: boo
     assert command.param1 == float(on)
 
 
+def test_repeated_enable_message_is_sent_each_time_and_logged_once(
+    ros: Ros, light: ServedLight, bridge: Program,
+) -> None:
+    ros.enable(False)
+    light.forget()
+    before = bridge.count('was switched on by topic')
+    for count in (1, 2, 3):
+        ros.publish(Bool, ENABLE, True)
+        light.wait_for(ON_OFF, count)
+    ros.enable(False)
+    bridge.wait_for('was switched off by service')
+
+    assert bridge.count('was switched on by topic') == before + 1
+
+
 def test_newest_enable_message_wins_while_the_light_is_being_switched(
     ros: Ros, light: ServedLight, parameters: Parameters,
 ) -> None:

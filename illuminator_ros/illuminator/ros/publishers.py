@@ -54,6 +54,7 @@ from ..model import (
     shortest,
     Status,
 )
+from ..sources import DEFAULT
 from ...payload.arbitration import Cause as HolderCause
 from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
@@ -105,6 +106,9 @@ class LightPublishers:
         self._check_diagnostics = check_diagnostics
         self._identity: object = None
         self._max_brightness = limits.max_brightness
+        # The last switch, and the source of setpoints as a part of its topics.
+        self._last_switch: LightSwitched | None = None
+        self._source = ''
         self._limits = Limits()
         self._condition: tuple[object, ...] = ()
         self._shared = False
@@ -174,6 +178,7 @@ class LightPublishers:
         self._check_diagnostics()
 
     def _restarted(self, event: LightRestarted) -> None:
+        self._last_switch = None
         self._log.info(f'light {event.address} has restarted', 'restart')
         if event.was_on and event.is_on is False:
             self._log.warning(f'light {event.address} was on before it restarted, and is off now',
@@ -190,7 +195,10 @@ class LightPublishers:
             self._check_diagnostics()
 
     def _switched(self, event: LightSwitched) -> None:
-        if event.left_out is not None:
+        # Programs repeat a message to keep a light on, or to hold it.
+        is_repeated = event == self._last_switch and event.detail.endswith('topic')
+        self._last_switch = event
+        if event.left_out is not None and not is_repeated:
             way = event.detail if event.origin is Origin.REQUEST else event.origin.value
             self._log.info(f'light {event.address} was switched {"on" if event.on else "off"} by '
                            f'{way or "a request"}{_left_out(event.left_out)}', 'switched')
@@ -200,6 +208,7 @@ class LightPublishers:
         reason = _REASONS[change.cause] if change.before else ''
         self._log.info(f'light {event.address} is held by {change.after or "no source"}'
                        f'{reason.format(change.before)}', 'holder')
+        self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
         self._interface.publish('source', change.after or '')
         self._check_diagnostics()
 
@@ -254,10 +263,10 @@ class LightPublishers:
         self._check_diagnostics()
 
     def _setpoint_failed(self, event: SetpointFailed) -> None:
-        self._log.warning(f'~/cmd/brightness: {event.message}', 'setpoint')
+        self._log.warning(f'~/{self._source}cmd/brightness: {event.message}', 'setpoint')
 
     def _setpoint_clipped(self, event: SetpointClipped) -> None:
-        self._log.warning(f'~/cmd/brightness: {event.message}: the limit is sent'
+        self._log.warning(f'~/{self._source}cmd/brightness: {event.message}: the limit is sent'
                           f'{_left_out(event.left_out)}', 'clipped')
 
     def _limit_exceeded(self, event: LimitExceeded) -> None:
