@@ -14,6 +14,8 @@
 
 """The faults of simulated lights: their effects, their values, and their ends."""
 
+from typing import Any
+
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
@@ -25,15 +27,15 @@ ON = (MavCmd.ILLUMINATOR_ON_OFF, 1)
 NORMAL = IlluminatorBehaviour()
 
 
-def acks(bench):
+def acks(bench: LightBench) -> Any:
     return [(at, ack.result) for at, ack in bench.of(CommandAck)]
 
 
-def active(bench):
+def active(bench: LightBench) -> Any:
     return FAULTS.as_typed(bench.component.behaviour, NORMAL)
 
 
-def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over():
+def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over() -> None:
     bench = LightBench('silence=3')
     bench.run(2.0)
     bench.command(*ON)
@@ -43,12 +45,12 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over():
     assert active(bench) == []
 
 
-def test_a_silence_without_an_end_lasts():
+def test_a_silence_without_an_end_lasts() -> None:
     bench = LightBench('silence')
     assert (bench.run(5000.0), active(bench)) == ([], ['silence'])
 
 
-def test_a_light_with_the_fault_reboot_restarts_at_its_interval():
+def test_a_light_with_the_fault_reboot_restarts_at_its_interval() -> None:
     bench = LightBench('reboot=4')
     bench.run(9.9)
     assert [status.uptime_ms for _, status in bench.of(IlluminatorStatus)] == [
@@ -56,7 +58,7 @@ def test_a_light_with_the_fault_reboot_restarts_at_its_interval():
 
 
 @pytest.mark.parametrize('fault', ['slow=2', 'progress=2', 'delay=3'])
-def test_a_restart_drops_unfinished_commands_and_delayed_messages(fault):
+def test_a_restart_drops_unfinished_commands_and_delayed_messages(fault: str) -> None:
     bench = LightBench(fault, status_interval=0.0)
     for _ in range(20):
         bench.command(*ON)
@@ -67,7 +69,7 @@ def test_a_restart_drops_unfinished_commands_and_delayed_messages(fault):
     assert (acks(bench), bench.lamp.enabled) == ([], False)
 
 
-def test_a_failed_thermistor_measures_nothing_and_sees_no_heat_until_it_is_cleared():
+def test_a_failed_thermistor_measures_nothing_and_sees_no_heat_until_it_is_cleared() -> None:
     bench = LightBench('thermistor')
     bench.lamp.heat_to(120.0, 0.0)
     assert (bench.status().error_status, bench.status().temp_c) == (4, 0.0)
@@ -79,14 +81,16 @@ def test_a_failed_thermistor_measures_nothing_and_sees_no_heat_until_it_is_clear
 @pytest.mark.parametrize(('fault', 'result'), [
     ('refuse', MavResult.DENIED), ('refuse=failed', MavResult.FAILED),
     ('refuse=MAV_RESULT_NOT_IN_CONTROL', MavResult.NOT_IN_CONTROL)])
-def test_changes_are_refused_with_the_given_result_and_requests_are_not(fault, result):
+def test_changes_are_refused_with_the_given_result_and_requests_are_not(
+    fault: str, result: MavResult,
+) -> None:
     bench = LightBench(fault)
     assert bench.result(*ON) == result
     assert bench.result(MavCmd.REQUEST_MESSAGE, STATUS_ID) == MavResult.ACCEPTED
     assert not bench.lamp.enabled
 
 
-def test_progress_is_reported_until_the_change_and_rejects_a_second_command():
+def test_progress_is_reported_until_the_change_and_rejects_a_second_command() -> None:
     bench = LightBench('progress=2')
     bench.command(*ON)
     bench.run(1.9)
@@ -99,14 +103,14 @@ def test_progress_is_reported_until_the_change_and_rejects_a_second_command():
     assert bench.lamp.enabled
 
 
-def test_a_busy_light_rejects_some_changes_temporarily_and_is_then_normal():
+def test_a_busy_light_rejects_some_changes_temporarily_and_is_then_normal() -> None:
     bench = LightBench('busy=2')
     assert [(bench.result(*ON), active(bench)) for _ in range(3)] == [
         (1, ['busy=1']), (1, []), (0, [])]
     assert bench.lamp.enabled
 
 
-def test_a_slow_light_answers_and_acts_late():
+def test_a_slow_light_answers_and_acts_late() -> None:
     bench = LightBench('slow=1.5')
     bench.command(*ON)
     bench.run(1.4)
@@ -115,24 +119,24 @@ def test_a_slow_light_answers_and_acts_late():
     assert (acks(bench), bench.lamp.enabled) == ([(1.5, MavResult.ACCEPTED)], True)
 
 
-def test_a_light_with_the_fault_lie_accepts_changes_and_ignores_them():
+def test_a_light_with_the_fault_lie_accepts_changes_and_ignores_them() -> None:
     bench = LightBench('lie')
     assert (bench.result(*ON), bench.status().enable) == (MavResult.ACCEPTED, 0)
 
 
 @pytest.mark.parametrize(('fault', 'low', 'high'), [
     ('drop=0.2', 140, 180), ('drop=1', 0, 0), ('duplicate=0.25', 230, 270)])
-def test_a_share_of_the_messages_is_lost_or_doubled(fault, low, high):
+def test_a_share_of_the_messages_is_lost_or_doubled(fault: str, low: float, high: float) -> None:
     assert low <= len(LightBench(fault, status_interval=0.0).run(199.5)) <= high
 
 
-def test_a_share_of_the_messages_has_a_wrong_checksum():
+def test_a_share_of_the_messages_has_a_wrong_checksum() -> None:
     sent = LightBench('corrupt=0.5', status_interval=0.0).run(199.5)
     assert 80 <= sum(one.crc_extra != Heartbeat.crc_extra for one in sent) <= 120
     assert Heartbeat.crc_extra == 50
 
 
-def test_messages_are_delayed_by_up_to_the_given_time():
+def test_messages_are_delayed_by_up_to_the_given_time() -> None:
     bench = LightBench('delay=0.5', status_interval=0.0)
     bench.run(50.0)
     late = [at % 1.0 for at, _ in bench.sent]
@@ -140,8 +144,8 @@ def test_messages_are_delayed_by_up_to_the_given_time():
 
 
 @pytest.mark.parametrize('fault', ['drop', 'duplicate', 'delay', 'corrupt'])
-def test_the_same_seed_gives_the_same_faults(fault):
-    def run(seed):
+def test_the_same_seed_gives_the_same_faults(fault: str) -> None:
+    def run(seed: int) -> Any:
         bench = LightBench(fault, seed=seed)
         bench.run(50.0)
         return [(at, message.crc_extra) for at, message in bench.sent]
@@ -149,7 +153,7 @@ def test_the_same_seed_gives_the_same_faults(fault):
     assert run(1) == run(1) != run(2)
 
 
-def test_a_fault_can_start_and_end_while_the_light_runs():
+def test_a_fault_can_start_and_end_while_the_light_runs() -> None:
     bench = LightBench()
     beats = []
     for behaviour in (NORMAL, FAULTS.add(NORMAL, 'drop=1'), NORMAL):
@@ -159,7 +163,7 @@ def test_a_fault_can_start_and_end_while_the_light_runs():
 
 
 @pytest.mark.parametrize('name', FAULTS)
-def test_each_fault_changes_the_behaviour_and_is_listed_until_it_is_removed(name):
+def test_each_fault_changes_the_behaviour_and_is_listed_until_it_is_removed(name: str) -> None:
     faulty = FAULTS.add(NORMAL, name)
     assert FAULTS.active(faulty, NORMAL) == [name]
     (typed,) = FAULTS.as_typed(faulty, NORMAL)
@@ -175,7 +179,7 @@ def test_each_fault_changes_the_behaviour_and_is_listed_until_it_is_removed(name
     ('slow=-1', '-1 is outside 0.001 to 3600'), ('slow=inf', 'inf is outside'),
     ('busy=0', '0 is outside'), ('refuse=maybe', "'maybe' is not a MAV_RESULT"),
     ('flags=0', '0 is outside'), ('type=256', '256 is outside 0 to 255')])
-def test_a_wrong_fault_is_refused_with_the_reason(text, reason):
+def test_a_wrong_fault_is_refused_with_the_reason(text: str, reason: str) -> None:
     with pytest.raises(FaultError) as caught:
         FAULTS.add(NORMAL, text)
     assert reason in str(caught.value)

@@ -14,6 +14,9 @@
 
 """The simulated light follows the illuminator, heartbeat, command and interval protocols."""
 
+from collections.abc import Iterable
+from typing import Any
+
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -43,29 +46,31 @@ HOT = ThermalProperties(ambient=40.0, rise=80.0, time_constant=10.0)
 
 
 @pytest.fixture
-def bench():
+def bench() -> LightBench:
     bench = LightBench()
     bench.run(0.5)
     bench.sent.clear()
     return bench
 
 
-def statuses(messages):
+def statuses(messages: Iterable[Any]) -> list[IlluminatorStatus]:
     return [message for message in messages if isinstance(message, IlluminatorStatus)]
 
 
-def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start():
+def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start() -> None:
     beats = [m for m in LightBench().run(4.5) if isinstance(m, Heartbeat)]
     assert {(m.type, m.autopilot) for m in beats} == {(MavType.ILLUMINATOR, 8)}
     assert len(beats) == 5
 
 
 @pytest.mark.parametrize(('interval', 'expected'), [(1.0, 5), (0.5, 9), (0.1, 45), (0.0, 0)])
-def test_statuses_are_sent_at_the_interval_of_the_properties(interval, expected):
+def test_statuses_are_sent_at_the_interval_of_the_properties(
+    interval: float, expected: float,
+) -> None:
     assert len(statuses(LightBench(status_interval=interval).run(4.45))) == expected
 
 
-def test_a_stream_keeps_its_rate_when_polled_late_and_leaves_out_what_it_missed():
+def test_a_stream_keeps_its_rate_when_polled_late_and_leaves_out_what_it_missed() -> None:
     bench = LightBench(status_interval=0.1)
     for turn in range(101):
         bench.component.poll(turn * 0.1 + 0.03)
@@ -74,12 +79,12 @@ def test_a_stream_keeps_its_rate_when_polled_late_and_leaves_out_what_it_missed(
     assert len(statuses(message for _, message in bench.component.outgoing)) == 102
 
 
-def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench):
+def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench: LightBench) -> None:
     assert bench.lamp.uptime_ms(1.234) == 1234
     assert bench.lamp.uptime_ms(2 ** 32 / 1000 + 1.5) == 1500
 
 
-def test_a_requested_message_follows_its_acknowledgement(bench):
+def test_a_requested_message_follows_its_acknowledgement(bench: LightBench) -> None:
     ack, status = bench.command(REQUEST, STATUS_ID)
     assert (type(ack), ack.result, ack.command) == (CommandAck, ACCEPTED, REQUEST)
     assert (ack.target_system, ack.target_component) == GROUND
@@ -89,7 +94,7 @@ def test_a_requested_message_follows_its_acknowledgement(bench):
     assert Identity.from_message(information).serial_number == 'SIM-1-243'
 
 
-def test_strings_that_are_too_long_are_cut_and_terminated():
+def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
     bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
     _, information = bench.command(REQUEST, INFORMATION_ID)
     assert encode_payload(information)[16:] == (
@@ -104,7 +109,8 @@ def test_strings_that_are_too_long_are_cut_and_terminated():
     *((command, (), MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
     *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
 def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
-        bench, command, params, result):
+    bench: LightBench, command: MavCmd, params: tuple[float, ...], result: MavResult,
+) -> None:
     (ack,) = bench.command(command, *params)
     assert ack.result == result
     assert bench.status().enable == 0
@@ -114,12 +120,13 @@ def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
 @pytest.mark.parametrize(('microseconds', 'expected'), [
     (250_000, 8), (2_000_000, 1), (0, 2), (-1, 0), (1, 200)])
 def test_the_interval_of_the_status_can_be_set_within_what_the_light_offers(
-        bench, microseconds, expected):
+    bench: LightBench, microseconds: float, expected: float,
+) -> None:
     assert bench.result(SET_INTERVAL, STATUS_ID, microseconds) == ACCEPTED
     assert len(statuses(bench.run(2.001))) == expected
 
 
-def test_the_default_interval_starts_a_stopped_stream_again(bench):
+def test_the_default_interval_starts_a_stopped_stream_again(bench: LightBench) -> None:
     bench.command(SET_INTERVAL, STATUS_ID, -1)
     bench.command(SET_INTERVAL, STATUS_ID, 0)
     assert len(statuses(bench.run(3.0))) == 3
@@ -128,13 +135,17 @@ def test_the_default_interval_starts_a_stopped_stream_again(bench):
 @pytest.mark.parametrize(('target', 'enabled'), [
     ((0, 0), True), ((1, 0), True), ((1, 243), True), ((0, 243), True),
     ((1, 244), False), ((2, 243), False), ((2, 0), False), ((255, 190), False)])
-def test_a_command_is_obeyed_only_by_its_target(bench, target, enabled):
+def test_a_command_is_obeyed_only_by_its_target(
+    bench: LightBench, target: tuple[int, int], enabled: bool,
+) -> None:
     assert bool(bench.command(ON_OFF, 1, target=target)) is enabled
     assert bench.lamp.enabled is enabled
 
 
 @pytest.mark.parametrize(('target', 'enabled'), [((1, 244), [False, True]), ((0, 0), [True] * 2)])
-def test_lights_on_one_link_obey_only_their_own_commands(target, enabled):
+def test_lights_on_one_link_obey_only_their_own_commands(
+    target: tuple[int, int], enabled: list[bool],
+) -> None:
     lights = simulated_lights(
         [IlluminatorProperties(address=Address(1, one)) for one in (243, 244)], 0.0)
     lights.receive(GROUND, CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
@@ -142,14 +153,16 @@ def test_lights_on_one_link_obey_only_their_own_commands(target, enabled):
     assert len({source for source, _ in lights.outgoing}) == sum(enabled)
 
 
-def test_messages_that_are_not_commands_are_not_answered(bench):
+def test_messages_that_are_not_commands_are_not_answered(bench: LightBench) -> None:
     for message in (Heartbeat(18, 8, 0, 0, 4, 3), CommandAck(405, 0, 0, 0, 1, 243)):
         bench.component.receive(GROUND, message, bench.now)
     assert not bench.component.outgoing
 
 
 @pytest.mark.parametrize('form', [CommandLong, CommandInt])
-def test_a_change_is_acknowledged_then_applied_then_reported(bench, form):
+def test_a_change_is_acknowledged_then_applied_then_reported(
+    bench: LightBench, form: type[CommandLong | CommandInt],
+) -> None:
     for value in (1, 0):
         ack, status = bench.command(ON_OFF, value, form=form)
         assert (ack.result, status.enable) == (ACCEPTED, value)
@@ -164,18 +177,20 @@ def test_a_change_is_acknowledged_then_applied_then_reported(bench, form):
     *((1, value) for value in (-1, -0.001, 100.001, 101, NAN, INF, -INF)),
     *((2, value) for value in (-1, 0.04, 10.01, 1e30, NAN, INF, -INF)),
     *((3, value) for value in (-1, -0.001, 100.001, 101, NAN, INF, -INF))])
-def test_one_wrong_value_denies_the_whole_configuration(bench, position, value):
-    before, params = bench.shown(), [2, 50, 1, 25]
+def test_one_wrong_value_denies_the_whole_configuration(
+    bench: LightBench, position: int, value: float,
+) -> None:
+    before, params = bench.shown(), [2.0, 50.0, 1.0, 25.0]
     params[position] = value
     (ack,) = bench.command(CONFIGURE, *params)
     assert (ack.result, bench.shown()) == (DENIED, before)
 
 
-def test_a_change_sends_no_status_while_the_stream_is_off():
+def test_a_change_sends_no_status_while_the_stream_is_off() -> None:
     assert len(LightBench(status_interval=0.0).command(ON_OFF, 1)) == 1
 
 
-def test_switching_and_configuring_do_not_affect_each_other(bench):
+def test_switching_and_configuring_do_not_affect_each_other(bench: LightBench) -> None:
     bench.command(CONFIGURE, 2, 50, 1, 25)
     bench.command(ON_OFF, 1)
     assert bench.shown() == (2, 50, 1, 25)
@@ -183,7 +198,7 @@ def test_switching_and_configuring_do_not_affect_each_other(bench):
     assert bench.lamp.enabled
 
 
-def test_a_restart_resets_the_settings_and_keeps_the_temperature():
+def test_a_restart_resets_the_settings_and_keeps_the_temperature() -> None:
     bench = LightBench()
     bench.command(ON_OFF, 1)
     bench.command(CONFIGURE, 2, 50, 1, 10)
@@ -196,7 +211,7 @@ def test_a_restart_resets_the_settings_and_keeps_the_temperature():
     assert bench.shown() == (1, 100.0, 0, 0)
 
 
-def test_a_light_that_is_on_heats_and_dims_and_recovers():
+def test_a_light_that_is_on_heats_and_dims_and_recovers() -> None:
     bench = LightBench(thermal=HOT, status_interval=0.0)
     bench.now = 100.0
     assert bench.status().temp_c == pytest.approx(40.0)
@@ -214,7 +229,8 @@ def test_a_light_that_is_on_heats_and_dims_and_recovers():
 @pytest.mark.parametrize(('brightness', 'period', 'duty_cycle', 'rise'), [
     (100, 1, 10, 8.0), (50, 1, 50, 20.0), (40, 0, 10, 32.0), (40, 0, 0, 32.0), (100, 1, 0, 0.0)])
 def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
-        brightness, period, duty_cycle, rise):
+    brightness: float, period: float, duty_cycle: float, rise: float,
+) -> None:
     bench = LightBench(thermal=HOT)
     bench.command(ON_OFF, 1)
     bench.command(CONFIGURE, 1, brightness, period, duty_cycle)
@@ -222,7 +238,7 @@ def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
     assert bench.status().temp_c == pytest.approx(40.0 + rise, abs=0.1)
 
 
-def test_heating_can_be_faster_than_real_time():
+def test_heating_can_be_faster_than_real_time() -> None:
     bench = LightBench(thermal=HOT, time_scale=8.0)
     bench.command(ON_OFF, 1)
     bench.now = 1.0

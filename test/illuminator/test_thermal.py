@@ -30,14 +30,16 @@ def model(**properties: float) -> ThermalModel:
 
 @pytest.mark.parametrize(('seconds', 'power', 'temperature'), [
     (0.0, 1.0, -10.0), (100.0, 1.0, -10.0 + 40.0 * 0.632), (5000.0, 0.5, 10.0)])
-def test_the_temperature_approaches_ambient_plus_rise_times_power(seconds, power, temperature):
+def test_the_temperature_approaches_ambient_plus_rise_times_power(
+    seconds: float, power: float, temperature: float,
+) -> None:
     one = model(ambient=-10.0, rise=40.0, time_constant=100.0)
     one.advance(seconds, power)
     assert one.temperature == pytest.approx(temperature, abs=0.1)
     assert (one.flags, one.output) == (0, 1.0)
 
 
-def test_the_temperature_does_not_depend_on_the_length_of_the_steps():
+def test_the_temperature_does_not_depend_on_the_length_of_the_steps() -> None:
     once, often = model(), model()
     once.advance(60.0, 1.0)
     for _ in range(600):
@@ -45,7 +47,7 @@ def test_the_temperature_does_not_depend_on_the_length_of_the_steps():
     assert once.temperature == pytest.approx(often.temperature, abs=0.01)
 
 
-def test_thresholds_have_a_hysteresis():
+def test_thresholds_have_a_hysteresis() -> None:
     one = model()
     for temperature, flags, output in (
             (79.9, ErrorFlag(0), 1.0), (80.0, THROTTLING, 0.5), (94.9, THROTTLING, 0.5),
@@ -56,7 +58,7 @@ def test_thresholds_have_a_hysteresis():
         assert (one.flags, one.output) == (flags, output), temperature
 
 
-def test_a_throttled_light_cools_and_throttles_again():
+def test_a_throttled_light_cools_and_throttles_again() -> None:
     one = model(ambient=30.0, rise=60.0, time_constant=10.0)
     changes = 0
     for _ in range(3000):
@@ -70,6 +72,6 @@ def test_a_throttled_light_cools_and_throttles_again():
 @pytest.mark.parametrize('wrong', [
     {'time_constant': 0.0}, {'time_constant': -1.0}, {'time_constant': float('nan')},
     {'throttle_until': 80.0}, {'throttle_at': 96.0}, {'shutdown_until': 95.0}])
-def test_properties_that_contradict_each_other_are_refused(wrong):
+def test_properties_that_contradict_each_other_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match='time constant|thresholds'):
         dataclasses.replace(ThermalProperties(), **wrong)
