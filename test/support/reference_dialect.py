@@ -33,45 +33,27 @@ from typing import Any
 from illuminator_ros.mavlink.messages import Address
 from pymavlink.generator import mavgen
 
-# Message id, name and fields (type, name, further attributes), in the order of common.xml.
-# None stands where the extension fields begin.
-DEFINITIONS: dict[int, tuple[str, list[tuple[str, str, str] | None]]] = {
-    0: ('HEARTBEAT', [
-        ('uint8_t', 'type', ''), ('uint8_t', 'autopilot', ''), ('uint8_t', 'base_mode', ''),
-        ('uint32_t', 'custom_mode', ''), ('uint8_t', 'system_status', ''),
-        ('uint8_t_mavlink_version', 'mavlink_version', '')]),
-    75: ('COMMAND_INT', [
-        ('uint8_t', 'target_system', ''), ('uint8_t', 'target_component', ''),
-        ('uint8_t', 'frame', ''), ('uint16_t', 'command', ''), ('uint8_t', 'current', ''),
-        ('uint8_t', 'autocontinue', ''), ('float', 'param1', ''), ('float', 'param2', ''),
-        ('float', 'param3', ''), ('float', 'param4', ''), ('int32_t', 'x', ''),
-        ('int32_t', 'y', ''), ('float', 'z', '')]),
-    76: ('COMMAND_LONG', [
-        ('uint8_t', 'target_system', ''), ('uint8_t', 'target_component', ''),
-        ('uint16_t', 'command', ''), ('uint8_t', 'confirmation', ''),
-        *(('float', f'param{number}', '') for number in range(1, 8))]),
-    77: ('COMMAND_ACK', [
-        ('uint16_t', 'command', ''), ('uint8_t', 'result', ''), None,
-        ('uint8_t', 'progress', ''), ('int32_t', 'result_param2', ''),
-        ('uint8_t', 'target_system', ''), ('uint8_t', 'target_component', '')]),
-    396: ('COMPONENT_INFORMATION_BASIC', [
-        ('uint32_t', 'time_boot_ms', 'units="ms"'),
-        ('uint64_t', 'capabilities', 'enum="MAV_PROTOCOL_CAPABILITY" display="bitmask"'),
-        ('uint32_t', 'time_manufacture_s', 'units="s"'),
-        ('char[32]', 'vendor_name', ''), ('char[32]', 'model_name', ''),
-        ('char[24]', 'software_version', ''), ('char[24]', 'hardware_version', ''),
-        ('char[32]', 'serial_number', '')]),
-    440: ('ILLUMINATOR_STATUS', [
-        ('uint32_t', 'uptime_ms', 'units="ms"'), ('uint8_t', 'enable', ''),
-        ('uint8_t', 'mode_bitmask', 'enum="ILLUMINATOR_MODE"'),
-        ('uint32_t', 'error_status', 'enum="ILLUMINATOR_ERROR_FLAGS" display="bitmask"'),
-        ('uint8_t', 'mode', 'enum="ILLUMINATOR_MODE"'), ('float', 'brightness', 'units="%"'),
-        ('float', 'strobe_period', 'units="s"'), ('float', 'strobe_duty_cycle', 'units="%"'),
-        ('float', 'temp_c', ''), ('float', 'min_strobe_period', 'units="s"'),
-        ('float', 'max_strobe_period', 'units="s"')]),
+# Message id, name and fields, in the order of common.xml; a bar before the extension fields.
+DEFINITIONS = {
+    0: ('HEARTBEAT', 'uint8_t type, uint8_t autopilot, uint8_t base_mode, uint32_t custom_mode, '
+        'uint8_t system_status, uint8_t_mavlink_version mavlink_version'),
+    75: ('COMMAND_INT', 'uint8_t target_system, uint8_t target_component, uint8_t frame, '
+         'uint16_t command, uint8_t current, uint8_t autocontinue, float param1, float param2, '
+         'float param3, float param4, int32_t x, int32_t y, float z'),
+    76: ('COMMAND_LONG', 'uint8_t target_system, uint8_t target_component, uint16_t command, '
+         'uint8_t confirmation, float param1, float param2, float param3, float param4, '
+         'float param5, float param6, float param7'),
+    77: ('COMMAND_ACK', 'uint16_t command, uint8_t result, |, uint8_t progress, '
+         'int32_t result_param2, uint8_t target_system, uint8_t target_component'),
+    396: ('COMPONENT_INFORMATION_BASIC', 'uint32_t time_boot_ms, uint64_t capabilities, '
+          'uint32_t time_manufacture_s, char[32] vendor_name, char[32] model_name, '
+          'char[24] software_version, char[24] hardware_version, char[32] serial_number'),
+    440: ('ILLUMINATOR_STATUS', 'uint32_t uptime_ms, uint8_t enable, uint8_t mode_bitmask, '
+          'uint32_t error_status, uint8_t mode, float brightness, float strobe_period, '
+          'float strobe_duty_cycle, float temp_c, float min_strobe_period, '
+          'float max_strobe_period'),
 }
 LIGHT = Address(1, 243)
-ENUMS = ('MAV_PROTOCOL_CAPABILITY', 'ILLUMINATOR_MODE', 'ILLUMINATOR_ERROR_FLAGS')
 
 
 @cache
@@ -93,19 +75,17 @@ def reference() -> Any:
 
 
 def _xml() -> str:
-    def field(definition: tuple[str, str, str] | None) -> str:
-        if definition is None:
+    def field(definition: str) -> str:
+        if definition == '|':
             return '<extensions/>'
-        type_, name, more = definition
-        return f'<field type="{type_}" name="{name}" {more}>-</field>'
+        type_, name = definition.split(' ')
+        return f'<field type="{type_}" name="{name}">-</field>'
 
-    enums = ''.join(
-        f'<enum name="{name}"><entry value="1" name="{name}_ONE"/></enum>' for name in ENUMS)
     messages = ''.join(
         f'<message id="{id_}" name="{name}"><description>-</description>'
-        f'{"".join(map(field, fields))}</message>'
+        f'{"".join(map(field, fields.split(", ")))}</message>'
         for id_, (name, fields) in DEFINITIONS.items())
-    return (f'<mavlink><version>3</version><dialect>0</dialect><enums>{enums}</enums>'
+    return (f'<mavlink><version>3</version><dialect>0</dialect>'
             f'<messages>{messages}</messages></mavlink>')
 
 
