@@ -163,33 +163,26 @@ class Configuration:
 
         :param step: whether a light's own rounding is passed over; float32's always is.
         """
-        percent = PERCENT_STEP if step else 0.0
-        period = PERIOD_STEP if step else FLOAT32_STEP
-        same = {
-            'mode': self.mode == other.mode,
-            'brightness': math.isclose(self.brightness, other.brightness,
-                                       rel_tol=FLOAT32_STEP, abs_tol=percent),
-            'strobe_period': math.isclose(self.strobe_period, other.strobe_period,
-                                          rel_tol=period, abs_tol=SHORTEST_PERIOD),
-            'strobe_duty_cycle': math.isclose(self.strobe_duty_cycle, other.strobe_duty_cycle,
-                                              rel_tol=FLOAT32_STEP, abs_tol=percent),
-        }
-        return [name for name, is_same in same.items() if not is_same]
+        percent = FLOAT32_STEP, PERCENT_STEP if step else 0.0
+        period = PERIOD_STEP if step else FLOAT32_STEP, SHORTEST_PERIOD
+        steps = {'brightness': percent, 'strobe_period': period, 'strobe_duty_cycle': percent}
+        return [*([] if self.mode == other.mode else ['mode']),
+                *(name for name, (relative, absolute) in steps.items() if not math.isclose(
+                    getattr(self, name), getattr(other, name), rel_tol=relative,
+                    abs_tol=absolute))]
 
     def describe(self, names: list[str] | None = None) -> str:
         """Return some or all of the fields for people, with units."""
-        texts = {
-            'mode': f'mode {self.mode.label}',
-            'brightness': f'brightness {self.brightness:g} %',
-            'strobe_period': f'strobe_period {self.strobe_period:g} s',
-            'strobe_duty_cycle': f'strobe_duty_cycle {self.strobe_duty_cycle:g} %',
-        }
-        return ', '.join(texts[name] for name in names or texts)
+        return ', '.join(
+            f'mode {self.mode.label}' if name == 'mode'
+            else f'{name} {getattr(self, name):g} {_NUMBERS[name][0]}'
+            for name in names or FIELDS)
 
 
 FIELDS = ('mode', 'brightness', 'strobe_period', 'strobe_duty_cycle')
-_UPPER = {'brightness': 100.0, 'strobe_period': MAX_STROBE_PERIOD, 'strobe_duty_cycle': 100.0}
-_UNITS = {'brightness': '%', 'strobe_period': 's', 'strobe_duty_cycle': '%'}
+# Unit and upper limit of the fields that are numbers.
+_NUMBERS = {'brightness': ('%', 100.0), 'strobe_period': ('s', MAX_STROBE_PERIOD),
+            'strobe_duty_cycle': ('%', 100.0)}
 
 
 def checked(name: str, value: Any, limits: Limits | None = None) -> Mode | float:
@@ -208,12 +201,11 @@ def checked(name: str, value: Any, limits: Limits | None = None) -> Mode | float
         return MODES[value]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidValue(f'{name} {reprlib.repr(value)} is not a number')
-    unit = _UNITS[name]
+    unit, upper = _NUMBERS[name]
     if not math.isfinite(value):
         raise InvalidValue(f'{name} {value} is not a finite number')
-    if not 0 <= value <= _UPPER[name]:
-        raise InvalidValue(
-            f'{name} {value:g} {unit} is out of range: 0 to {_UPPER[name]:g} {unit}')
+    if not 0 <= value <= upper:
+        raise InvalidValue(f'{name} {value:g} {unit} is out of range: 0 to {upper:g} {unit}')
     if name == 'strobe_period':
         _check_period(float(value), limits)
     return float(value)

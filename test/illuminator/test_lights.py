@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.illuminator.client import MAX_ASKED
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Status
@@ -114,10 +113,10 @@ def test_a_light_is_found_before_its_next_heartbeat_when_the_link_is_open_again(
 
 def test_a_link_that_is_open_again_is_not_filled_with_requests() -> None:
     pair = Pair([IlluminatorProperties(address=Address(1, 1 + i))
-                 for i in range(3 * MAX_ASKED)]).settle()
+                 for i in range(24)]).settle()
     pair.close()
     pair.open()
-    assert len(pair.commands(REQUEST, since=pair.now)) == MAX_ASKED
+    assert len(pair.commands(REQUEST, since=pair.now)) == 8
 
 
 # Restarts
