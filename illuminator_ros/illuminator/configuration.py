@@ -91,7 +91,7 @@ class Pending:
     :param due: when they are sent next, s.
     """
 
-    values: dict[str, Any]
+    values: dict[str, object]
     origin: Origin
     due: float
     attempts: int = 0
@@ -176,7 +176,7 @@ class ConfigurationManager:
 
     # Requests
 
-    def configure(self, changes: Mapping[str, Any], now: float, done: Done) -> None:
+    def configure(self, changes: Mapping[str, object], now: float, done: Done) -> None:
         """
         Change some fields with one command; the light is connected.
 
@@ -217,7 +217,7 @@ class ConfigurationManager:
         self._setpoint = brightness
         self.poll(now, connected=True)
 
-    def set_desired(self, values: Mapping[str, Any], now: float) -> None:
+    def set_desired(self, values: Mapping[str, object], now: float) -> None:
         """
         Have values sent as soon as the light has reported its configuration.
 
@@ -226,14 +226,14 @@ class ConfigurationManager:
         self._want({**(self._pending.values if self._pending else {}), **values},
                    self._pending.origin if self._pending else Origin.OVERRIDE, now)
 
-    def _undo(self, values: Mapping[str, Any], origin: Origin, due: float) -> None:
+    def _undo(self, values: Mapping[str, object], origin: Origin, due: float) -> None:
         """Have values sent that another sender has changed, after those that already wait."""
         pending = self._pending
         self._pending = Pending(
             {**values, **(pending.values if pending else {})},
             pending.origin if pending else origin, due)
 
-    def _want(self, values: dict[str, Any], origin: Origin, now: float) -> None:
+    def _want(self, values: dict[str, object], origin: Origin, now: float) -> None:
         wait = 0.0 if self.confirmed else STATUS_TIMEOUT
         self._pending = Pending(values, origin, now + wait)
 
@@ -255,7 +255,7 @@ class ConfigurationManager:
             if not self._pending.values:
                 self._pending = None
 
-    def _checked(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+    def _checked(self, changes: Mapping[str, object]) -> dict[str, object]:
         return {name: checked(name, value, self._limits) for name, value in changes.items()}
 
     def _goal(self, values: Mapping[str, Any]) -> Configure:

@@ -185,7 +185,7 @@ _NUMBERS = {'brightness': ('%', 100.0), 'strobe_period': ('s', MAX_STROBE_PERIOD
             'strobe_duty_cycle': ('%', 100.0)}
 
 
-def checked(name: str, value: Any, limits: Limits | None = None) -> Mode | float:
+def checked(name: str, value: object, limits: Limits | None = None) -> Mode | float:
     """
     Return the value of a configuration field, ready to be sent.
 
@@ -233,7 +233,7 @@ class SafetyLimits:
     max_brightness: float = 100.0
     min_strobe_period: float = 0.0
 
-    def check(self, name: str, value: Any) -> None:
+    def check(self, name: str, value: object) -> None:
         """
         Check the value of a field that :func:`checked` has returned.
 

@@ -24,7 +24,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 import math
-from typing import Any
 
 from .messages import IlluminatorStatus, STATUS_ID
 from .model import (
@@ -245,7 +244,7 @@ class SimulatedIlluminator(SimulatedDevice):
         if self.behaviour.brightness_is_switch:
             self.enabled = configuration.brightness > 0
 
-    def press(self, now: float, *, enabled: bool | None = None, **changes: Any) -> Change:
+    def press(self, now: float, *, enabled: bool | None = None, **changes: object) -> Change:
         """
         Return the change that a button on the light makes.
 

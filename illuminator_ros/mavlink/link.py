@@ -28,7 +28,7 @@ import socket
 import struct
 import threading
 import time
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .component import Endpoint
 from .connector import Connector
@@ -351,7 +351,7 @@ class Link:
             self._snapshot_due = now + SNAPSHOT_INTERVAL
             self._due = min(self._due, self._snapshot_due)
 
-    def _serve(self, handle: Any, events: int) -> None:
+    def _serve(self, handle: object, events: int) -> None:
         assert self._channel is not None
         try:
             if events & selectors.EVENT_WRITE:
@@ -520,7 +520,7 @@ class Link:
         self._receiver.clear()
         self._router.clear()
 
-    def _safe_call(self, function: Callable[..., None], *arguments: Any) -> None:
+    def _safe_call(self, function: Callable[..., None], *arguments: object) -> None:
         """Call what is not ours: its fault must not end the thread."""
         try:
             function(*arguments)

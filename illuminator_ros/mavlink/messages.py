@@ -28,7 +28,7 @@ from dataclasses import dataclass, fields
 from enum import IntEnum
 from operator import attrgetter, itemgetter
 import struct
-from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
+from typing import Annotated, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import common
@@ -66,11 +66,11 @@ class Layout(NamedTuple):
 
 class _Codec(NamedTuple):
     pack: Callable[..., bytes]
-    unpack: Callable[[bytes], tuple[Any, ...]]
+    unpack: Callable[[bytes], tuple[object, ...]]
     # Returns the values of a message in wire order.
-    values: Callable[[Message], tuple[Any, ...]]
+    values: Callable[[Message], tuple[object, ...]]
     # Returns values in wire order in the order of the fields.
-    arguments: Callable[[tuple[Any, ...]], tuple[Any, ...]]
+    arguments: Callable[[tuple[object, ...]], tuple[object, ...]]
     size: int
 
 

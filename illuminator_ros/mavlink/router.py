@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import math
-from typing import Any
 
 from .messages import Address
 from .transport import Peer
@@ -69,7 +68,7 @@ class Router:
                 return
         ways[peer] = now
 
-    def towards(self, message: Any, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
+    def towards(self, message: object, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
         """Return those of the peers that lead to the message's target, all where none does."""
         system = getattr(message, 'target_system', 0)
         if not system or len(peers) < 2:

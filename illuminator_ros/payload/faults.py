@@ -132,15 +132,15 @@ class Fault:
     field: str
     description: str
     metavar: str = ''
-    read: Callable[[str], Any] | None = None
-    default: Any = True
+    read: Callable[[str], object] | None = None
+    default: object = True
 
     @property
     def default_text(self) -> str:
         """Return the default value for people, '' if the fault has no value."""
         return (self.text(self.default) or 'for ever') if self.read else ''
 
-    def text(self, value: Any) -> str:
+    def text(self, value: object) -> str:
         """Return a value as it is typed, '' if there is none to type."""
         if self.read is None or value == math.inf:
             return ''

@@ -32,7 +32,7 @@ class Setting:
 
     metavar: str
     help: str  # noqa: A003
-    read: Callable[[str], Any]
+    read: Callable[[str], object]
     adds: bool = False
 
 

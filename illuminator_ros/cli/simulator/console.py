@@ -71,7 +71,7 @@ def describe_commands(devices: Iterable[type[SimulatedDevice]]) -> str:
 
 def _bound(component: Component) -> dict[str, tuple[ConsoleCommand[Any, Any], Execute]]:
     """Return the commands of a component by name, each with the function that executes it."""
-    def apply(command: ConsoleCommand[Any, Change], words: list[str], now: float) -> None:
+    def apply(command: ConsoleCommand[object, Change], words: list[str], now: float) -> None:
         component.apply(command.do(component.device, words, now), now)
 
     return {

@@ -113,9 +113,9 @@ def _listed(entries: Any, path: str, kind: SimulatedType[Any]) -> Iterator[Liste
 
 def _read(
     content: Mapping[Any, Any], others: tuple[str, ...], path: str, types: Types,
-) -> dict[str, dict[str, Any]]:
+) -> dict[str, dict[str, object]]:
     """Return the settings for each type that has them; the key ``faults`` is a setting, too."""
-    result: dict[str, dict[str, Any]] = {one.noun: {} for one in types}
+    result: dict[str, dict[str, object]] = {one.noun: {} for one in types}
     for key, value in content.items():
         name = 'fault' if key == 'faults' else key
         having = [one for one in types if name in one.all_settings and key != 'fault']
@@ -129,7 +129,7 @@ def _read(
     return result
 
 
-def _as_text(value: Any) -> str:
+def _as_text(value: object) -> str:
     if isinstance(value, Mapping):
         return ','.join(str(key) if one is True or one is None else f'{key}={one}'
                         for key, one in value.items())
@@ -186,7 +186,7 @@ def _given(options: argparse.Namespace, kind: SimulatedType[Any]) -> dict[str, A
 
 def _of_type(
     options: argparse.Namespace, file: Scenario, kind: SimulatedType[Any],
-    given: Mapping[str, Any],
+    given: Mapping[str, object],
 ) -> list[Listed]:
     listed = file.listed.get(kind.noun, [])
     if named := getattr(options, kind.noun):

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import functools
 import itertools
-from typing import Any
 
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float32, String
@@ -228,13 +227,13 @@ class LightNode:
             light.set_brightness(brightness, now, source=source)
 
     # The value of a parameter is of any type.
-    def _check_value(self, name: str, value: Any) -> None:
+    def _check_value(self, name: str, value: object) -> None:
         light = self._light()
         self._client.settings.limits.check(
             name, checked(name, value, light.limits if light else None))
 
     def _configure(
-        self, changes: Mapping[str, Any], now: float, answer: Callable[[str], None],
+        self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
     ) -> None:
         def done(result: Result, now: float) -> None:
             if result.note:
@@ -265,9 +264,9 @@ class LightNode:
         return LightsHeard(len(client.lights), tuple(some), client.limit_reached)
 
 
-def _checked(overrides: Mapping[str, Any], limits: SafetyLimits) -> dict[str, Any]:
+def _checked(overrides: Mapping[str, object], limits: SafetyLimits) -> dict[str, object]:
     try:
-        values: dict[str, Any] = {
+        values: dict[str, object] = {
             name: checked(name, value) for name, value in overrides.items()}
         for name, value in values.items():
             limits.check(name, value)

@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 import functools
 import logging
 import math
-from typing import Any
 
 from rclpy.node import Node
 from std_msgs.msg import Bool
@@ -51,7 +50,7 @@ from ...payload.request import Result
 from ...ros.link_call import LatestOnly
 from ...ros.log import NodeLog
 from ...ros.node import Answer, CommandTopic, RequestService
-from ...ros.parameters import misspelt
+from ...ros.parameters import misspelt, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 # s without a light until the log gives the reason, once.
@@ -160,7 +159,7 @@ class Lights(ServedPayload):
         else:
             answer(False, self._first.absence(now))
 
-    def _switch_all(self, on: bool, now: float, ended: Any) -> None:
+    def _switch_all(self, on: bool, now: float, ended: Callable[[float], None]) -> None:
         def answer(success: bool, message: str) -> None:
             if not success:
                 self._host.log.warning(f'~/cmd/enable_all: {message}', 'cmd/enable_all')
@@ -216,7 +215,7 @@ class Lights(ServedPayload):
                 node.close()
 
 
-def _make_client(commands: CommandSender, values: Mapping[str, Any]) -> IlluminatorClient:
+def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:
     return IlluminatorClient(
         commands, settings(values), wanted=Selection(values, 'illuminator').is_served)
 

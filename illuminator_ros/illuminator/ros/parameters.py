@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import math
 import re
 import reprlib
-from typing import Any
 
 from rclpy.node import Node
 
@@ -29,7 +28,13 @@ from ..light import Settings
 from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ..sources import DEFAULT, SourceSettings
 from ...mavlink.messages import Address
-from ...ros.parameters import declare_read_only, given_parameters, ParameterError, ParameterSpec
+from ...ros.parameters import (
+    declare_read_only,
+    given_parameters,
+    ParameterError,
+    ParameterSpec,
+    Values,
+)
 
 LIGHT_PARAMETERS = (
     ParameterSpec('target_system', 0, 'system id of the light to serve; 0 = any', low=0,
@@ -94,7 +99,7 @@ class BeamGeometry:
     beam_angle: float
 
     @classmethod
-    def of(cls, values: Mapping[str, Any]) -> BeamGeometry:
+    def of(cls, values: Values) -> BeamGeometry:
         """Return the one that parameters give."""
         return cls(*(values[name] for name in _GEOMETRY))
 
@@ -117,7 +122,7 @@ def ignored_parameters(node: Node, first: Node) -> list[str]:
             and parameter.value != first.get_parameter(name).value]
 
 
-def settings(values: Mapping[str, Any]) -> Settings:
+def settings(values: Values) -> Settings:
     """
     Return how lights are treated.
 
@@ -130,7 +135,7 @@ def settings(values: Mapping[str, Any]) -> Settings:
                     _source_settings(values))
 
 
-def _source_settings(values: Mapping[str, Any]) -> SourceSettings | None:
+def _source_settings(values: Values) -> SourceSettings | None:
     names = values['sources']
     timeout, off = values['source_timeout'], values['on_release'] == 'off'
     if not names:
@@ -169,7 +174,7 @@ class Selection:
     :raises ParameterError: if ``names`` is wrong.
     """
 
-    def __init__(self, values: Mapping[str, Any], first: str) -> None:
+    def __init__(self, values: Values, first: str) -> None:
         self._target = Address(values['target_system'], values['target_component'])
         self._only_target = bool(values['only_target'])
         self._first = first

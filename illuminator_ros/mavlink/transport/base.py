@@ -20,7 +20,6 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Hashable, Iterator, Sequence
 import selectors
-from typing import Any
 
 # The origin of received bytes, to which an answer can be sent.
 Peer = Hashable
@@ -52,7 +51,7 @@ class Channel(ABC):
         """Register its descriptors with the selector."""
 
     @abstractmethod
-    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """
         Read from a registered handle; return bytes with their origin.
 
@@ -82,7 +81,7 @@ class Channel(ABC):
         :raises ChannelLost: if the channel is closed.
         """
 
-    def writable(self, handle: Any) -> None:  # noqa: B027 - only queues have something to do
+    def writable(self, handle: object) -> None:  # noqa: B027 - only queues have something to do
         """Continue sending on a registered handle that is writable."""
 
     @abstractmethod

@@ -20,7 +20,6 @@ from collections.abc import Iterator, Sequence
 import selectors
 import socket
 import threading
-from typing import Any
 
 from .base import Channel, Peer
 from ..url import MemoryUrl
@@ -49,7 +48,7 @@ class _MemoryChannel(Channel):
     def register(self, selector: selectors.BaseSelector) -> None:
         selector.register(self._inbox, selectors.EVENT_READ)
 
-    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         try:
             while True:
                 yield None, self._inbox.recv(65536)

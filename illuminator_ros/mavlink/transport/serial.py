@@ -22,7 +22,7 @@ import errno
 import os
 import selectors
 import termios
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from .base import Channel, ChannelLost, FrameQueue, Peer
 from ..url import SerialUrl
@@ -74,7 +74,7 @@ class _SerialChannel(Channel):
         self._selector = selector
         selector.register(self._fd, selectors.EVENT_READ)
 
-    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         try:
             data = os.read(self._fd, READ_SIZE)
         except BlockingIOError:
@@ -93,7 +93,7 @@ class _SerialChannel(Channel):
         self.dropped += sum(self._queue.put(frame) for frame in frames)
         self.writable(self._fd)
 
-    def writable(self, handle: Any) -> None:
+    def writable(self, handle: object) -> None:
         try:
             while self._queue:
                 self._queue.written(os.write(self._fd, self._queue.head()))

@@ -95,7 +95,7 @@ class TcpClient(Channel):
         self._selector = selector
         selector.register(self._stream.socket, selectors.EVENT_READ)
 
-    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         try:
             data = self._stream.receive()
@@ -119,7 +119,7 @@ class TcpClient(Channel):
             raise ChannelLost(error.errno, error.strerror) from None
         self._stream.watch(self._selector)
 
-    def writable(self, handle: Any) -> None:
+    def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""
         try:
             self._stream.flush()
@@ -228,7 +228,7 @@ class TcpServer(Channel):
             self._selector.unregister(connection)
             connection.close()
 
-    def heard(self, peer: Any, now: float) -> bool:
+    def heard(self, peer: object, now: float) -> bool:
         """See :meth:`Channel.heard`."""
         self._now = now
         new = peer in self._clients and peer not in self._heard
@@ -246,7 +246,7 @@ class TcpServer(Channel):
         for peer in peers:
             self._write(peer, frames)
 
-    def writable(self, handle: Any) -> None:
+    def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""
         self._write(handle, ())
 

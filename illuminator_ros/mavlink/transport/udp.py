@@ -87,12 +87,12 @@ class UdpChannel(Channel):
     def _hears_all(self) -> bool:
         return self._remote is None or bool(self._broadcast)
 
-    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         receive = self._socket.recvfrom
         # Datagrams of one peer are decoded together, at a third of the cost. The first is decoded
         # alone: it is mostly the only one, and an answer may wait for it.
-        sender: Any = None
+        sender: object = None
         datagrams: list[bytes] = []
         lost = None
         self.more = True
@@ -121,7 +121,7 @@ class UdpChannel(Channel):
         if lost:
             raise lost
 
-    def _heard_of(self, peer: Any, datagrams: list[bytes]) -> Iterator[tuple[Peer, bytes]]:
+    def _heard_of(self, peer: object, datagrams: list[bytes]) -> Iterator[tuple[Peer, bytes]]:
         if datagrams and (self._hears_all or _same_host(peer, self._remote)):
             yield peer, b''.join(datagrams)
 
