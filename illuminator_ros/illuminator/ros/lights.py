@@ -91,7 +91,8 @@ class Lights(ServedPayload):
             self._forget(event.address)
         elif node is not None:
             if isinstance(event, LightRestarted):
-                self._forgive_loss(event.address)
+                # Its sequence numbers have restarted, which is not a loss.
+                self._host.link.reset_loss(event.address)
             node.take(event)
         elif isinstance(event, LightConnected | StatusReceived):
             self._serve(event.address)
@@ -143,10 +144,6 @@ class Lights(ServedPayload):
                 self._host.log.info(f'light {address} was silent for long: {node.full_name} '
                                     'is removed', 'forgotten')
             self._host.nodes.remove(address)
-
-    def _forgive_loss(self, address: Address) -> None:
-        """Do not count the restarted sequence numbers of a light as loss."""
-        self._host.link.reset_loss(address)
 
     # Requests to all lights
 
