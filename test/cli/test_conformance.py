@@ -33,11 +33,13 @@ from support.waiting import eventually, PATIENCE
 
 Start = Callable[..., Program]
 
+CONFORMANCE = 'support.quick_conformance'
+
 # Started like this, a program can import only what `pip install` brings.
 WITHOUT_ROS = (
     'import sys, support.no_ros\n'
     'sys.modules.update(dict.fromkeys(["yaml", "serial"]))\n'
-    'from illuminator_ros.{0} import main\n'
+    'from {0} import main\n'
     'sys.exit(main(sys.argv[1:]))\n')
 # s; a whole run takes about 30.
 WHOLE_RUN = 300.0
@@ -56,9 +58,8 @@ def start() -> Iterator[Start]:
     started = []
 
     def one(module: str, *arguments: str, **env: str) -> Program:
-        path = os.pathsep.join((str(ROOT), str(ROOT / 'test')))
-        started.append(Program(sys.executable, '-c', WITHOUT_ROS.format(module), *arguments,
-                               env={'PYTHONPATH': path, **env}))
+        started.append(Program(
+            sys.executable, '-c', WITHOUT_ROS.format(module), *arguments, env=env))
         return started[-1]
 
     yield one
@@ -70,7 +71,7 @@ def start() -> Iterator[Start]:
 def simulate(start: Start, url: str) -> Start:
     """Return a function that starts a simulator on the URL."""
     def one(*arguments: str, **env: str) -> Program:
-        program = start('simulator', f'udpin://{url}', *arguments, **env)
+        program = start('illuminator_ros.simulator', f'udpin://{url}', *arguments, **env)
         program.wait_for('link open')
         return program
     return one
@@ -78,7 +79,7 @@ def simulate(start: Start, url: str) -> Start:
 
 def shell(command: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        f'{sys.executable} -m illuminator_ros.conformance {command}', shell=True, cwd=ROOT,
+        f'{sys.executable} -m {CONFORMANCE} {command}', shell=True, cwd=ROOT,
         env=environment({'PYTHONUNBUFFERED': ''}), text=True, capture_output=True,
         timeout=PATIENCE)
 
@@ -89,7 +90,7 @@ def test_a_whole_run_ends_and_its_reports_agree(
     # Without a virtual clock a busy machine may make the simulator slow, so FAIL is possible.
     simulate()
     program = start(
-        'conformance', f'udpout://{url}', '--yes', '--heat', '0', '--junit',
+        CONFORMANCE, f'udpout://{url}', '--yes', '--heat', '0', '--junit',
         str(tmp_path / 'report.xml'), '--json', str(tmp_path / 'report.json'))
     status = program.wait(WHOLE_RUN)
 
@@ -108,7 +109,7 @@ def test_a_whole_run_ends_and_its_reports_agree(
 
 def test_a_failed_requirement_ends_with_status_1(url: str, start: Start, simulate: Start) -> None:
     simulate('--fault', 'refuse=failed')
-    program = start('conformance', f'udpout://{url}', '--only', 'brightness', '--only', 'on')
+    program = start(CONFORMANCE, f'udpout://{url}', '--only', 'brightness', '--only', 'on')
 
     assert program.wait() == 1
     assert 'FAIL    brightness ' in program.log
@@ -120,7 +121,7 @@ def test_a_failed_requirement_ends_with_status_1(url: str, start: Start, simulat
 def test_a_signal_restores_the_light_and_ends_with_status_1(
         url: str, start: Start, simulate: Start, number: int) -> None:
     simulator = simulate()
-    program = start('conformance', f'udpout://{url}', *LONG)
+    program = start(CONFORMANCE, f'udpout://{url}', *LONG)
     simulator.wait_for('ON     100 %')
     program.send(number)
     program.wait_for('restoring the light')
@@ -136,7 +137,7 @@ def test_a_signal_restores_the_light_and_ends_with_status_1(
 def test_a_second_signal_ends_at_once_and_says_that_the_light_is_changed(
         url: str, start: Start, simulate: Start) -> None:
     simulator = simulate()
-    program = start('conformance', f'udpout://{url}', *LONG)
+    program = start(CONFORMANCE, f'udpout://{url}', *LONG)
     simulator.wait_for('ON     100 %')
     program.send(signal.SIGINT)
     program.wait_for('restoring the light')
@@ -147,7 +148,7 @@ def test_a_second_signal_ends_at_once_and_says_that_the_light_is_changed(
 
 
 def test_a_signal_before_a_light_is_found_speaks_of_no_restoring(url: str, start: Start) -> None:
-    program = start('conformance', f'udpin://{url}')
+    program = start(CONFORMANCE, f'udpin://{url}')
     program.wait_for('checking the light')
     program.send(signal.SIGTERM)
 
@@ -158,7 +159,7 @@ def test_a_signal_before_a_light_is_found_speaks_of_no_restoring(url: str, start
 
 def test_a_closed_terminal_leaves_the_light_as_it_was(url: str, simulate: Start) -> None:
     simulator = simulate()
-    with on_terminal('illuminator_ros.conformance', f'udpout://{url}', *LONG) as (process, master):
+    with on_terminal(CONFORMANCE, f'udpout://{url}', *LONG) as (process, master):
         simulator.wait_for('ON     100 %')
         os.close(master)
         process.send_signal(signal.SIGHUP)
@@ -168,7 +169,7 @@ def test_a_closed_terminal_leaves_the_light_as_it_was(url: str, simulate: Start)
 
 def test_under_nohup_a_run_ignores_sighup(url: str) -> None:
     program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
-                      'illuminator_ros.conformance', f'udpout://{url}', '--yes')
+                      CONFORMANCE, f'udpout://{url}', '--yes')
     program.wait_for('checking the light')
     status = Path(f'/proc/{program.pid}/status').read_text()
     program.kill()
@@ -196,7 +197,7 @@ def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirec
 def test_a_name_that_the_encoding_lacks_is_escaped(
         url: str, start: Start, simulate: Start) -> None:
     simulate('--vendor', 'Müller')
-    program = start('conformance', f'udpout://{url}', '--only', 'information-request',
+    program = start(CONFORMANCE, f'udpout://{url}', '--only', 'information-request',
                     PYTHONIOENCODING='ascii')
 
     assert program.wait() == 0
@@ -214,7 +215,7 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
 ) -> None:
     if used:
         simulate()
-    program = start('conformance', link.format(url=url), '--wait', '0.5')
+    program = start(CONFORMANCE, link.format(url=url), '--wait', '0.5')
 
     assert program.wait() == status
     assert reason in program.log
@@ -248,7 +249,7 @@ def test_a_check_that_needs_consent_asks_after_it_named_the_lights_on_the_link(
         url: str, simulate: Start, only: str, answers: list[str], reply: str) -> None:
     simulate('--light', '1/7', '--light', '1/8')
     status, seen = conversation(
-        'illuminator_ros.conformance', f'udpout://{url}', '--target', '1/8', '--only', only,
+        CONFORMANCE, f'udpout://{url}', '--target', '1/8', '--only', only,
         '--only', 'address', answers=[('[y/N]', answer) for answer in answers])
 
     announced, question, answered = seen.partition('May light 1/8 strobe')

@@ -42,8 +42,6 @@ from support.waiting import eventually, PATIENCE
 LIGHT = Address(1, 243)
 # s of the slow clock between statuses: ten in a real second.
 STREAM = 0.1 * SPEED
-# s
-AFTER_REFUSAL = 0.3
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 
 
@@ -151,8 +149,6 @@ class ServedLight:
         self.fake.pushes = True
         self.fake.answers.add(STATUS_ID)
         self.fake.stream = STREAM
-        # A command that follows a refusal sooner waits for late copies of that.
-        CLOCK.forward(AFTER_REFUSAL)
 
     def do(self, action: Callable[[float], Any]) -> Any:
         """Have ``action(now)`` called in the light's thread and return what it returns."""

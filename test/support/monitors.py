@@ -35,7 +35,7 @@ from illuminator_ros.cli.monitor.model import Light, Outcome
 from illuminator_ros.cli.monitor.run import Monitor
 from rclpy.node import Node
 from support.light import eventually
-from support.processes import environment, prepare_child, ROOT, slow_environment
+from support.processes import environment, prepare_child, ROOT
 from support.ros import Ros
 from support.slow import CLOCK
 from support.waiting import PATIENCE
@@ -110,7 +110,7 @@ class Terminal:
                  **(env or {})}
         self._process = subprocess.Popen(
             ['sh', '-mc', shell, 'sh', sys.executable, '-m', 'support.slow_program', module,
-             *arguments], cwd=ROOT, env=environment({**slow_environment(), **given}),
+             *arguments], cwd=ROOT, env=environment({**CLOCK.environment, **given}),
             stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
             preexec_fn=_own_terminal)
         self._grown = threading.Condition()

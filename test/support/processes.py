@@ -156,7 +156,7 @@ def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
     return {
         **os.environ, 'HOME': home, 'ROS_HOME': f'{home}/.ros', 'ROS_LOG_DIR': f'{home}/log',
         'PYTHONPATH': os.pathsep.join(
-            filter(None, (str(ROOT), os.environ.get('PYTHONPATH')))),
+            filter(None, (str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **(more or {})}
 
 
@@ -165,18 +165,11 @@ def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -
     return Program(sys.executable, '-m', module, *arguments, env=env)
 
 
-def slow_environment() -> dict[str, str]:
-    """Return what :mod:`support.slow_program` needs of an environment."""
-    from support.slow import CLOCK
-    return {'PYTHONPATH': os.pathsep.join(filter(None, (
-        str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))), **CLOCK.environment}
-
-
 def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
     """Start a module of ours that lives by the tests' slow clock, see :mod:`support.slow`."""
-    return Program(
-        sys.executable, '-m', 'support.slow_program', module, *arguments,
-        env={**slow_environment(), **(env or {})})
+    from support.slow import CLOCK
+    return python('support.slow_program', module, *arguments,
+                  env={**CLOCK.environment, **(env or {})})
 
 
 def run(

@@ -107,10 +107,10 @@ def test_light_that_requires_signing_is_recognised_while_signing_is_off(
     with (running_bridge(own_ros.domain, port) as bridge,
           running_simulator(f'udpout://127.0.0.1:{port}', '--signing-mode', 'require',
                             '--signing-key-file', key_file(SECRET))):
-        bridge.wait_for('light 1/243 connected')
+        pass_time_until(lambda: bridge.count('light 1/243 connected'), step=0.1)
         diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
 
         pass_time_until(lambda: any(
             'commands are not answered' in array.status[0].message
             and 'signing_mode is off' in array.status[0].message
-            for array in list(diagnostics.messages)), step=0.02)
+            for array in list(diagnostics.messages)))

@@ -16,7 +16,6 @@
 
 from collections.abc import Iterator
 import json
-from pathlib import Path
 
 import pytest
 from support.machines import CannotBeMade, Machine, two_machines
@@ -51,8 +50,7 @@ def test_client_on_another_machine_uses_topics_services_and_parameters_of_the_br
                              f'connection_url:=udpin://{listening}:14590', env=env)) as bridge,
           ended(light.python('illuminator_ros.simulator', f'udpout://{sending}:14590'))):
         bridge.wait_for('light 1/243 connected')
-        client = station.python('support.distant_client', str(domain), env={
-            **env, 'PYTHONPATH': str(Path(__file__).parents[1])})
+        client = station.python('support.distant_client', str(domain), env=env)
         try:
             assert client.wait(120.0) == 0, f'{client.log}\n{bridge.log}'
         finally:

@@ -67,7 +67,7 @@ LIGHT_PARAMETERS = (
                   'limit of the strobe period that is sent; 0 = none', 's', 0.0,
                   MAX_STROBE_PERIOD),
     ParameterSpec('off_after_silence', 0.0,
-                  'silence of all sources after which a light is switched off; 0 = never', 's',
+                  'silence of all sources that switches a light off; 0 = never', 's',
                   0.0, 3600.0),
     ParameterSpec('external_changes', 'follow', 'answer to changes by other senders',
                   choices=('follow', 'reassert')),

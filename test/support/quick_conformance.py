@@ -1,0 +1,31 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Run ``conformance`` as users do, but for the time that it listens for other lights."""
+
+import sys
+
+# s; the lights of the tests send a heartbeat each second.
+LISTEN_TIME = 1.5
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run it and return the exit status."""
+    from illuminator_ros.cli.conformance import main, run
+    run.LISTEN_TIME = LISTEN_TIME
+    return main(arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
