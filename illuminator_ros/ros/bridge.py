@@ -26,6 +26,7 @@ import time
 
 from rclpy.node import Node
 
+from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
 from .log import LogForwarder, NodeLog
@@ -90,6 +91,7 @@ class Bridge:
                 mavlink_version=parameters.mavlink_version)
         except ValueError as error:
             raise ParameterError(f'mavlink_version: {error}') from None
+        self._told_of_signing = False
         # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()
@@ -214,6 +216,10 @@ class Bridge:
             self._wake.clear()
 
     def _poll(self, now: float) -> None:
+        if (not self._told_of_signing and self.component.commands.unanswering
+                and self.link.snapshot(now).signing.unchecked):
+            self._told_of_signing = True
+            self.log.warning(f'{SIGNING_NEEDED}: set signing_mode and signing_key_file')
         for payload in self._payloads:
             payload.poll(now)
 

@@ -35,6 +35,9 @@ from ..mavlink.messages import Address
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
+SIGNING_NEEDED = ('commands are not answered, and others sign their frames while signing_mode is '
+                  'off')
+
 # s until the absence of a device is an error.
 DISCOVERY_GRACE = 10.0
 # % of lost frames of a device above which there is a warning.
@@ -197,8 +200,7 @@ def link_findings(
             f'no {what} connected for {format_seconds(waited)}'
             + (f': {absence}' if link.state.is_open else '')))
     if device in link.unanswering and link.unchecked:
-        findings.append((WARN, 'commands are not answered, and others sign their frames while '
-                               'signing_mode is off'))
+        findings.append((WARN, SIGNING_NEEDED))
     loss = link.devices.get(device, {}).get('loss_percent') if device else None
     if isinstance(loss, float) and loss > LOSS_WARNING:
         findings.append((WARN, f'{loss:.0f} % of the frames lost'))

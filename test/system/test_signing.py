@@ -114,3 +114,4 @@ def test_light_that_requires_signing_is_recognised_while_signing_is_off(
             'commands are not answered' in array.status[0].message
             and 'signing_mode is off' in array.status[0].message
             for array in list(diagnostics.messages)))
+        bridge.wait_for('signing_mode is off: set signing_mode and signing_key_file')
