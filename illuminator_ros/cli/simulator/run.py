@@ -82,7 +82,8 @@ class _Simulation:
         threading.Thread(target=self._listen, name='console', daemon=True).start()
         # From here on this thread waits for its terminal while that is stopped.
         self._view.say(self._headline)
-        while not self._ended.is_set():
+        # Lines before a "quit" have answers that may still be queued.
+        while not (self._ended.is_set() and self._texts.empty()):
             self._link.call(self._look)
             with contextlib.suppress(queue.Empty):
                 if (text := self._texts.get(timeout=VIEW_INTERVAL)) is not None:
