@@ -26,7 +26,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.embedded import refusal
 from support.graph import Interface, interface
-from support.light import Address, ServedLight
+from support.light import Address, eventually, ServedLight
 from support.ros import Ros, running_bridge, STREAM
 import yaml
 
@@ -202,9 +202,8 @@ def test_aggregator_takes_all_statuses_of_all_lights_and_no_others(
     with (running_bridge(own_ros.domain, port, diagnostics_period=0.1, target_component=243),
           ServedLight(port), ServedLight(port, Address(1, 244))):
         recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-        seen: set[str] = set()
-        recorder.wait(lambda array: seen.update(
-            status.name for status in array.status) or seen >= names)
+        eventually(lambda: names <= {status.name for array in list(recorder.messages)
+                                     for status in array.status})
 
     assert AGGREGATOR['type'] == 'diagnostic_aggregator/GenericAnalyzer'
     assert all(map(matches, names))

@@ -73,8 +73,9 @@ def test_limits_are_shown_by_descriptors_refuse_parameters_and_clip_streams(own_
 
 def ask(ros: Ros, source: str, on: bool) -> SetBool.Response:
     """Switch the light as a source."""
-    return ros.call(SetBool, f'/illuminator/{source}/enable', SetBool.Request(data=on),
-                    node='/illuminator')
+    answer: SetBool.Response = ros.call(
+        SetBool, f'/illuminator/{source}/enable', SetBool.Request(data=on), node='/illuminator')
+    return answer
 
 
 def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
@@ -124,11 +125,16 @@ def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
 
 def test_silent_source_loses_the_light_while_the_executor_is_blocked(own_ros: Ros) -> None:
     port, released, blocked = free_port(), threading.Event(), threading.Event()
+
+    def block() -> None:
+        blocked.set()
+        released.wait()
+
     with (embedded_bridge(own_ros.domain, port, sources=['safety'], source_timeout=5.0,
                           on_release='off') as process, ServedLight(port) as light):
         Parameters(own_ros).wait(mode='internal_control')
         assert ask(own_ros, 'safety', True).success
-        process.node.create_timer(0.001, lambda: (blocked.set(), released.wait()))
+        process.node.create_timer(0.001, block)
         assert blocked.wait(PATIENCE)
 
         pass_time_until(lambda: light.fake.fields['enable'] == 0)

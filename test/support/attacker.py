@@ -201,8 +201,9 @@ class Attacker:
                                  *(self._float() for _ in range(6)))
 
     def _information(self) -> Any:
-        return ComponentInformationBasic(*map(self._int, (32, 64, 32)),
-                                         *map(self._bytes, (32, 32, 24, 24, 32)))
+        return ComponentInformationBasic(
+            self._int(32), self._int(64), self._int(32),
+            *(self._bytes(length) for length in (32, 32, 24, 24, 32)))
 
     def _ack(self) -> Any:
         return CommandAck(
@@ -217,6 +218,6 @@ class Attacker:
     def _command_int(self) -> Any:
         return CommandInt(
             *self._target(), self._int(8), self._random.choice(COMMANDS), self._int(8),
-            self._int(8), *(self._float() for _ in range(4)), self._int(31), self._int(31),
-            self._float())
+            self._int(8), self._float(), self._float(), self._float(), self._float(),
+            self._int(31), self._int(31), self._float())
 

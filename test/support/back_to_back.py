@@ -129,7 +129,8 @@ class Pair:
     @property
     def light(self) -> Light:
         """Return the light that the controller has found first."""
-        return next(iter(self.controller.lights.values()))
+        light: Light = next(iter(self.controller.lights.values()))
+        return light
 
     @property
     def snapshot(self) -> LightSnapshot:

@@ -120,8 +120,8 @@ class FakeLight(Endpoint):
     def _result(self, command: int) -> int | None:
         result = self.results.get(command, MavResult.ACCEPTED)
         if isinstance(result, list):
-            return result.pop(0) if len(result) > 1 else result[0]
-        return result
+            result = result.pop(0) if len(result) > 1 else result[0]
+        return None if result is None else int(result)
 
     def _carry_out(self, message: Any, now: float) -> None:
         if message.command == MavCmd.REQUEST_MESSAGE and message.param1 in self.answers:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 import math
 import random
-from typing import Any
+from typing import Any, cast
 
 from illuminator_ros.illuminator.events import (
     AnyLightEvent,
@@ -40,7 +40,7 @@ from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.payload.discovery import MAX_DEVICES
 from illuminator_ros.payload.request import Done, Result
 from illuminator_ros.payload.request import MAX_WAITING as MAX_REQUESTS
-from illuminator_ros.payload.simulated import SimulatedComponent
+from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.attacker import Attacker
 from support.client import Client
 from support.frames import Codec
@@ -174,8 +174,7 @@ class BridgeSiege(Siege):
     @property
     def controller(self) -> Client:
         """Return what is attacked."""
-        controller: Client = self.link.endpoint
-        return controller
+        return cast(Client, self.link.endpoint)
 
     def get_ready(self) -> None:
         self._light = SimulatedComponent(
@@ -275,6 +274,7 @@ class LightSiege(Siege):
             [IlluminatorProperties(address=Address(1, 243 + i)) for i in range(3)], 1000.0)
 
     def get_ready(self) -> None:
+        self.lights = cast(SimulatedComponents[Any], self.link.endpoint).components
         self._party = Codec(self._signing(7))
         self._acks: list[Any] = []
         self.busy()
@@ -294,7 +294,7 @@ class LightSiege(Siege):
 
     def check_bounds(self) -> None:
         super().check_bounds()
-        for light in self.link.endpoint.components:
+        for light in self.lights:
             assert math.isfinite(light.device.thermal.temperature)
             configuration = light.device.configuration
             assert 0 <= configuration.brightness <= 100, configuration
@@ -308,7 +308,7 @@ class LightSiege(Siege):
             self._acks.clear()
             self._command(405, on)
             assert [ack.result for ack in self._acks] == [MavResult.ACCEPTED]
-            assert self.link.endpoint.components[0].device.enabled is bool(on)
+            assert self.lights[0].device.enabled is bool(on)
 
 
 def _longest(queues: Iterable[Any]) -> int:
