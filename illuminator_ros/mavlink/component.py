@@ -83,9 +83,11 @@ class Payload(Protocol):
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
+        return
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Endpoint.link_closed`; all commands have ended by then."""
+        return
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Receive a message from another address, of one of the classes of ``messages``."""

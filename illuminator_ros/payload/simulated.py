@@ -127,9 +127,8 @@ class SimulatedDevice(ABC):
         """Behave differently from now on."""
         self.behaviour = behaviour
 
-    @abstractmethod
-    def restart(self, now: float) -> None:
-        """Return to the state after a power cycle."""
+    def restart(self, now: float) -> None:  # noqa: B027 - optional
+        """Return to the state after a power cycle, if it differs."""
 
     @abstractmethod
     def streams(self) -> Mapping[int, float]:

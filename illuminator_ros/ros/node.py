@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+import math
 import threading
 from typing import Any, Generic, Protocol, TYPE_CHECKING, TypeVar
 
@@ -118,6 +119,12 @@ class Data(Protocol[T]):
     data: T
 
 
+def _finite(value: T) -> T:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f'{value} is not a finite number')
+    return value
+
+
 @dataclass(frozen=True)
 class CommandTopic(Generic[T]):
     """
@@ -127,12 +134,13 @@ class CommandTopic(Generic[T]):
     :param take: called in the link's thread with ``data`` and the time (s); of values that come
         faster than the link takes them only the newest.
     :param check: returns a value as ``take`` is given it, in any thread; a ValueError is logged.
+        Without it a number must be finite.
     """
 
     name: str
     type: type[Data[T]]  # noqa: A003
     take: Callable[[T, float], None]
-    check: Callable[[T], T] = lambda value: value
+    check: Callable[[T], T] = _finite
 
 
 # Of any type of request, and of any type of value.

@@ -134,12 +134,10 @@ def test_a_silent_winch_is_forgotten_unless_it_was_commanded(
 
 def test_the_console_gives_each_command_to_the_components_that_have_it() -> None:
     devices = simulated('--light', '1/9=bow', '--winch', '1/8=deck').components
-    assert execute('deck release 2.5', devices, 0.0) == 'done'
     assert execute('on', devices, 0.0) == 'done'
-    assert 'no command' in execute('bow release 1', devices, 0.0)
+    assert 'no command' in execute('deck on', devices, 0.0)
     assert [str(look(one, 0.0)).split()[:3] for one in devices] == [
-        ['1/9', 'bow', 'ON'], ['1/8', 'deck', '2.5']]
-    assert 'release M' in execute('help', devices, 0.0)
+        ['1/9', 'bow', 'ON'], ['1/8', 'deck', '0.0']]
 
 
 def test_a_file_lists_components_of_each_payload() -> None:

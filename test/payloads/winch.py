@@ -28,18 +28,17 @@ import math
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.payload import request, simulated
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.events import Listeners
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.registry import PayloadType
 
-WINCH = PayloadType(
-    'winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
-    checks='payloads.winch_checks:CHECKS')
+WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
+                    simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS')
 
-MAV_TYPE_WINCH = 42
-DO_WINCH = 42600
+MAV_TYPE_WINCH, DO_WINCH = 42, 42600
 WINCH_RELATIVE_LENGTH_CONTROL = 1
 # s without a message after which a winch is lost.
 TIMEOUT = 3.0
@@ -113,8 +112,7 @@ class Winch:
         self.address = address
         self.lost_at = math.inf
         self.was_commanded = False
-        self._heard_at = 0.0
-        self._line_length = 0.0
+        self._heard_at = self._line_length = 0.0
         self._target = request.Target(
             address, commands, ended, kind='winch', status_id=WinchStatus.id,
             status_name='WINCH_STATUS')
@@ -149,7 +147,7 @@ class Winch:
         return min(lost, self._requests.next_deadline())
 
 
-class WinchClient:
+class WinchClient(Payload):
     """
     Finds winches on a link; each releases line.
 
@@ -163,9 +161,15 @@ class WinchClient:
         self.events: Listeners[WinchReport] = Listeners()
         self._discovery = Discovery(self._make, commands)
         self.winches: Mapping[mav.Address, Winch] = self._discovery.devices
-        self.poll = self._discovery.poll
-        self.next_deadline = self._discovery.next_deadline
         self._commands = commands
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        self._discovery.poll(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return self._discovery.next_deadline()
 
     def _make(self, address: mav.Address) -> Winch:
         return Winch(address, self._commands,
@@ -181,12 +185,6 @@ class WinchClient:
                 and (winch := self._discovery.hear(source, now, proved=False))):
             winch.heard(now)
 
-    def link_opened(self, now: float) -> None:
-        """See :meth:`Payload.link_opened`."""
-
-    def link_closed(self, now: float, reason: str) -> None:
-        """See :meth:`Payload.link_closed`."""
-
 
 class SimulatedWinch(simulated.SimulatedDevice):
     """A winch that releases and winds in at once."""
@@ -197,18 +195,14 @@ class SimulatedWinch(simulated.SimulatedDevice):
         super().__init__(Behaviour(heartbeat_type=MAV_TYPE_WINCH))
         self.line_length = 0.0
 
-    def restart(self, now: float) -> None:
-        """See :meth:`SimulatedDevice.restart`; the line stays where it is."""
-
     def streams(self) -> Mapping[int, float]:
         """See :meth:`SimulatedDevice.streams`."""
         return {WinchStatus.id: 1.0}
 
     def message(self, message_id: int, now: float) -> mav.Message | None:
         """See :meth:`SimulatedDevice.message`."""
-        if message_id == WinchStatus.id:
-            return WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
-        return None
+        return (WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
+                if message_id == WinchStatus.id else None)
 
     def execute(self, command: simulated.AnyCommand, now: float) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
@@ -227,13 +221,7 @@ class SimulatedWinch(simulated.SimulatedDevice):
         """See :meth:`SimulatedDevice.snapshot`."""
         return simulated.Snapshot(f'{self.line_length:.1f} m released', (self.line_length,))
 
-    def _release(self, words: list[str], now: float) -> simulated.Change:
-        return partial(self.set_length, self.line_length + float(words[0]))
-
-    commands = (simulated.ConsoleCommand('release M', 'release line', _release, (1,)),)
-
 
 SIMULATED = simulated.SimulatedType(
-    'winch', 'winches', SimulatedWinch,
-    make=lambda settings, address, several: SimulatedWinch(),
+    'winch', 'winches', SimulatedWinch, make=lambda settings, address, several: SimulatedWinch(),
     address=lambda settings: mav.Address(1, 169))

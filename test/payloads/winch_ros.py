@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-import math
-
 from illuminator_ros.payload.request import Result
 from illuminator_ros.ros.node import CommandTopic, NodeInterface, Publication
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
@@ -33,7 +31,7 @@ class WinchNode(ServedPayload):
         self._log = host.log
         self._interface = NodeInterface(
             host.node, host.link, host.log, publications=[Publication('line_length', Float32)],
-            commands=[CommandTopic('cmd/release', Float32, self._release, _finite)])
+            commands=[CommandTopic('cmd/release', Float32, self._release)])
         client.events.subscribe(self._publish)
 
     def _publish(self, report: WinchReport) -> None:
@@ -45,12 +43,6 @@ class WinchNode(ServedPayload):
 
     def _released(self, result: Result, now: float) -> None:
         self._log.info(f'~/cmd/release: {result.message}', 'release')
-
-
-def _finite(length: float) -> float:
-    if not math.isfinite(length):
-        raise ValueError(f'{length} m is not a finite length')
-    return length
 
 
 WINCH = RosPayload('winch', lambda commands, values: WinchClient(commands), WinchNode)
