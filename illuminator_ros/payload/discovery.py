@@ -46,7 +46,7 @@ class Device(Protocol):
 
     @property
     def address(self) -> Address:
-        """The address that it sends from."""
+        """Return the address that it sends from."""
 
     @property
     def lost_at(self) -> float:

@@ -85,6 +85,7 @@ class ParameterServices:
         self._calls = LinkCalls(link, log)
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
+
         def serve(type_: type[ServiceType[Q, A]], name: str, take: Take[Q, A]) -> None:
             node.create_service(type_, f'~/{name}', DeferredService(take), qos_profile=qos)
 

@@ -220,4 +220,3 @@ class Attacker:
             *self._target(), self._int(8), self._random.choice(COMMANDS), self._int(8),
             self._int(8), self._float(), self._float(), self._float(), self._float(),
             self._int(31), self._int(31), self._float())
-
