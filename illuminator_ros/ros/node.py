@@ -33,8 +33,7 @@ from .log import NodeLog
 from ..mavlink.link import Link
 
 if TYPE_CHECKING:
-    # A name of typings/ only.
-    from rclpy.type_support import ServiceType
+    from rclpy.type_support import ServiceType  # A name of typings/ only.
 
 T = TypeVar('T')
 # Takes success and a message.

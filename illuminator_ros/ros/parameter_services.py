@@ -48,8 +48,7 @@ from .parameters import DeviceParameters, Values
 from ..mavlink.link import Link
 
 if TYPE_CHECKING:
-    # A name of typings/ only.
-    from rclpy.type_support import ServiceType
+    from rclpy.type_support import ServiceType  # A name of typings/ only.
 
 T = TypeVar('T')
 Messages = Sequence[ParameterMessage]
