@@ -63,11 +63,12 @@ def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
         assert ros.enable(True).success
         enabled.wait_value(True)
         publisher = ros.node.create_publisher(Float32, '/winch/cmd/release', 10)
+        length.wait_value(0.0)
 
-        def is_released() -> int:
-            # The first messages may come before the node has found the publisher.
+        def is_released() -> bool:
+            # The first message may come before the node has found the publisher.
             publisher.publish(Float32(data=2.5))
-            return bridge.count('confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED')
+            return length.values[-1] >= 2.5
 
         eventually(is_released)
-        length.wait(lambda message: message.data >= 2.5)
+        eventually(lambda: bridge.count('confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED'))
