@@ -158,6 +158,10 @@ class Light:
         self._was_lost = False
         self._enabled: bool | None = None
         self._last_switch: tuple[bool, float] = False, -math.inf
+        # Until when a switch that was not confirmed may still take effect, s.
+        self._late_until = -math.inf
+        # The brightness that the light reports while it is off: 0 where that is the switch, too.
+        self._off_brightness: float | None = None
         self._rate = RateLimit(REPORT_INTERVAL)
         # When the last request came, or the light was seen to be switched on, s.
         self._requested_at = -math.inf
@@ -213,6 +217,8 @@ class Light:
 
     def _take_report(self, report: Report[Status], now: float, *, restarted: bool) -> None:
         before, self._enabled = self._enabled, report.status.enabled
+        if self._enabled is False:
+            self._off_brightness = report.status.brightness
         # Several lights at one address seem to switch again and again.
         if self._enabled and not before and (
                 not report.shared_address or self._requested_at == -math.inf):
@@ -237,9 +243,10 @@ class Light:
                 or report.shared_address or status.error_flags & DIMMING_FLAGS
                 or status.mode is Mode.EXTERNAL_SYNC):
             return
-        on, at = self._last_switch
-        is_own = (on == status.enabled and now <= at + LATE_TIME
-                  or now <= self._configuration.sent_at + IMPLIED_TIME)
+        on = self._last_switch[0]
+        is_own = (on == status.enabled and now <= self._late_until
+                  or self._off_brightness == 0.0
+                  and now <= self._configuration.sent_at + IMPLIED_TIME)
         self._emit(LightSwitched(
             self.address, status.enabled, Origin.REQUEST if is_own else Origin.OTHER_SENDER,
             left_out=self._rate.take(now)))
@@ -457,6 +464,7 @@ class Light:
 
         def prepare(now: float) -> Change[Status]:
             self._last_switch = on, now
+            self._late_until = now + LATE_TIME
             return change
 
         def finished(
@@ -464,6 +472,7 @@ class Light:
         ) -> None:
             if result.success:
                 self._enabled = on
+                self._late_until = -math.inf
             done(result, now)
             if result.success:
                 self._emit(LightSwitched(self.address, on, Origin.REQUEST, detail))

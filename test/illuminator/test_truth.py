@@ -208,6 +208,20 @@ def test_each_switch_is_one_event_with_its_origin(fake: FakeLight, faked: Pair) 
         (True, Origin.REQUEST, 'service'), (False, Origin.OTHER_SENDER, '')]
 
 
+@pytest.mark.parametrize('before', [
+    lambda pair: pair.configure(brightness=30.0),
+    lambda pair: (pair.enable(True), pair.enable(False))],
+    ids=['dimmed', 'switched on and off'])
+def test_a_button_pressed_soon_after_a_command_of_ours_is_another_sender(
+    fake: FakeLight, faked: Pair, before: Callable[[Pair], Any],
+) -> None:
+    before(faked)
+    events = events_of(faked)
+    fake.fields['enable'] = 1
+    faked.run(1.5)
+    assert switches(events) == [(True, Origin.OTHER_SENDER, '')]
+
+
 def test_a_switch_that_takes_effect_late_is_ours(fake: FakeLight, faked: Pair) -> None:
     fake.apply_after = 4.0
     events = events_of(faked)
