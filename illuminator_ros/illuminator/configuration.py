@@ -22,7 +22,7 @@ from enum import Enum
 import math
 from typing import Any
 
-from .changes import Configure
+from .commands import Configure
 from .events import (
     AnyLightEvent,
     Cause,

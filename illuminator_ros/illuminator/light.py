@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from .changes import Switch
+from .commands import Switch
 from .configuration import (
     ConfigurationManager,
     IMPLIED_TIME,
@@ -49,7 +49,7 @@ from .events import (
 from .messages import STATUS_ID
 from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
 from .sources import DEFAULT, Sources, SourceSettings
-from .status import RESTART_PROOF_TIME, StatusTracker
+from .status_tracker import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged

@@ -47,7 +47,6 @@ from ..mavlink.messages import (
     UInt8,
 )
 from ..payload.faults import Behaviour
-from ..payload.settings import number
 from ..payload.simulated import (
     AnyCommand,
     Change,
@@ -59,6 +58,7 @@ from ..payload.simulated import (
     SimulatedDevice,
     Snapshot,
 )
+from ..payload.simulated_settings import number
 
 # K by which the temperature must change to deserve a line of its own.
 TEMPERATURE_STEP = 5.0

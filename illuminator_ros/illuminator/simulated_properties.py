@@ -33,7 +33,7 @@ from ..mavlink.messages import (
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.identity import Identity
-from ..payload.settings import integer
+from ..payload.simulated_settings import integer
 
 
 class Extension(NamedTuple):

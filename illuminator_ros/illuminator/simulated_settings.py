@@ -26,8 +26,8 @@ from .simulated_properties import Extension, IlluminatorProperties, PROFILES
 from .thermal import ThermalProperties
 from ..mavlink.messages import Address
 from ..payload.identity import Identity
-from ..payload.settings import integer, number, one_of, Setting, text
 from ..payload.simulated import SimulatedType
+from ..payload.simulated_settings import integer, number, one_of, Setting, text
 
 THERMAL = {field.name: field.default for field in fields(ThermalProperties)}
 

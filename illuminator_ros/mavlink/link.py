@@ -37,7 +37,7 @@ from .frame_writer import FrameWriter
 from .link_state import LinkEvent, LinkInput, LinkSnapshot, LinkStatus
 from .messages import Address, decode_payload, Message
 from .receiver import Receiver
-from .router import Router
+from .routing_table import RoutingTable
 from .signing import Signing
 from .signing_files import TimestampKeeper, TimestampStore
 from .statistics import Traffic
@@ -129,7 +129,7 @@ class Link:
         self._connect_at = -math.inf
         self._channel: Channel | None = None
         self._receiver = Receiver(self._signing, self._classes)
-        self._router = Router()
+        self._router = RoutingTable()
         self._traffic = Traffic()
         self._status = LinkStatus(label, clock())
         # When the channel is proved without a frame, and whether a frame was received over it.

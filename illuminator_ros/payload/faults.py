@@ -28,7 +28,7 @@ import math
 import random
 from typing import Any, TypeVar
 
-from .settings import integer, number
+from .simulated_settings import integer, number
 from ..mavlink.messages import (
     MAV_AUTOPILOT_INVALID,
     MAV_STATE_ACTIVE,

@@ -29,7 +29,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .events import Listeners
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
-from .settings import integer, Setting
+from .simulated_settings import integer, Setting
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (

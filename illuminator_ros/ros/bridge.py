@@ -29,10 +29,9 @@ from rclpy.node import Node
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
-from .log import LogForwarder, NodeLog
 from .logger_services import LoggerServices
 from .node import PayloadNode
-from .node_pool import NodePool
+from .node_manager import NodeManager
 from .parameters import (
     declare_link_parameters,
     declare_read_only,
@@ -40,6 +39,7 @@ from .parameters import (
     ParameterError,
 )
 from .payload import Host, RosPayload, ServedPayload
+from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command import CommandSender, format_seconds
 from ..mavlink.component import Component
 from ..mavlink.link import Link
@@ -98,7 +98,7 @@ class Bridge:
         self._closed = threading.Event()
         self._housekeeping = threading.Thread(
             target=self._keep_house, name='housekeeping', daemon=True)
-        self.pool = NodePool(node, arguments, self.log, self._wake.set)
+        self.pool = NodeManager(node, arguments, self.log, self._wake.set)
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self.component, url=parameters.connection_url,
             period=parameters.diagnostics_period)

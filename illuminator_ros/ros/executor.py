@@ -40,7 +40,7 @@ from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from .log import NodeLog
+from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1

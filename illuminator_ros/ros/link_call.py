@@ -20,7 +20,7 @@ from collections.abc import Callable
 import threading
 from typing import Generic, TypeVar
 
-from .log import NodeLog
+from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
 T = TypeVar('T')

@@ -21,8 +21,8 @@ from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
 from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
 from rclpy.node import Node
 
-from .log import LogForwarder, NodeLog
 from .parameter_services import MAX_NAMES
+from .throttled_log import LogForwarder, NodeLog
 
 # rcl never forgets a logger whose level was set.
 MAX_LOGGERS = 200

@@ -29,7 +29,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from .cdr import serializer
 from .executor import A, DeferredService, Q, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
-from .log import NodeLog
+from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
 if TYPE_CHECKING:

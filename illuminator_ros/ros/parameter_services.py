@@ -43,8 +43,8 @@ from rclpy.qos import qos_profile_services_default, QoSProfile
 
 from .executor import A, DeferredService, Q, Respond, Take
 from .link_call import LinkCalls
-from .log import NodeLog
 from .parameters import DeviceParameters, Values
+from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
 if TYPE_CHECKING:

@@ -23,9 +23,9 @@ from typing import Any
 from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsPublisher
-from .log import NodeLog
-from .node_pool import NodePool
+from .node_manager import NodeManager
 from .parameters import LinkParameters, ParameterSpec, Values
+from .throttled_log import NodeLog
 from ..mavlink.command import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.link import Link
@@ -48,7 +48,7 @@ class Host:
     node: Node
     link: Link
     log: NodeLog
-    nodes: NodePool
+    nodes: NodeManager
     diagnostics: DiagnosticsPublisher
     link_parameters: LinkParameters
     values: Values

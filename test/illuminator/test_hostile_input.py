@@ -36,7 +36,7 @@ from illuminator_ros.mavlink.messages import (
     LAYOUTS,
 )
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
-from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS

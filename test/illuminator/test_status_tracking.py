@@ -20,7 +20,7 @@ import random
 from typing import Any
 
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.illuminator.status import (
+from illuminator_ros.illuminator.status_tracker import (
     AddressConflict,
     SendingTimes,
     Uptime,

@@ -68,7 +68,7 @@ def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
         def is_released() -> bool:
             # The first message may come before the node has found the publisher.
             publisher.publish(Float32(data=2.5))
-            return length.values[-1] >= 2.5
+            return bool(length.values[-1] >= 2.5)
 
         eventually(is_released)
         eventually(lambda: bridge.count('confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED'))

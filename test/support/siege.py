@@ -33,7 +33,7 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.mavlink.command import MAX_WAITING
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
-from illuminator_ros.mavlink.router import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS

@@ -48,7 +48,7 @@ from ..program import discard_output, one_line
 from ..termination import Termination
 from ... import __version__
 from ...ros.executor import NodeExecutor
-from ...ros.log import NodeLog
+from ...ros.throttled_log import NodeLog
 
 # s between updates of the screen.
 INTERVAL = 0.25

@@ -25,8 +25,8 @@ from typing import Any
 
 from ..options import address
 from ...mavlink.messages import Address
-from ...payload.settings import Setting
 from ...payload.simulated import Description, SimulatedType
+from ...payload.simulated_settings import Setting
 
 MAX_COMPONENTS = 200
 

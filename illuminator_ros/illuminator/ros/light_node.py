@@ -37,7 +37,6 @@ from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
-from ...ros.log import NodeLog
 from ...ros.node import (
     Answer,
     AnyCommand,
@@ -50,6 +49,7 @@ from ...ros.node import (
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import DeviceParameters, ParameterError
 from ...ros.payload import Host
+from ...ros.throttled_log import NodeLog
 
 # Refreshes that may wait for their answers: each is two messages of the light.
 MAX_REFRESHES = 16

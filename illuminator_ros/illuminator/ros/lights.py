@@ -48,10 +48,10 @@ from ...mavlink.command import CommandSender
 from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.link_call import LatestOnly
-from ...ros.log import NodeLog
 from ...ros.node import Answer, CommandTopic, RequestService
 from ...ros.parameters import misspelt, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.throttled_log import NodeLog
 
 # s without a light until the log gives the reason, once.
 NO_LIGHT_DELAY = 5.0

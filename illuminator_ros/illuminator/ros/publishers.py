@@ -58,9 +58,9 @@ from ..sources import DEFAULT
 from ...payload.arbitration import Cause as HolderCause
 from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
-from ...ros.log import NodeLog
 from ...ros.node import NodeInterface, Publication, STREAM_QOS
 from ...ros.parameters import DeviceParameters
+from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
 STATUS_TOPICS: dict[str, tuple[Any, Callable[[Status], object]]] = {

@@ -31,7 +31,7 @@ EXPIRY = 10.0
 LOOK_INTERVAL = 1.0
 
 
-class Router:
+class RoutingTable:
     """
     The ways to components, learnt from what comes from them.
 

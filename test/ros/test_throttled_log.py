@@ -14,7 +14,7 @@
 
 """The log of a node: lines of one kind are limited in rate, and those left out are counted."""
 
-from illuminator_ros.ros import log
+from illuminator_ros.ros import throttled_log as log
 import pytest
 from rclpy.logging import get_logger
 

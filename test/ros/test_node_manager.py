@@ -16,9 +16,9 @@
 
 from collections.abc import Iterator
 
-from illuminator_ros.ros.log import NodeLog
 from illuminator_ros.ros.node import PayloadNode
-from illuminator_ros.ros.node_pool import NodePool
+from illuminator_ros.ros.node_manager import NodeManager
+from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
 from rclpy.node import Node
 from support.ros import Ros
@@ -26,9 +26,9 @@ from support.waiting import eventually
 
 
 @pytest.fixture
-def pool(own_ros: Ros) -> Iterator[NodePool]:
+def pool(own_ros: Ros) -> Iterator[NodeManager]:
     first = PayloadNode('first', context=own_ros.context)
-    pool = NodePool(first, [], NodeLog(first.get_logger()), lambda: None)
+    pool = NodeManager(first, [], NodeLog(first.get_logger()), lambda: None)
     yield pool
     pool.end()
     for node in (first, *pool.nodes):
@@ -40,7 +40,7 @@ def names(ros: Ros) -> list[str]:
 
 
 def test_node_that_cannot_be_made_is_tried_again_and_logged(
-    own_ros: Ros, pool: NodePool, capfd: pytest.CaptureFixture[str],
+    own_ros: Ros, pool: NodeManager, capfd: pytest.CaptureFixture[str],
 ) -> None:
     failures = [OSError('too many threads')]
 
@@ -55,7 +55,7 @@ def test_node_that_cannot_be_made_is_tried_again_and_logged(
     eventually(lambda: pool.work() or 'further' in names(own_ros))
 
 
-def test_node_is_removed_with_its_device(own_ros: Ros, pool: NodePool) -> None:
+def test_node_is_removed_with_its_device(own_ros: Ros, pool: NodeManager) -> None:
     pool.make('1/244', 'light 1/244', 'further', lambda node: None)
     pool.work()
     eventually(lambda: 'further' in names(own_ros))
@@ -68,7 +68,7 @@ def test_node_is_removed_with_its_device(own_ros: Ros, pool: NodePool) -> None:
 
 
 def test_device_that_goes_before_its_node_is_made_gets_none(
-    own_ros: Ros, pool: NodePool,
+    own_ros: Ros, pool: NodeManager,
 ) -> None:
     pool.make('1/244', 'light 1/244', 'further', lambda node: None)
     pool.remove('1/244')

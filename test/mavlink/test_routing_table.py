@@ -17,7 +17,13 @@
 from __future__ import annotations
 
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
-from illuminator_ros.mavlink.router import EXPIRY, LOOK_INTERVAL, MAX_ROUTES, MAX_WAYS, Router
+from illuminator_ros.mavlink.routing_table import (
+    EXPIRY,
+    LOOK_INTERVAL,
+    MAX_ROUTES,
+    MAX_WAYS,
+    RoutingTable,
+)
 import pytest
 from support.frames import LIGHT
 
@@ -29,9 +35,9 @@ def to(target: Address) -> CommandLong:
 
 
 @pytest.fixture
-def router() -> Router:
+def router() -> RoutingTable:
     """Return a router that has heard the light over one peer at 0 s."""
-    one = Router()
+    one = RoutingTable()
     one.heard(LIGHT, 'b', 0.0)
     return one
 
@@ -45,12 +51,12 @@ def router() -> Router:
     *((to(target), PEERS, 0.0, PEERS) for target in (
         Address(0, 0), Address(0, 243), Address(1, 0), Address(2, 243)))])
 def test_message_goes_where_its_target_was_lately_heard_and_else_to_all(
-        router: Router, message: Message, peers: tuple[str, ...], now: float,
+        router: RoutingTable, message: Message, peers: tuple[str, ...], now: float,
         receivers: list[str]) -> None:
     assert router.towards(message, peers, now) == receivers
 
 
-def test_message_goes_over_all_peers_that_its_target_was_heard_over(router: Router) -> None:
+def test_message_goes_over_all_peers_that_its_target_was_heard_over(router: RoutingTable) -> None:
     router.heard(LIGHT, 'c', 1.0)
     assert router.towards(to(LIGHT), PEERS, 1.0) == ['b', 'c']
     router.heard(LIGHT, 'b', EXPIRY)
@@ -59,7 +65,7 @@ def test_message_goes_over_all_peers_that_its_target_was_heard_over(router: Rout
 
 def test_component_on_more_peers_than_are_remembered_is_sent_to_over_all_meanwhile() -> None:
     # A light that restarts on another port each time must be reached on the newest.
-    router, peers = Router(), tuple(range(MAX_WAYS + 1))
+    router, peers = RoutingTable(), tuple(range(MAX_WAYS + 1))
     for peer in peers:
         router.heard(LIGHT, peer, 0.0)
     assert router.towards(to(LIGHT), peers, 1.0) == peers
@@ -67,14 +73,16 @@ def test_component_on_more_peers_than_are_remembered_is_sent_to_over_all_meanwhi
     assert router.towards(to(LIGHT), (*peers, 'new'), EXPIRY + 1) == ['new']
 
 
-def test_components_beyond_the_bound_take_no_way_from_those_remembered(router: Router) -> None:
+def test_components_beyond_the_bound_take_no_way_from_those_remembered(
+    router: RoutingTable,
+) -> None:
     for number in range(2 * MAX_ROUTES):
         router.heard(Address(2 + number // 256, number % 256), 'a', 0.0)
     assert len(router) == MAX_ROUTES
     assert router.towards(to(LIGHT), PEERS, 0.0) == ['b']
 
 
-def test_full_table_makes_room_for_silent_components_once_a_second(router: Router) -> None:
+def test_full_table_makes_room_for_silent_components_once_a_second(router: RoutingTable) -> None:
     # A look costs as much as hundreds of frames.
     for number in range(MAX_ROUTES - 1):
         router.heard(Address(2, number), 'a', 0.0)
@@ -86,7 +94,7 @@ def test_full_table_makes_room_for_silent_components_once_a_second(router: Route
 
 
 def test_peers_count_while_they_are_heard_and_none_do_after_the_link_is_closed(
-        router: Router) -> None:
+        router: RoutingTable) -> None:
     router.heard(Address(9, 9), 'b', 1.0)
     router.heard(Address(9, 9), 'c', 5.0)
     assert [router.peer_count(now) for now in (5.0, EXPIRY + 2, EXPIRY + 6)] == [2, 1, 0]

@@ -27,9 +27,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from .executor import NodeExecutor
-from .log import NodeLog
 from .node import PayloadNode
 from .parameters import ParameterError
+from .throttled_log import NodeLog
 
 # Threads for all nodes except the first. Each further node on a thread costs 5 us a callback.
 EXECUTORS = 1
@@ -46,7 +46,7 @@ class _Wanted:
     delay: float = RETRY_DELAYS[0]
 
 
-class NodePool:
+class NodeManager:
     """
     The nodes of further devices, made and removed one at a time by :meth:`work`.
 
