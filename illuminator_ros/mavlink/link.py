@@ -28,7 +28,6 @@ import socket
 import struct
 import threading
 import time
-from typing import TypeVar
 
 from .component import Endpoint
 from .connector import Connector
@@ -44,9 +43,8 @@ from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
 
-# s; the loop polls this often even where nothing is due. It is not longer than the shortest wait
-# for an acknowledgement, so that a command that another thread sends need not wake the loop.
-IDLE = 0.2
+# s; the loop polls this often even where nothing is due.
+IDLE = 1.0
 # A turn costs as much as ten foreign frames. Where more than BUSY come per second, they collect
 # for REST s, or until COLLECTED are expected; a UDP socket has room for 250. A call ends the
 # rest, and there is none within HURRY s of a message that may be answered.
@@ -70,8 +68,6 @@ THREAD_RETRY_INTERVAL = 0.25
 FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
 
-T = TypeVar('T')
-
 _log = logging.getLogger(__name__)
 # Each frame in a line, at DEBUG.
 _frame_log = logging.getLogger('illuminator_ros')
@@ -85,10 +81,7 @@ class Link:
     """
     Runs an endpoint over a connection URL in a thread of its own, and reopens what is lost.
 
-    All state of the link and its endpoint belongs to the thread that holds the turn. The link's
-    thread holds it except while it sleeps. Then :meth:`do` takes it for one function, so that a
-    request is sent without a change of threads; it never waits for the turn. :meth:`call` brings
-    work to the link's thread. Both may be called while the turn is held.
+    All of the endpoint is called from that thread and no other; :meth:`call` brings work to it.
 
     :param on_event: called in the link's thread when the link is opened, lost, or cannot be
         opened at first; at a limited rate.
@@ -148,11 +141,6 @@ class Link:
         self._snapshot_due = 0.0
         self._snapshot = self.snapshot(clock())
         self._calls: deque[Callable[[float], None]] = deque()
-        # Held from now on, and again after the thread has ended.
-        self._turn = threading.Lock()
-        self._turn.acquire()
-        # When the thread wakes by itself, s.
-        self._wakes_at = math.inf
         self._wake_out, self._wake_in = socket.socketpair()
         self._wake_out.setblocking(False)
         self._wake_in.setblocking(False)
@@ -206,20 +194,6 @@ class Link:
         self._calls.append(function)
         self._wake()
 
-    def do(self, function: Callable[[float], None]) -> None:
-        """Call ``function(now)`` before returning if the thread sleeps, else as :meth:`call`."""
-        if self._calls or not self._turn.acquire(blocking=False):
-            self.call(function)
-            return
-        try:
-            self._safe_call(function, self.clock())
-            self._flush()
-            self._work_pending = True
-            if self._channel is None or self.endpoint.next_deadline() < self._wakes_at:
-                self._wake()
-        finally:
-            self._turn.release()
-
     def state(self) -> LinkSnapshot:
         """Return the newest snapshot; it is at most 0.25 s behind the link's thread."""
         return self._snapshot
@@ -238,7 +212,7 @@ class Link:
     def _connector_ended(self) -> None:
         self.call(self._connect_later)
 
-    # By the holder of the turn
+    # In the link's thread
 
     def snapshot(self, now: float) -> LinkSnapshot:
         """Return the link at this moment."""
@@ -280,8 +254,7 @@ class Link:
         now = self.clock()
         wait = min(max(due - now, self._pause), IDLE)
         self._pause = 0.0
-        self._wakes_at = now + wait
-        for key, events in self._sleep(self._selector.select, wait):
+        for key, events in self._selector.select(wait):
             if key.fileobj is self._wake_out:
                 with contextlib.suppress(BlockingIOError):
                     self._wake_out.recv(4096)
@@ -305,16 +278,7 @@ class Link:
             if rest < 0.001:
                 time.sleep(rest)
             else:
-                # A request that is made meanwhile must not wait for its answer.
-                self._wakes_at = math.inf
-                self._sleep(self._calls_only.poll, 1000 * rest)
-
-    def _sleep(self, wait: Callable[[float], T], timeout: float) -> T:
-        self._turn.release()
-        try:
-            return wait(timeout)
-        finally:
-            self._turn.acquire()
+                self._calls_only.poll(1000 * rest)
 
     def _work(self) -> None:
         """Do what others asked for, and what is due."""

@@ -81,7 +81,7 @@ class LinkCalls:
                 self._log.error(reason, 'request')
                 end(lambda: refuse(reason))
 
-        self._link.do(run)
+        self._link.call(run)
 
 
 class LatestOnly(Generic[T]):

@@ -69,34 +69,6 @@ def test_open_link_tells_its_name_and_counts_frames_and_bytes_both_ways(
     eventually(lambda: link.link.state().traffic.frames_received == 1)
 
 
-def test_function_is_called_at_once_while_the_thread_sleeps_and_by_it_while_it_works(
-        run: Run) -> None:
-    link = run(LiveLink(URL))
-    held, go_on, callers = threading.Event(), threading.Event(), Log[str]()
-
-    def note(now: float) -> None:
-        callers.append(threading.current_thread().name)
-
-    def called_at_once() -> bool:
-        before = len(callers)
-        link.link.do(note)
-        return list(callers)[before:] == [threading.current_thread().name]
-
-    def hold(now: float) -> None:
-        held.set()
-        go_on.wait(PATIENCE)
-
-    eventually(called_at_once)
-    link.ask(lambda now: None)
-    link.link.call(hold)
-    assert held.wait(PATIENCE)
-    before = len(callers)
-    link.link.do(note)
-    assert len(callers) == before
-    go_on.set()
-    assert callers.wait_for(lambda name: True, since=before) == 'mavlink-link'
-
-
 def test_frames_are_logged_in_a_line_each_at_debug_level_only(
         run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
     for level in (logging.INFO, logging.DEBUG):
