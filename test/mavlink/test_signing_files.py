@@ -21,7 +21,6 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-import time
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -148,13 +147,14 @@ def test_clock_that_was_ahead_for_a_moment_locks_no_light_out(store: TimestampSt
 
 
 SIGN_UNTIL_KILLED = """
-import sys, time
+import sys
 from illuminator_ros.mavlink.signing import SigningMode
 from illuminator_ros.mavlink.signing_files import keyed, TimestampKeeper
-signing, store = keyed(SigningMode.SIGN, sys.argv[1], 'bridge', time.time())
-TimestampKeeper(signing, store).keep(time.time())
+now = float(sys.argv[2])
+signing, store = keyed(SigningMode.SIGN, sys.argv[1], 'bridge', now)
+TimestampKeeper(signing, store).keep(now)
 while True:
-    signing.sign(b'', time.time())
+    signing.sign(b'', now)
     sys.stdout.buffer.write(signing.timestamp.to_bytes(8, 'big'))
 """
 
@@ -164,7 +164,7 @@ def test_kill_9_again_and_again_repeats_no_time_stamp_and_locks_no_light_out(
     monkeypatch.setenv('ROS_HOME', str(tmp_path))
     key, newest = key_file(tmp_path, PASSPHRASE), 0
     for _ in range(3):
-        with subprocess.Popen([sys.executable, '-c', SIGN_UNTIL_KILLED, key],
+        with subprocess.Popen([sys.executable, '-c', SIGN_UNTIL_KILLED, key, str(NOW)],
                               stdout=subprocess.PIPE) as program:
             assert program.stdout is not None
             data = program.stdout.read(80_000)
@@ -173,11 +173,11 @@ def test_kill_9_again_and_again_repeats_no_time_stamp_and_locks_no_light_out(
         used = [int.from_bytes(data[at:at + 8], 'big') for at in range(0, len(data) - 7, 8)]
         assert newest < used[0] < used[-1]
         newest = used[-1]
-    ours, light = (keyed(SigningMode.REQUIRE, key, name, time.time())[0]
+    ours, light = (keyed(SigningMode.REQUIRE, key, name, NOW)[0]
                    for name in ('bridge', 'light'))
     for sender, receiver in ((ours, light), (light, ours)):
-        frame = only(sender.sign(frame_of(signed=True), time.time()))
-        assert receiver.accepts(frame, time.time())
+        frame = only(sender.sign(frame_of(signed=True), NOW))
+        assert receiver.accepts(frame, NOW)
 
 
 def test_failed_write_is_logged_once_tried_again_and_leaves_the_old_time_stamp(
