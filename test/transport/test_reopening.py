@@ -163,8 +163,8 @@ def test_frames_drops_and_losses_are_counted_over_openings_without_those_in_betw
 
 def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sends(
         run: Run, server: Server, pauses: Log[float], _endless_probation: None) -> None:
-    link = run(LiveLink(server.url))
     server.listen()
+    link = run(LiveLink(server.url))
     for _ in range(5):
         server.come(b'')
         server.drop()
