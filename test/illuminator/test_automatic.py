@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a light does without a request: off after silence, and back after other senders."""
+"""Commands without a request: off after silence, and undoing changes by other senders."""
 
 from collections.abc import Callable
 import math

@@ -125,7 +125,7 @@ def run(store: TimestampStore, unix_time: float) -> int:
     # After an orderly end: right behind the last stamp, or with the clock.
     (-NOW, True, 1, 2), (1.0, True, SECOND, SECOND + 1),
     (3600.0, True, 3600 * SECOND, 3600 * SECOND + 1),
-    # After a crash: beyond all that may have been used, and within the minute that peers accept.
+    # After a crash: beyond every stamp that was used, and within the minute that peers accept.
     (-NOW, False, 44 * SECOND, NEW_STREAM_TICKS), (1.0, False, 44 * SECOND, NEW_STREAM_TICKS)])
 def test_next_run_repeats_no_time_stamp_and_stays_near_the_clock(
         store: TimestampStore, clock: float, last: bool, least: int, most: int) -> None:

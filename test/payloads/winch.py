@@ -152,7 +152,7 @@ class WinchClient(Payload):
     Finds winches on a link; each releases line.
 
     :ivar events: a :class:`WinchReport` for each status.
-    :ivar winches: those that have sent a status, by address.
+    :ivar winches: the winches that were found, by address.
     """
 
     messages = (mav.Heartbeat, WinchStatus)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Run ``conformance`` as users do, but for the time that it listens for other lights."""
+"""Run ``conformance`` as users do, but listen for other lights for a shorter time."""
 
 import sys
 

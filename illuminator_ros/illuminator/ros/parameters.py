@@ -144,7 +144,7 @@ def _source_settings(values: Values) -> SourceSettings | None:
                                  'sources is empty')
         return None
     for name in names:
-        # Names that a topic may have, one of which is that of the plain commands.
+        # Names that a topic may have; the plain commands already use one of them.
         if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', name) or name == 'cmd':
             raise ParameterError(f'sources: {reprlib.repr(name)} is not a valid name of a source')
         if names.count(name) > 1:
