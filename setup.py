@@ -49,7 +49,9 @@ setup(
         'serial': ['pyserial>=3.5'],
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
-        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich'],
+        # scipy is the oracle for rotations, mavsdk another player at a gimbal.
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich', 'scipy',
+                 'mavsdk>=4.1'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',

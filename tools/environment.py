@@ -44,13 +44,15 @@ ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
 PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'rich>=13.3']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.5', 'hypothesis>=6.100',
         'pyyaml>=6', 'wheel>=0.38', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
-        'catkin_pkg>=0.5']
+        'catkin_pkg>=0.5', 'scipy>=1.10']
 # ROS's linters, which a ROS installation has, and the plugins for flake8 that rosdep and setup-ros
 # install with them. flake8-builtins as in Ubuntu 24.04: later ones have rules that ROS does not.
 LINT = ['ros-ament-lint>=0.17', 'ros-ament-flake8>=0.17', 'ros-ament-pep257>=0.17', 'flake8>=7',
         'pydocstyle>=6.3', 'flake8-blind-except>=0.2.1', 'flake8-builtins>=2.1,<2.2',
         'flake8-class-newline>=1.6', 'flake8-comprehensions>=3.14', 'flake8-deprecated>=2.2',
         'flake8-docstrings>=1.6', 'flake8-import-order>=0.18', 'flake8-quotes>=3.4']
+# An independent MAVLink stack, the other player at a gimbal in the tests.
+PEERS = ['mavsdk>=4.1']
 # A router for the tests, alone: run without a display it needs none of the gigabyte of graphics
 # packages that it asks for.
 ALONE = ['MAVProxy>=1.8.70']
@@ -122,7 +124,7 @@ def requirements() -> list[str]:
              'or use its image, which exists for arm64 too:\n'
              '  docker run --rm -v "$PWD":/src -w /src ros:jazzy bash -c "apt-get update && '
              'apt-get install -y make python3-venv && make demo"')
-    return ROS + PACKAGE + TEST + LINT
+    return ROS + PACKAGE + TEST + LINT + PEERS
 
 
 def reason_for_new_venv() -> str:

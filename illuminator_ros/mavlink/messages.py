@@ -23,12 +23,13 @@ all other messages of pymavlink's ``common`` dialect are checked, but not decode
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from itertools import islice
 from operator import attrgetter, itemgetter
 import struct
-from typing import Annotated, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import common
@@ -43,6 +44,8 @@ Float = Annotated[float, 'f']
 # The bytes of a string as they are on the wire, with or without a terminator.
 Char24 = Annotated[bytes, '24s']
 Char32 = Annotated[bytes, '32s']
+UInt8x20 = Annotated[tuple[int, ...], '20B']
+Float4 = Annotated[tuple[float, float, float, float], '4f']
 _C_NAMES = {'B': 'uint8_t', 'H': 'uint16_t', 'I': 'uint32_t', 'Q': 'uint64_t', 'h': 'int16_t',
             'i': 'int32_t', 'f': 'float', 's': 'char'}
 
@@ -120,12 +123,34 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
         crc = mcrf4xx(seed)
         cls.id, cls.name, cls.crc_extra = id_, name, crc & 0xFF ^ crc >> 8
         cls.base_size = struct.calcsize('<' + ''.join(codes[one] for one in base))
+        pack: Callable[..., bytes] = layout.pack
+        unpack: Callable[[bytes], tuple[object, ...]] = layout.unpack
+        if any(codes[one][:-1] and codes[one][-1] != 's' for one in order):
+            pack, unpack = _with_arrays(layout, [codes[one] for one in order])
         cls.codec = _Codec(
-            layout.pack, layout.unpack, attrgetter(*order),
-            itemgetter(*map(order.index, names)), layout.size)
+            pack, unpack, attrgetter(*order), itemgetter(*map(order.index, names)), layout.size)
         LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
         return cls
     return complete
+
+
+def _with_arrays(
+    layout: struct.Struct, codes: Sequence[str],
+) -> tuple[Callable[..., bytes], Callable[[bytes], tuple[object, ...]]]:
+    """Return pack and unpack of a layout in which arrays of numbers are tuples."""
+    counts = [0 if code[-1] == 's' else int(code[:-1] or 0) for code in codes]
+
+    def pack(*values: Any) -> bytes:
+        flat: list[object] = []
+        for count, value in zip(counts, values, strict=True):
+            flat += value if count else (value,)
+        return layout.pack(*flat)
+
+    def unpack(payload: bytes) -> tuple[object, ...]:
+        flat = iter(layout.unpack(payload))
+        return tuple(tuple(islice(flat, count)) if count else next(flat) for count in counts)
+
+    return pack, unpack
 
 
 def encode_payload(message: Message) -> bytes:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import math
 import threading
-from typing import Any, Generic, Protocol, TYPE_CHECKING, TypeVar
+from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -112,13 +112,13 @@ class RequestService(Generic[Q, A]):
     limit: int = MAX_PENDING
 
 
-class Data(Protocol[T]):
-    """A message of std_msgs."""
+def finite_data(message: Any) -> Any:
+    """
+    Return ``data`` of a message of std_msgs.
 
-    data: T
-
-
-def _finite(value: T) -> T:
+    :raises ValueError: if it is NaN or infinite.
+    """
+    value = message.data
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f'{value} is not a finite number')
     return value
@@ -129,17 +129,17 @@ class CommandTopic(Generic[T]):
     """
     A topic ``~/name`` that the node subscribes to.
 
-    :param type: a class of std_msgs.
-    :param take: called in the link's thread with ``data`` and the time (s); of values that come
+    :param type: the message's class.
+    :param take: called in the link's thread with a value and the time (s); of values that come
         faster than the link takes them only the newest.
-    :param check: returns a value as ``take`` is given it, in any thread; a ValueError is logged.
-        Without it a number must be finite.
+    :param read: returns the value of a message, in any thread; a ValueError is logged.
     """
 
     name: str
-    type: type[Data[T]]  # noqa: A003
+    type: type[object]  # noqa: A003
     take: Callable[[T, float], None]
-    check: Callable[[T], T] = _finite
+    # Any: of the class that ``type`` names.
+    read: Callable[[Any], T] = finite_data
 
 
 # Of any type of request, and of any type of value.
@@ -202,9 +202,9 @@ class _Newest(Generic[T]):
         self._waiting: list[T] = []
         self._lock = threading.Lock()
 
-    def offer(self, message: Data[T]) -> None:
+    def offer(self, message: object) -> None:
         try:
-            value = self._command.check(message.data)
+            value = self._command.read(message)
         except ValueError as error:
             self._log.warning(f'~/{self._command.name}: {error}', self._command.name)
             return

@@ -184,7 +184,7 @@ class LightNode:
             CommandTopic(f'{prefix}cmd/enable', Bool, enable),
             CommandTopic(f'{prefix}cmd/brightness', Float32,
                          functools.partial(self._set_brightness, source, prefix),
-                         functools.partial(checked, 'brightness')))
+                         lambda message: checked('brightness', message.data)))
 
     # Requests
 

@@ -1,0 +1,93 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Rotations, compared with scipy's."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+from illuminator_ros.payload.rotation import (
+    enu_flu,
+    enu_ned,
+    flip,
+    flu_frd,
+    ned_frd,
+    Quaternion,
+    Vector,
+)
+import pytest
+from scipy.spatial.transform import Rotation
+
+ENU_TO_NED = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
+FLU_TO_FRD = Rotation.from_matrix([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
+
+angles = st.floats(-math.pi, math.pi)
+quaternions = st.builds(
+    Quaternion.from_euler, angles, st.sampled_from((-math.pi / 2, math.pi / 2)) | angles, angles)
+vectors = st.tuples(*[st.floats(-10, 10)] * 3)
+
+
+def oracle(q: Quaternion) -> Rotation:
+    return Rotation.from_quat([q.x, q.y, q.z, q.w])
+
+
+def distance(q: Quaternion, expected: Rotation) -> float:
+    return float((oracle(q).inv() * expected).magnitude())
+
+
+@given(quaternions, quaternions, vectors)
+def test_composition_inverse_and_vectors_are_those_of_scipy(
+        one: Quaternion, other: Quaternion, vector: Vector) -> None:
+    assert distance(one * other, oracle(one) * oracle(other)) < 1e-6
+    assert distance(one.inverse(), oracle(one).inv()) < 1e-6
+    assert one.rotate(vector) == pytest.approx(oracle(one).apply(vector), abs=1e-9)
+    assert one.angle_to(other) == pytest.approx(
+        (oracle(one).inv() * oracle(other)).magnitude(), abs=1e-6)
+
+
+@given(angles, angles, angles)
+def test_euler_angles_are_intrinsic_zyx(roll: float, pitch: float, yaw: float) -> None:
+    assert distance(Quaternion.from_euler(roll, pitch, yaw),
+                    Rotation.from_euler('ZYX', [yaw, pitch, roll])) < 1e-6
+
+
+@given(quaternions)
+def test_euler_angles_recompose_the_rotation_at_the_singular_pitch_too(q: Quaternion) -> None:
+    assert q.angle_to(Quaternion.from_euler(*q.euler())) < math.radians(0.001)
+
+
+@given(quaternions, vectors)
+def test_frames_of_ros_and_mavlink_are_converted_there_and_back(
+        q: Quaternion, vector: Vector) -> None:
+    assert distance(ned_frd(q), ENU_TO_NED * oracle(q) * FLU_TO_FRD.inv()) < 1e-6
+    assert enu_flu(ned_frd(q)).angle_to(q) < 1e-6
+    assert distance(flip(q), FLU_TO_FRD * oracle(q) * FLU_TO_FRD.inv()) < 1e-6
+    assert enu_ned(vector) == pytest.approx(ENU_TO_NED.apply(vector), abs=1e-9)
+    assert flu_frd(vector) == pytest.approx(FLU_TO_FRD.apply(vector), abs=1e-9)
+
+
+@pytest.mark.parametrize('yaw_ros, yaw_mavlink', [(0, 90), (90, 0), (180, -90), (-90, 180)])
+def test_yaw_is_counted_from_east_in_ros_and_from_north_in_mavlink(
+        yaw_ros: float, yaw_mavlink: float) -> None:
+    _, _, yaw = ned_frd(Quaternion.from_euler(0, 0, math.radians(yaw_ros))).euler()
+    assert math.cos(yaw - math.radians(yaw_mavlink)) == pytest.approx(1)
+
+
+@pytest.mark.parametrize('q', [
+    Quaternion(0, 0, 0, 0), Quaternion(math.nan, 0, 0, 0), Quaternion(math.inf, 0, 0, 1)])
+def test_a_quaternion_without_direction_is_refused(q: Quaternion) -> None:
+    with pytest.raises(ValueError, match='is not a rotation'):
+        q.normalized()
