@@ -81,6 +81,12 @@ def address(text: str) -> Address:
     return Address(int(system), int(component))
 
 
+def add_mavlink_version(parser: argparse.ArgumentParser) -> None:
+    """Add the option that selects the version of the frames that are sent."""
+    parser.add_argument('--mavlink-version', type=int, choices=(1, 2), default=2,
+                        help='MAVLink version of sent frames; both are received (default: 2)')
+
+
 def add_signing(parser: argparse.ArgumentParser) -> None:
     """Add the options of message signing."""
     parser.add_argument('--signing-mode', choices=[mode.value for mode in SigningMode],

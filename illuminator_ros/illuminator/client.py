@@ -24,6 +24,7 @@ from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
 from ..mavlink.command import CommandSender
+from ..mavlink.component import Payload
 from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, MavType, Message
 from ..payload.discovery import Discovery
 from ..payload.events import Listeners
@@ -33,7 +34,7 @@ from ..payload.identity import Identity
 MAX_ASKED = 8
 
 
-class IlluminatorClient:
+class IlluminatorClient(Payload):
     """
     Finds illuminators on a link by what they send, never by their ids.
 

@@ -119,6 +119,7 @@ class SimulatedIlluminator(SimulatedDevice):
     """
 
     changes = frozenset({MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE})
+    sends = (IlluminatorStatus, ComponentInformationBasic)
     faults = FAULTS
     commands = COMMANDS
     behaviour: IlluminatorBehaviour

@@ -38,10 +38,13 @@ class Endpoint(ABC):
     A :class:`~.link.Link` calls it from its thread only and sends what it leaves in ``outgoing``.
 
     :ivar messages: the classes of the messages that it receives; the link decodes no others.
+    :ivar sends: the classes of messages that it sends; those that it also receives, and those of
+        the command protocol, may be left out.
     :ivar outgoing: messages to send, each with the address that sends it.
     """
 
     messages: Sequence[type[Message]]
+    sends: Sequence[type[Message]] = ()
 
     def __init__(self) -> None:
         self.outgoing: deque[tuple[Address, Message]] = deque()
@@ -75,7 +78,10 @@ class Payload(Protocol):
     A part of a component: the client of a light, a winch, a camera ...
 
     :ivar messages: the classes of the messages that it receives, HEARTBEAT included if needed.
+    :ivar sends: the classes of messages that it sends, see :class:`Endpoint`.
     """
+
+    sends: Sequence[type[Message]] = ()
 
     @property
     def messages(self) -> Sequence[type[Message]]:
@@ -145,6 +151,7 @@ class Component(Endpoint):
         # HEARTBEAT and COMMAND_ACK show an address conflict where no payload needs them.
         self.messages = tuple(dict.fromkeys(
             (Heartbeat, CommandAck, *(cls for one in payloads for cls in one.messages))))
+        self.sends = tuple(dict.fromkeys(cls for one in payloads for cls in one.sends))
         self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)
                            for cls in self.messages}
         self._heartbeat = HeartbeatTimer(self.address, mav_type)

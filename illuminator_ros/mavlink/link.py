@@ -111,10 +111,10 @@ class Link:
         self._signing = signing or Signing()
         self._writer = FrameWriter(self._signing, mavlink_version)
         self._classes = {cls.id: cls for cls in endpoint.messages}
-        if mavlink_version == 1 and (
-                too_high := [c.name for c in endpoint.messages if c.id > MAX_ID_V1]):
-            raise ValueError(f'{", ".join(too_high)} cannot be sent with MAVLink 1, which has no '
-                             f'message ids above {MAX_ID_V1}: use MAVLink 2')
+        classes = dict.fromkeys((*endpoint.messages, *endpoint.sends))
+        if mavlink_version == 1 and (too_high := [c.name for c in classes if c.id > MAX_ID_V1]):
+            raise ValueError(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
+                             f'ids above {MAX_ID_V1}; use MAVLink 2')
         self._timestamps = TimestampKeeper(self._signing, store)
         self._connector = Connector(
             url, self._opened_elsewhere, self._failed_elsewhere, self._connector_ended)

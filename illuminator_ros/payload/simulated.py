@@ -112,11 +112,13 @@ class SimulatedDevice(ABC):
 
     :param behaviour: how it behaves at first, and without faults.
     :cvar changes: the MAV_CMDs that change its state.
+    :cvar sends: the classes of its messages.
     :cvar faults: the faults that it can have.
     :cvar commands: changes by a person, on the console.
     """
 
     changes: ClassVar[frozenset[int]]
+    sends: ClassVar[Sequence[type[Message]]] = ()
     faults: ClassVar[FaultTable] = FAULTS
     commands: ClassVar[Sequence[ConsoleCommand[Any, Change]]] = ()
 
@@ -498,6 +500,8 @@ class SimulatedComponents(Endpoint, Generic[D]):
             SimulatedComponent(one, now, self.outgoing,
                                functools.partial(self._changed.add, index))
             for index, one in enumerate(described)]
+        self.sends = tuple(dict.fromkeys(
+            cls for one in self.components for cls in one.device.sends))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""

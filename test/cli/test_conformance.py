@@ -231,6 +231,7 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
     (['udpin://:1', '--target', '1'], "'1' is "),
     (['udpin://:1', '--junit', '/nowhere/at/all.xml'], 'there is no such directory'),
     (['udpin://:1', '--signing-mode', 'sign'], 'key'),
+    (['udpin://:1', '--mavlink-version', '1'], 'MAVLink 1 cannot carry ILLUMINATOR_STATUS'),
 ])
 def test_a_wrong_argument_is_named_in_one_line_with_status_2(
         arguments: list[str], reason: str) -> None:

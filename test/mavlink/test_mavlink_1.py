@@ -20,6 +20,8 @@ from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
 from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component, Payload
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -82,8 +84,18 @@ def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_
         (76, bytes(28) + bytes((0, 2, 1, 2, 0))), (75, bytes(28) + bytes((195, 0, 1, 2, 0, 0, 0)))]
 
 
+def test_link_of_version_1_refuses_messages_that_only_a_payload_of_its_component_sends() -> None:
+    class Sender(Payload):
+        messages = (Heartbeat,)
+        sends = (IlluminatorStatus,)
+
+    with pytest.raises(ValueError, match='cannot carry ILLUMINATOR_STATUS:'):
+        Link(parse_url('memory://one'), Component(CommandSender(BRIDGE), [Sender()]),
+             label='one', mavlink_version=1)
+
+
 @pytest.mark.parametrize(('messages', 'options', 'reason'), [
-    ((Heartbeat, IlluminatorStatus), {}, 'ILLUMINATOR_STATUS cannot be sent with MAVLink 1'),
+    ((Heartbeat, IlluminatorStatus), {}, 'MAVLink 1 cannot carry ILLUMINATOR_STATUS:'),
     ((), {'signing': Signing(SigningMode.SIGN, bytes(32))}, 'cannot be signed'),
     ((), {'mavlink_version': 3}, 'version 3 is neither')])
 def test_link_that_mavlink_1_cannot_serve_is_refused_with_the_reason(

@@ -190,6 +190,7 @@ class SimulatedWinch(simulated.SimulatedDevice):
     """A winch that releases and winds in at once."""
 
     changes = frozenset({DO_WINCH})
+    sends = (WinchStatus,)
 
     def __init__(self) -> None:
         super().__init__(Behaviour(heartbeat_type=MAV_TYPE_WINCH))

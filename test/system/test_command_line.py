@@ -77,6 +77,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', '--ambient inf', '--ambient: inf is outside -60 to 150'),
     ('simulator', '--min-strobe-period 2 --max-strobe-period 1',
      'min_strobe_period is above max_strobe_period'),
+    ('simulator', '--mavlink-version 1',
+     'MAVLink 1 cannot carry ILLUMINATOR_STATUS, COMPONENT_INFORMATION_BASIC:'),
     ('simulator', '--signing-mode maybe', "invalid choice: 'maybe'"),
     ('simulator', '--signing-mode require', 'no key file is given'),
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',

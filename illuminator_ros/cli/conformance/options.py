@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..options import add_signing, address, integer, number, Parser
+from ..options import add_mavlink_version, add_signing, address, integer, number, Parser
 from ..payloads import PAYLOADS
 from ... import __version__
 from ...mavlink.messages import Address
@@ -88,6 +88,7 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks
     add('--json', metavar='FILE', help='also write a JSON report with all messages')
     add('-v', '--verbose', action='store_true',
         help='show the messages for requirements that are met, too')
+    add_mavlink_version(parser)
     add_signing(parser)
     options = parser.parse_args(args)
     if options.url is None and not options.list:

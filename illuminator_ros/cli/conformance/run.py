@@ -68,11 +68,12 @@ def run(args: Sequence[str] | None = None) -> int:
     try:
         url = parse_url(options.url)
         signs, store = signing(options, f'conformance {address}')
+        conformance = Conformance(options, checks, address, url, signs, store)
     except (UrlError, KeyFileError, ValueError) as error:
         _complain(str(error))
         return 2
     try:
-        return Conformance(options, checks, address, url, signs, store).run()
+        return conformance.run()
     except LinkThreadError as error:
         _complain(f'{error}; nothing was checked')
         return 2
@@ -96,7 +97,8 @@ class Conformance:
         self._table = Table(verbose=options.verbose)
         self._session = checks.session(address, options.target)
         self._link = Link(url, self._session, label=options.url, on_event=self._link_event,
-                          signing=signs, store=store)
+                          signing=signs, store=store,
+                          mavlink_version=options.mavlink_version)
         self._suite: Suite[Any] | None = None
         self._signals = 0
         self._written = True

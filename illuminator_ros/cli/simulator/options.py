@@ -21,7 +21,7 @@ from collections.abc import Iterable, Mapping
 
 from .console import describe_commands
 from .scenario import SettingError, Types
-from ..options import add_signing, integer, Parser
+from ..options import add_mavlink_version, add_signing, integer, Parser
 from ..payloads import PAYLOADS
 from ... import __version__
 from ...payload.registry import PayloadType
@@ -104,5 +104,6 @@ def parser(
                             action='append' if name == 'fault' else 'store', help=setting.help)
     result.add_argument('--plain', action='store_true',
                         help='plain lines on a terminal, too, instead of the live view')
+    add_mavlink_version(result)
     add_signing(result)
     return result

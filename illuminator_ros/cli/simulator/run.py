@@ -69,7 +69,8 @@ class _Simulation:
         self._endpoint: SimulatedComponents[Any] = SimulatedComponents(described, 0.0)
         self._endpoint.new_peers.subscribe(self._found)
         self._link = Link(url, self._endpoint, label=label, on_event=self._say,
-                          signing=signs, store=store)
+                          signing=signs, store=store,
+                          mavlink_version=options.mavlink_version)
         for component in self._endpoint.components:
             component.power_on(self._link.clock())
 

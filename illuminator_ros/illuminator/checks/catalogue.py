@@ -60,7 +60,8 @@ def describe(message: Message) -> str:
 
 
 CHECKS: PayloadChecks[LightTester] = PayloadChecks(
-    payload='illuminator', device='light', messages=(IlluminatorStatus,), is_device=is_light,
+    payload='illuminator', device='light', is_device=is_light,
+    messages=(IlluminatorStatus, ComponentInformationBasic),
     evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS', describe=describe,
     tester=LightTester, requirements=REQUIREMENTS,
     risk='strobe, or shine at 100 %',

@@ -217,8 +217,7 @@ class Session(Endpoint):
     ) -> None:
         super().__init__()
         self.address = address
-        self.messages = (messages.Heartbeat, CommandAck, messages.ComponentInformationBasic,
-                         *payload_messages)
+        self.messages = (messages.Heartbeat, CommandAck, *payload_messages)
         self.target = target
         self.runner = CoroutineRunner()
         self.found: Address | None = None
@@ -316,7 +315,7 @@ class Session(Endpoint):
 
     def received(self, cls: type[M]) -> History[tuple[float, M]]:
         """Return the messages of a class that the device has sent, with their times, s."""
-        return cast(History[tuple[float, M]], self._received[cls])
+        return cast(History[tuple[float, M]], self._received.get(cls, History()))
 
     def idle(self, cls: type[M]) -> list[tuple[float, M]]:
         """Return those that the device sent before the session sent a command."""
