@@ -20,12 +20,13 @@ import random
 from types import ModuleType
 from typing import Any, cast
 
+from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.mavlink.messages import decode_payload, encode_payload, Message
 from illuminator_ros.payload import vehicle
 from pymavlink.dialects.v20 import ardupilotmega
 import pytest
 
-MODULES: tuple[ModuleType, ...] = (vehicle,)
+MODULES: tuple[ModuleType, ...] = (vehicle, gimbal)
 CLASSES: list[type[Message]] = [
     value for module in MODULES for value in vars(module).values()
     if isinstance(value, type) and issubclass(value, Message) and value is not Message

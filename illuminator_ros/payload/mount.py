@@ -1,0 +1,151 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The attitude of a stabilised mount, in the conventions of ROS and MAVLink.
+
+A stabilised mount keeps roll and pitch relative to the horizon. Its yaw is relative to the earth
+or to the vehicle's heading, so that neither frame is the vehicle's body frame. ROS has ENU and FLU
+(REP 103): pitch down and yaw left are positive, and a yaw of 0 is east or ahead. MAVLink has NED
+and FRD: pitch up and yaw right are positive, and a yaw of 0 is north or ahead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntFlag
+import math
+
+from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
+from .vehicle import GimbalDeviceAttitudeStatus
+
+# w, x, y, z of a message.
+Components = tuple[float, float, float, float]
+# A quaternion or a vector that the receiver must ignore.
+UNSET: Components = (math.nan,) * 4
+
+
+class MountFlags(IntFlag):
+    """GIMBAL_DEVICE_FLAGS, and GIMBAL_MANAGER_FLAGS, which has the same values."""
+
+    RETRACT = 1
+    NEUTRAL = 2
+    ROLL_LOCK = 4
+    PITCH_LOCK = 8
+    YAW_LOCK = 16
+    YAW_IN_VEHICLE_FRAME = 32
+    YAW_IN_EARTH_FRAME = 64
+    ACCEPTS_YAW_IN_EARTH_FRAME = 128
+    RC_EXCLUSIVE = 256
+    RC_MIXED = 512
+
+
+class YawFrame(Enum):
+    """The direction that a yaw is relative to; roll and pitch are relative to the horizon."""
+
+    EARTH = 'earth'
+    VEHICLE = 'vehicle'
+
+    @property
+    def flag(self) -> MountFlags:
+        """Return the flag of messages that name the frame."""
+        return _FLAGS[self]
+
+
+_FLAGS = {YawFrame.EARTH: MountFlags.YAW_IN_EARTH_FRAME,
+          YawFrame.VEHICLE: MountFlags.YAW_IN_VEHICLE_FRAME}
+
+
+def names_frame(flags: int) -> bool:
+    """Return whether flags name a yaw frame, as those of old implementations do not."""
+    return bool(flags & (MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME))
+
+
+def yaw_frame(flags: int) -> YawFrame:
+    """
+    Return the yaw frame of a message with quaternion and flags.
+
+    Without a flag of a frame it follows from YAW_LOCK (GIMBAL_DEVICE_ATTITUDE_STATUS).
+
+    :raises ValueError: if the flags name both frames.
+    """
+    earth, vehicle = flags & MountFlags.YAW_IN_EARTH_FRAME, flags & MountFlags.YAW_IN_VEHICLE_FRAME
+    if earth and vehicle:
+        raise ValueError('the flags name both yaw frames')
+    if not vehicle and (earth or flags & MountFlags.YAW_LOCK):
+        return YawFrame.EARTH
+    return YawFrame.VEHICLE
+
+
+def from_mavlink(q: Components, frame: YawFrame) -> Quaternion:
+    """
+    Return the rotation in ROS of a quaternion in MAVLink.
+
+    :raises ValueError: if it is not a rotation, NaN included.
+    """
+    rotation = Quaternion(*q).normalized()
+    return enu_flu(rotation) if frame is YawFrame.EARTH else flip(rotation)
+
+
+def to_mavlink(rotation: Quaternion, frame: YawFrame) -> Components:
+    """Return the quaternion in MAVLink of a rotation in ROS."""
+    q = ned_frd(rotation) if frame is YawFrame.EARTH else flip(rotation)
+    return q.w, q.x, q.y, q.z
+
+
+@dataclass(frozen=True, slots=True)
+class MountAttitude:
+    """
+    The attitude of a mount.
+
+    :param rotation: from the FLU axes of the mount to ENU, or to the level FLU axes that have the
+        vehicle's heading.
+    :param rates: of roll, pitch and yaw with the signs of FLU, rad/s; None where unknown.
+    :param heading: of the vehicle, rad from north, clockwise; None where unknown.
+    """
+
+    rotation: Quaternion
+    frame: YawFrame
+    rates: Vector | None = None
+    heading: float | None = None
+
+    @classmethod
+    def from_status(cls, status: GimbalDeviceAttitudeStatus) -> MountAttitude:
+        """
+        Read a status.
+
+        :raises ValueError: if it has no attitude.
+        """
+        frame = yaw_frame(status.flags)
+        rates = flu_frd((status.angular_velocity_x, status.angular_velocity_y,
+                         status.angular_velocity_z))
+        # Implementations that name no frame are older than delta_yaw.
+        heading = status.delta_yaw if names_frame(status.flags) else math.nan
+        return cls(from_mavlink(status.q, frame), frame,
+                   rates if all(map(math.isfinite, rates)) else None,
+                   heading if math.isfinite(heading) else None)
+
+    def seen_from(self, frame: YawFrame, heading: float | None = None) -> Quaternion | None:
+        """
+        Return the rotation with a yaw relative to a frame, None if the heading is unknown.
+
+        :param heading: of the vehicle, used where the mount reports none.
+        """
+        if frame is self.frame:
+            return self.rotation
+        heading = heading if self.heading is None else self.heading
+        if heading is None:
+            return None
+        ahead = Quaternion.from_euler(0.0, 0.0, math.pi / 2 - heading)
+        return (ahead if frame is YawFrame.EARTH else ahead.inverse()) * self.rotation
