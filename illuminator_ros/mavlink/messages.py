@@ -38,6 +38,7 @@ UInt8 = Annotated[int, 'B']
 UInt16 = Annotated[int, 'H']
 UInt32 = Annotated[int, 'I']
 UInt64 = Annotated[int, 'Q']
+Int8 = Annotated[int, 'b']
 Int16 = Annotated[int, 'h']
 Int32 = Annotated[int, 'i']
 Float = Annotated[float, 'f']
@@ -46,8 +47,8 @@ Char24 = Annotated[bytes, '24s']
 Char32 = Annotated[bytes, '32s']
 UInt8x20 = Annotated[tuple[int, ...], '20B']
 Float4 = Annotated[tuple[float, float, float, float], '4f']
-_C_NAMES = {'B': 'uint8_t', 'H': 'uint16_t', 'I': 'uint32_t', 'Q': 'uint64_t', 'h': 'int16_t',
-            'i': 'int32_t', 'f': 'float', 's': 'char'}
+_C_NAMES = {'B': 'uint8_t', 'H': 'uint16_t', 'I': 'uint32_t', 'Q': 'uint64_t', 'b': 'int8_t',
+            'h': 'int16_t', 'i': 'int32_t', 'f': 'float', 's': 'char'}
 
 
 class Address(NamedTuple):
