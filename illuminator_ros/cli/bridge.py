@@ -21,8 +21,8 @@ import json
 import os
 import sys
 
+from .entry_point import one_line, run_program
 from .payloads import PAYLOADS
-from .program import one_line, run_program
 from .termination import Termination
 from ..payload.registry import PayloadType
 

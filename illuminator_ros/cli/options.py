@@ -22,7 +22,7 @@ import sys
 import time
 from typing import NoReturn
 
-from .program import discard_output
+from .entry_point import discard_output
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, TimestampStore

@@ -26,7 +26,7 @@ import threading
 import time
 from typing import NoReturn
 
-from .output import OutputQueue
+from .output_queue import OutputQueue
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, even if something hangs.

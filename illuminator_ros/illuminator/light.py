@@ -22,7 +22,7 @@ import math
 from typing import Any
 
 from .commands import Switch
-from .configuration import (
+from .configuration_manager import (
     ConfigurationManager,
     IMPLIED_TIME,
     LATE_TIME,

@@ -32,10 +32,10 @@ import time
 from .component import Endpoint
 from .connector import Connector
 from .frame import Frame, MAX_ID_V1
+from .frame_reader import FrameReader
 from .frame_writer import FrameWriter
 from .link_state import LinkEvent, LinkInput, LinkSnapshot, LinkStatus
 from .messages import Address, decode_payload, Message
-from .receiver import Receiver
 from .routing_table import RoutingTable
 from .signing import Signing
 from .signing_files import TimestampKeeper, TimestampStore
@@ -121,7 +121,7 @@ class Link:
         self._connecting = False
         self._connect_at = -math.inf
         self._channel: Channel | None = None
-        self._receiver = Receiver(self._signing, self._classes)
+        self._receiver = FrameReader(self._signing, self._classes)
         self._router = RoutingTable()
         self._traffic = Traffic()
         self._status = LinkStatus(label, clock())

@@ -45,7 +45,7 @@ class NodeLog:
     Writes to the logger of a node, from any thread.
 
     Writing never waits for the reader of stderr: that leads to an
-    :class:`~illuminator_ros.cli.output.OutputQueue`.
+    :class:`~illuminator_ros.cli.output_queue.OutputQueue`.
     """
 
     def __init__(

@@ -16,8 +16,8 @@
 
 from pathlib import Path
 
+from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
-from illuminator_ros.cli.simulator.scenario import scenario
 from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import astuple
 from typing import Any
 
-from illuminator_ros.illuminator.configuration import RESTORE_INTERVAL
+from illuminator_ros.illuminator.configuration_manager import RESTORE_INTERVAL
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode

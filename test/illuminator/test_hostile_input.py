@@ -26,6 +26,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import checked
+from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -35,7 +36,6 @@ from illuminator_ros.mavlink.messages import (
     Heartbeat,
     LAYOUTS,
 )
-from illuminator_ros.mavlink.receiver import MAX_DECODERS
 from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES

@@ -17,9 +17,9 @@
 from typing import Any
 
 from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.cli.simulator.components import components, Scenario, scenario
 from illuminator_ros.cli.simulator.console import execute
 from illuminator_ros.cli.simulator.options import parser, payload_types
-from illuminator_ros.cli.simulator.scenario import components, Scenario, scenario
 from illuminator_ros.cli.simulator.view import look
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings

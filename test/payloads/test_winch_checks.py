@@ -20,7 +20,7 @@ from illuminator_ros.illuminator.simulated import describe
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
-from illuminator_ros.payload.checks.suite import Suite
+from illuminator_ros.payload.checks.runner import CheckRunner
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from payloads.winch import SimulatedWinch, WINCH
 from payloads.winch_checks import REQUIREMENTS
@@ -41,7 +41,7 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
     if fault:
         component.behave(winch.faults.add(component.behaviour, fault), START)
     session = checks.session(Address(255, 190))
-    suite = Suite(checks, session, Conditions(), checks.requirements)
+    suite = CheckRunner(checks, session, Conditions(), checks.requirements)
 
     async def run() -> None:
         await session.find(10.0, 2.0)

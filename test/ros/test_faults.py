@@ -19,7 +19,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.ros.publishers import LightPublishers
+from illuminator_ros.illuminator.ros.event_publisher import EventPublisher
 from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsPublisher
 from illuminator_ros.ros.node import PayloadNode
@@ -133,7 +133,7 @@ def test_parameter_service_that_fails_inside_answers_empty(ros: Ros, light: Serv
 
 
 @pytest.mark.parametrize(('owner', 'method'), [
-    (LightPublishers, 'take'), (DiagnosticsPublisher, 'poll'), (DiagnosticsPublisher, 'look')])
+    (EventPublisher, 'take'), (DiagnosticsPublisher, 'poll'), (DiagnosticsPublisher, 'look')])
 def test_publishing_goes_on_after_it_has_failed(
     ros: Ros, light: ServedLight, owner: type, method: str,
 ) -> None:

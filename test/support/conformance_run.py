@@ -30,7 +30,7 @@ from illuminator_ros.illuminator.simulated_properties import FAULTS, Illuminator
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
 from illuminator_ros.payload.checks.coroutine import Interrupted
 from illuminator_ros.payload.checks.requirement import Conditions, Requirement, Result, Verdict
-from illuminator_ros.payload.checks.suite import absence, Suite
+from illuminator_ros.payload.checks.runner import absence, CheckRunner
 from support.virtual_link import START, VirtualLink
 
 TESTER = Address(255, 190)
@@ -61,7 +61,7 @@ class Run:
         self.light = self.lights.components[0]
         self.session = CHECKS.session(TESTER, target)
         self.link = VirtualLink(self.session, self.lights)
-        self.suite = Suite(
+        self.suite = CheckRunner(
             CHECKS, self.session, Conditions(
                 consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat}),
             [one for one in requirements if not only or one.name in only])

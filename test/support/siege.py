@@ -31,8 +31,8 @@ from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated import describe, simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.command import MAX_WAITING
+from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
-from illuminator_ros.mavlink.receiver import MAX_DECODERS
 from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
-from illuminator_ros.illuminator.configuration import CONFIGURE_LIMIT
+from illuminator_ros.illuminator.configuration_manager import CONFIGURE_LIMIT
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import Mode

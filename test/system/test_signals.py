@@ -43,7 +43,7 @@ LEASE = 20.0
 
 HANGING = """
 import threading
-from illuminator_ros.cli.program import run_program
+from illuminator_ros.cli.entry_point import run_program
 def hang(termination):
     termination.calls(threading.Event().wait, last=lambda: print('at last', flush=True))
     print('hanging', flush=True)

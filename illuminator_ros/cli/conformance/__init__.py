@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import signal
 
-from ..program import escape_output, explained
+from ..entry_point import escape_output, explained
 
 
 def main(args: list[str] | None = None) -> int:

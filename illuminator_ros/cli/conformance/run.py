@@ -32,8 +32,8 @@ from types import FrameType
 from typing import Any
 
 from .options import parse
+from ..entry_point import discard_output
 from ..options import signing
-from ..program import discard_output
 from ..termination import SIGNALS
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent
@@ -44,7 +44,7 @@ from ...mavlink.url import parse_url, Url, UrlError
 from ...payload.checks.coroutine import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
 from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, Result
-from ...payload.checks.suite import absence, names, Suite
+from ...payload.checks.runner import absence, CheckRunner, names
 
 # s to listen before the first command.
 LISTEN_TIME = 4.5
@@ -99,7 +99,7 @@ class Conformance:
         self._link = Link(url, self._session, label=options.url, on_event=self._link_event,
                           signing=signs, store=store,
                           mavlink_version=options.mavlink_version)
-        self._suite: Suite[Any] | None = None
+        self._suite: CheckRunner[Any] | None = None
         self._signals = 0
         self._written = True
         # Written by the link's thread before the main thread reads them.
@@ -126,7 +126,7 @@ class Conformance:
         conditions = Conditions(
             bool(self._announcement) and self._consent(),
             lambda: self._link.state().decoding.crc_errors, self._payload_options)
-        suite = self._suite = Suite(
+        suite = self._suite = CheckRunner(
             checks, self._session, conditions, self._requirements, self._show)
         self._finish(suite.run(missing))
         self._link.stop()

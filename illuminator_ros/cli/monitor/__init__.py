@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import signal
 
-from ..program import run_program
+from ..entry_point import run_program
 from ..termination import Termination
 
 

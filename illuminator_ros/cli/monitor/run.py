@@ -43,8 +43,8 @@ from .terminal import (
     while_it_lasts,
 )
 from .view import plain, screen, ViewState
+from ..entry_point import discard_output, one_line
 from ..options import number, Parser
-from ..program import discard_output, one_line
 from ..termination import Termination
 from ... import __version__
 from ...ros.executor import NodeExecutor

@@ -28,7 +28,7 @@ import tempfile
 import termios
 import threading
 
-from ..program import discard_output
+from ..entry_point import discard_output
 
 # s after an escape in which the rest of its sequence must arrive.
 ESCAPE_TIMEOUT = 0.05

@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 import sys
 
+from ..entry_point import run_program
 from ..payloads import PAYLOADS
-from ..program import run_program
 from ..termination import Termination
 from ...payload.registry import PayloadType
 

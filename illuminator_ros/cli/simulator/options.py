@@ -19,8 +19,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Mapping
 
+from .components import SettingError, Types
 from .console import describe_commands
-from .scenario import SettingError, Types
 from ..options import add_mavlink_version, add_signing, integer, Parser
 from ..payloads import PAYLOADS
 from ... import __version__

@@ -28,9 +28,9 @@ import sys
 import threading
 from typing import Any
 
+from .components import components, load, Scenario, SettingError, Types
 from .console import execute
 from .options import DEFAULT_URL, parser, payload_types
-from .scenario import components, load, Scenario, SettingError, Types
 from .view import LiveView, Look, look, PlainView
 from ..options import signing
 from ..termination import Termination

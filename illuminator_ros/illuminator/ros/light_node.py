@@ -26,8 +26,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from .beam import BeamPublisher
 from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
+from .event_publisher import EventPublisher, PUBLICATIONS
 from .parameters import BeamGeometry, device_parameters
-from .publishers import LightPublishers, PUBLICATIONS
 from ..client import IlluminatorClient
 from ..events import AnyLightEvent
 from ..light import Light
@@ -100,7 +100,7 @@ class LightNode:
             interface.publish('source', '')
         ParameterServices(
             node, host.link, log, parameters, self._check_value, self._configure)
-        self._publishers = LightPublishers(
+        self._publishers = EventPublisher(
             node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
             check_diagnostics=host.check_diagnostics)
         self._beam = BeamPublisher(node, geometry) if geometry.beam_range else None

@@ -17,8 +17,7 @@
 from pathlib import Path
 import sys
 
-from illuminator_ros.cli.simulator.options import parser
-from illuminator_ros.cli.simulator.scenario import (
+from illuminator_ros.cli.simulator.components import (
     components,
     Listed,
     load,
@@ -26,6 +25,7 @@ from illuminator_ros.cli.simulator.scenario import (
     scenario,
     SettingError,
 )
+from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.illuminator.model import Limits, Mode
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties

@@ -20,8 +20,8 @@ from collections.abc import Sequence
 import math
 
 from illuminator_ros.mavlink.frame import ForeignFrames, Frame
+from illuminator_ros.mavlink.frame_reader import FrameReader, MAX_DECODERS, STALL
 from illuminator_ros.mavlink.messages import Address, LAYOUTS
-from illuminator_ros.mavlink.receiver import MAX_DECODERS, Receiver, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import heartbeat_frame, LIGHT, raw_v1
@@ -33,15 +33,15 @@ FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\
 
 
 @pytest.fixture
-def receiver() -> Receiver:
-    return Receiver(Signing(), LAYOUTS)
+def receiver() -> FrameReader:
+    return FrameReader(Signing(), LAYOUTS)
 
 
 def sources(frames: Sequence[Frame | ForeignFrames]) -> list[Address]:
     return [frame.source for frame in frames]
 
 
-def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Receiver) -> None:
+def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: FrameReader) -> None:
     frames = {peer: heartbeat_frame(Address(1, peer)) for peer in (1, 2)}
     for peer, frame in frames.items():
         assert receiver.take(peer, frame[:9], 0.0, UNIX) == []
@@ -52,7 +52,7 @@ def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Re
 
 @pytest.mark.parametrize('noise', [*FALSE_STARTS, b''.join(FALSE_STARTS * 5)])
 def test_good_frame_behind_false_starts_comes_after_the_stall_time_without_more_bytes(
-        receiver: Receiver, noise: bytes) -> None:
+        receiver: FrameReader, noise: bytes) -> None:
     assert receiver.take('a', noise + FRAME, 0.0, UNIX) == []
     assert receiver.next_deadline() == STALL
     assert receiver.give_up(STALL - 0.01, UNIX) == []
@@ -61,7 +61,7 @@ def test_good_frame_behind_false_starts_comes_after_the_stall_time_without_more_
     assert receiver.next_deadline() == math.inf
 
 
-def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: Receiver) -> None:
+def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: FrameReader) -> None:
     receiver.take('a', FALSE_STARTS[0], 0.0, UNIX)
     receiver.take('a', FRAME[:9], 0.4, UNIX)
     assert receiver.next_deadline() == STALL
@@ -69,13 +69,13 @@ def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: Receiv
     assert sources(receiver.take('a', FRAME[9:], STALL + 0.1, UNIX)) == [LIGHT]
 
 
-def test_wait_begins_anew_with_the_next_frame(receiver: Receiver) -> None:
+def test_wait_begins_anew_with_the_next_frame(receiver: FrameReader) -> None:
     receiver.take('a', FRAME[:9], 0.0, UNIX)
     receiver.take('a', FRAME[9:] + FRAME[:9], 0.4, UNIX)
     assert receiver.next_deadline() == 0.4 + STALL
 
 
-def test_longest_frame_at_9600_baud_is_not_given_up(receiver: Receiver) -> None:
+def test_longest_frame_at_9600_baud_is_not_given_up(receiver: FrameReader) -> None:
     found = []
     for number, byte in enumerate(raw_v1(110, bytes(range(1, 251)))):
         now = number * 0.00104
@@ -85,7 +85,7 @@ def test_longest_frame_at_9600_baud_is_not_given_up(receiver: Receiver) -> None:
 
 
 def test_garbage_of_many_peers_is_bounded_and_costs_a_good_peer_nothing(
-        receiver: Receiver) -> None:
+        receiver: FrameReader) -> None:
     receiver.take('good', FRAME + FRAME[:9], 0.0, UNIX)
     for number in range(10 * MAX_DECODERS):
         receiver.take(number, FALSE_STARTS[0], 0.0, UNIX)
@@ -96,12 +96,12 @@ def test_garbage_of_many_peers_is_bounded_and_costs_a_good_peer_nothing(
 
 
 def test_unsigned_frames_do_not_pass_where_signing_is_required() -> None:
-    receiver = Receiver(Signing(SigningMode.REQUIRE, bytes(32)), LAYOUTS)
+    receiver = FrameReader(Signing(SigningMode.REQUIRE, bytes(32)), LAYOUTS)
     assert receiver.take('a', FRAME + FALSE_STARTS[0] + FRAME, 0.0, UNIX) == []
     assert receiver.give_up(STALL, UNIX) == []
 
 
-def test_closed_link_awaits_nothing(receiver: Receiver) -> None:
+def test_closed_link_awaits_nothing(receiver: FrameReader) -> None:
     receiver.take('a', FRAME[:9], 0.0, UNIX)
     receiver.clear()
     assert receiver.next_deadline() == math.inf

@@ -86,7 +86,7 @@ _REASONS = {
 _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 
-class LightPublishers:
+class EventPublisher:
     """
     Publishes the events of one light, in the link's thread, without a change of threads.
 

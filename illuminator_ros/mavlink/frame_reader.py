@@ -49,7 +49,7 @@ class _Stream:
         self.good = False
 
 
-class Receiver:
+class FrameReader:
     """
     The way in of a link: framing and signing.
 

@@ -62,7 +62,7 @@ def absence(session: Session, checks: PayloadChecks[T], timeout: float) -> str:
             + others)
 
 
-class Suite(Generic[T]):
+class CheckRunner(Generic[T]):
     """
     Checks requirements one after another; :meth:`run` does it.
 
