@@ -23,7 +23,18 @@ import math
 from typing import Protocol
 
 from .command import CommandSender, CommandStatus
-from .messages import Address, CommandAck, Heartbeat, heartbeat, MavType, Message
+from .command_receiver import AnyCommand, CommandReceiver
+from .messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    heartbeat,
+    MavResult,
+    MavType,
+    Message,
+)
 
 # s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0
@@ -78,6 +89,7 @@ class Payload(Protocol):
     A part of a component: the client of a light, a winch, a camera ...
 
     :ivar messages: the classes of the messages that it receives, HEARTBEAT included if needed.
+        Commands are executed if COMMAND_LONG and COMMAND_INT are among them.
     :ivar sends: the classes of messages that it sends, see :class:`Endpoint`.
     """
 
@@ -97,6 +109,14 @@ class Payload(Protocol):
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Receive a message from another address, of one of the classes of ``messages``."""
+
+    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+        """
+        Execute a command to this component, or to all components, and return its result.
+
+        :return: None if the payload does not support it; another payload may.
+        """
+        return None
 
     def poll(self, now: float) -> None:
         """Do everything that is due."""
@@ -154,6 +174,7 @@ class Component(Endpoint):
         self.sends = tuple(dict.fromkeys(cls for one in payloads for cls in one.sends))
         self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)
                            for cls in self.messages}
+        self._received = CommandReceiver(self.address)
         self._heartbeat = HeartbeatTimer(self.address, mav_type)
         self._link_open = False
         self._conflict_at = -math.inf
@@ -187,8 +208,22 @@ class Component(Endpoint):
             return
         if isinstance(message, CommandAck):
             self.commands.acknowledge(source, message, now)
+        if isinstance(message, CommandLong | CommandInt):
+            self._take_command(source, message, now)
+            return
         for payload in self._receivers.get(type(message), ()):
             payload.receive(source, message, now)
+
+    def _take_command(self, source: Address, command: AnyCommand, now: float) -> None:
+        before = len(self.outgoing)
+        ack = self._received.take(source, command, now, self._execute)
+        if ack is not None:
+            # Ahead of the messages that the command has caused.
+            self.outgoing.insert(before, (self.address, ack))
+
+    def _execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+        return next((result for payload in self._receivers[type(command)]
+                     if (result := payload.execute(source, command, now)) is not None), None)
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""

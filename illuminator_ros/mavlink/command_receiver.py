@@ -1,0 +1,104 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The receiving side of the MAVLink command protocol; no I/O, and time is passed in.
+
+https://mavlink.io/en/services/command.html: each received COMMAND_LONG and COMMAND_INT is
+acknowledged once. A COMMAND_LONG that its sender repeats, with ``confirmation`` counted up, is
+acknowledged again but not executed again. COMMAND_INT has no such field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+from typing import NamedTuple
+
+from .messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    encode_payload,
+    MavResult,
+)
+
+# Commands whose result is remembered, one of each kind from each sender.
+MAX_RESULTS = 256
+# s since the last frame of a command within which one with a higher confirmation repeats it.
+REPEAT_TIME = 5.0
+
+AnyCommand = CommandLong | CommandInt
+# Executes a command; None if it is not supported.
+Execute = Callable[[Address, AnyCommand, float], MavResult | None]
+
+
+class _Executed(NamedTuple):
+    payload: bytes
+    result: MavResult
+    at: float
+
+
+class CommandReceiver:
+    """
+    Decides which received commands are executed, and how they are acknowledged.
+
+    :param address: our own address.
+    """
+
+    def __init__(self, address: Address) -> None:
+        self._address = address
+        self._executed: dict[tuple[Address, int], _Executed] = {}
+
+    def take(
+        self, source: Address, command: AnyCommand, now: float, execute: Execute,
+    ) -> CommandAck | None:
+        """
+        Take a command and return its acknowledgement.
+
+        :return: None for a command to another component, and for one to all components that is
+            not supported.
+        """
+        target = Address(command.target_system, command.target_component)
+        if target.system not in (self._address.system, 0) or target.component not in (
+                self._address.component, 0):
+            return None
+        result = self._result(source, command, now, execute)
+        if result is None:
+            if target != self._address:
+                return None
+            result = MavResult.UNSUPPORTED
+        return CommandAck(command.command, result, 0, 0, *source)
+
+    def _result(
+        self, source: Address, command: AnyCommand, now: float, execute: Execute,
+    ) -> MavResult | None:
+        if isinstance(command, CommandInt):
+            return execute(source, command, now)
+        key = source, command.command
+        payload = encode_payload(replace(command, confirmation=0))
+        last = self._executed.pop(key, _Executed(b'', MavResult.FAILED, -math.inf))
+        if command.confirmation and last.payload == payload and now < last.at + REPEAT_TIME:
+            result: MavResult | None = last.result
+        else:
+            result = execute(source, command, now)
+        # A command that was rejected temporarily is repeated to be executed.
+        if result not in (None, MavResult.TEMPORARILY_REJECTED):
+            self._executed[key] = _Executed(payload, result, now)
+            if len(self._executed) > MAX_RESULTS:
+                del self._executed[next(iter(self._executed))]
+        return result
+

@@ -1,0 +1,163 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A component that is commanded: what it executes, and how it acknowledges."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_receiver import AnyCommand, MAX_RESULTS, REPEAT_TIME
+from illuminator_ros.mavlink.component import Component, Payload
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    heartbeat,
+    MavResult,
+    Message,
+)
+import pytest
+
+OURS, PILOT, OTHER = Address(1, 194), Address(255, 190), Address(255, 191)
+SUPPORTED = 1000
+
+
+class Turner(Payload):
+    """Executes one command, and sends a heartbeat for it."""
+
+    messages = (CommandLong, CommandInt)
+
+    def __init__(self, commands: CommandSender, supported: int, *results: MavResult) -> None:
+        self.commands = commands
+        self.supported = supported
+        self.results = list(results)
+        self.executed: list[AnyCommand] = []
+
+    def next_deadline(self) -> float:
+        return math.inf
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        raise AssertionError('commands are executed')
+
+    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+        if command.command != self.supported:
+            return None
+        self.executed.append(command)
+        self.commands.send(heartbeat(26))
+        return self.results.pop(0) if self.results else MavResult.ACCEPTED
+
+
+class Rig:
+    """A component with two payloads, of which the second supports the command."""
+
+    def __init__(self, *results: MavResult) -> None:
+        commands = CommandSender(OURS)
+        self.turner = Turner(commands, SUPPORTED, *results)
+        self.component = Component(commands, [Turner(commands, 1001), self.turner])
+
+    def give(self, command: Any, *, source: Address = PILOT, now: float = 1.0) -> list[Any]:
+        """Return what the component sends when it receives a command."""
+        self.component.receive(source, command, now)
+        sent = [message for _, message in self.component.outgoing]
+        self.component.outgoing.clear()
+        return sent
+
+
+def long(command: int = SUPPORTED, *, to: Address = OURS, confirmation: int = 0,
+         param1: float = math.nan) -> CommandLong:
+    return CommandLong(*to, command, confirmation, param1, *(0.0,) * 6)
+
+
+def whole(command: int = SUPPORTED, *, to: Address = OURS) -> CommandInt:
+    return CommandInt(*to, 0, command, 0, 0, *(0.0,) * 4, 0, 0, 0.0)
+
+
+def ack(result: MavResult, command: int = SUPPORTED) -> CommandAck:
+    return CommandAck(command, result, 0, 0, *PILOT)
+
+
+@pytest.mark.parametrize('make', [long, whole])
+def test_a_command_is_acknowledged_before_the_messages_that_it_causes(make: Any) -> None:
+    first, second = Rig(MavResult.DENIED).give(make())
+
+    assert first == ack(MavResult.DENIED)
+    assert isinstance(second, Heartbeat)
+
+
+@pytest.mark.parametrize(('to', 'command', 'result'), [
+    (OURS, SUPPORTED, MavResult.ACCEPTED),
+    (Address(1, 0), SUPPORTED, MavResult.ACCEPTED),
+    (Address(0, 0), SUPPORTED, MavResult.ACCEPTED),
+    (OURS, 31000, MavResult.UNSUPPORTED),
+    (Address(1, 0), 31000, None),
+    (Address(0, 0), 31000, None),
+    (Address(1, 1), SUPPORTED, None),
+    (Address(2, 194), SUPPORTED, None),
+])
+@pytest.mark.parametrize('make', [long, whole])
+def test_a_command_is_answered_if_it_is_for_us(
+        make: Any, to: Address, command: int, result: MavResult | None) -> None:
+    rig = Rig()
+
+    sent = rig.give(make(command, to=to))
+
+    assert sent[:1] == ([] if result is None else [ack(result, command)])
+    assert bool(rig.turner.executed) == (result is MavResult.ACCEPTED)
+
+
+# The second command that comes after long(), and whether it is executed.
+SECOND = {
+    'a repetition': (long(confirmation=1), PILOT, 1.0, False),
+    'a late repetition': (long(confirmation=1), PILOT, REPEAT_TIME + 0.1, True),
+    'the same command, new': (long(), PILOT, 1.0, True),
+    'other params': (long(confirmation=1, param1=1.0), PILOT, 1.0, True),
+    'another sender': (long(confirmation=1), OTHER, 1.0, True),
+}
+
+
+@pytest.mark.parametrize('case', SECOND)
+def test_a_repeated_command_is_acknowledged_again_but_not_executed_again(case: str) -> None:
+    command, source, pause, executed = SECOND[case]
+    rig = Rig(MavResult.DENIED)
+    rig.give(long())
+
+    [answer, *_] = rig.give(command, source=source, now=1.0 + pause)
+
+    assert len(rig.turner.executed) == 1 + executed
+    assert answer.result == (MavResult.ACCEPTED if executed else MavResult.DENIED)
+
+
+def test_a_command_that_was_rejected_temporarily_is_executed_when_it_is_repeated() -> None:
+    rig = Rig(MavResult.TEMPORARILY_REJECTED)
+    rig.give(long())
+
+    [answer, _] = rig.give(long(confirmation=1))
+
+    assert answer == ack(MavResult.ACCEPTED)
+
+
+def test_only_so_many_results_are_remembered() -> None:
+    rig = Rig()
+    rig.give(long())
+    for number in range(MAX_RESULTS):
+        rig.give(long(), source=Address(2 + number // 250, 1 + number % 250))
+
+    rig.give(long(confirmation=1))
+
+    assert len(rig.turner.executed) == MAX_RESULTS + 2
