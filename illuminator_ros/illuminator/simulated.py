@@ -38,6 +38,7 @@ from .model import (
 from .simulated_properties import FAULTS, IlluminatorBehaviour, IlluminatorProperties
 from .thermal import ThermalModel
 from ..mavlink.messages import (
+    Address,
     ComponentInformationBasic,
     define,
     INFORMATION_ID,
@@ -196,7 +197,7 @@ class SimulatedIlluminator(SimulatedDevice):
             string(identity.software_version, 24), string(identity.hardware_version, 24),
             string(identity.serial_number, 32))
 
-    def execute(self, command: AnyCommand, now: float) -> Reply:
+    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""
         self.warm(now)
         if command.command == MavCmd.ILLUMINATOR_ON_OFF:

@@ -111,14 +111,16 @@ class SimulatedDevice(ABC):
     No I/O; ``now`` is s on the link's clock.
 
     :param behaviour: how it behaves at first, and without faults.
-    :cvar changes: the MAV_CMDs that change its state.
+    :cvar messages: the classes of the messages that it takes, besides commands.
     :cvar sends: the classes of its messages.
+    :cvar changes: the MAV_CMDs that change its state.
     :cvar faults: the faults that it can have.
     :cvar commands: changes by a person, on the console.
     """
 
-    changes: ClassVar[frozenset[int]]
+    messages: ClassVar[tuple[type[Message], ...]] = ()
     sends: ClassVar[Sequence[type[Message]]] = ()
+    changes: ClassVar[frozenset[int]] = frozenset()
     faults: ClassVar[FaultTable] = FAULTS
     commands: ClassVar[Sequence[ConsoleCommand[Any, Change]]] = ()
 
@@ -140,9 +142,13 @@ class SimulatedDevice(ABC):
     def message(self, message_id: int, now: float) -> Message | None:
         """Return a message of this moment, None if the device does not have it."""
 
+    def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
+        """Take a message of one of the classes of ``messages``; return the messages to send."""
+        return ()
+
     @abstractmethod
-    def execute(self, command: AnyCommand, now: float) -> Reply:
-        """Return the reply to a command, None if the device does not support it."""
+    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
+        """Return the reply to a command from an address, None if it is not supported."""
 
     @abstractmethod
     def snapshot(self, now: float) -> Snapshot:
@@ -326,12 +332,16 @@ class SimulatedComponent(Generic[D]):
             system == 0 or system == self.address.system and component == 0))
 
     def receive(self, source: Address, message: Any, now: float) -> None:
-        """Answer a command for this component; ignore all other messages."""
-        if (not isinstance(message, CommandLong | CommandInt) or not self.addressed(message)
-                or self.silent(now)):
+        """Take a command or a message for this component, or for no one in particular."""
+        if self.silent(now) or hasattr(message, 'target_system') and not self.addressed(message):
             return
         behaviour = self.behaviour
-        if isinstance(message, CommandInt) and not behaviour.answers_command_int:
+        if isinstance(message, self.device.messages):
+            for sent in self.device.receive(source, message, now):
+                self._send(sent, now)
+            self._changed()
+        if (not isinstance(message, CommandLong | CommandInt)
+                or isinstance(message, CommandInt) and not behaviour.answers_command_int):
             return
         if behaviour.slow:
             self._schedule.add(now + behaviour.slow,
@@ -390,7 +400,7 @@ class SimulatedComponent(Generic[D]):
         if message.command == MavCmd.SET_MESSAGE_INTERVAL:
             self._acknowledge(source, message.command, self._set_interval(message, now), now)
             return
-        reply = self.device.execute(message, now)
+        reply = self.device.execute(source, message, now)
         if reply is None:
             reply = CommandReply(self._unknown(MavResult.UNSUPPORTED))
         accepted = reply.result == MavResult.ACCEPTED
@@ -487,8 +497,6 @@ class SimulatedComponents(Endpoint, Generic[D]):
     :ivar new_peers: the address of each other component, with the first message from it.
     """
 
-    messages = (Heartbeat, CommandLong, CommandInt)
-
     def __init__(self, described: Iterable[Description[D]], now: float) -> None:
         super().__init__()
         self.new_peers: Listeners[Address] = Listeners()
@@ -502,6 +510,9 @@ class SimulatedComponents(Endpoint, Generic[D]):
             for index, one in enumerate(described)]
         self.sends = tuple(dict.fromkeys(
             cls for one in self.components for cls in one.device.sends))
+        self.messages = tuple(dict.fromkeys((
+            Heartbeat, CommandLong, CommandInt,
+            *(cls for one in self.components for cls in one.device.messages))))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
@@ -513,9 +524,8 @@ class SimulatedComponents(Endpoint, Generic[D]):
         if source not in self._peers and len(self._peers) < MAX_PEERS:
             self._peers.add(source)
             self.new_peers.emit(source)
-        if isinstance(message, CommandLong | CommandInt):
-            for component in self.components:
-                component.receive(source, message, now)
+        for component in self.components:
+            component.receive(source, message, now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""

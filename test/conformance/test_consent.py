@@ -59,8 +59,8 @@ def rejecting(
     run.lamp.configuration = configuration
     execute = run.light.device.execute
     run.light.device.execute = (  # type: ignore[method-assign]
-        lambda command, now: CommandReply(MavResult.FAILED) if command.command == 406
-        else execute(command, now))
+        lambda source, command, now: CommandReply(MavResult.FAILED) if command.command == 406
+        else execute(source, command, now))
     seen = run.watch()
     return run.finish(), seen
 

@@ -205,7 +205,9 @@ class SimulatedWinch(simulated.SimulatedDevice):
         return (WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
                 if message_id == WinchStatus.id else None)
 
-    def execute(self, command: simulated.AnyCommand, now: float) -> simulated.Reply:
+    def execute(
+        self, source: mav.Address, command: simulated.AnyCommand, now: float,
+    ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
         if command.command != DO_WINCH:
             return None
