@@ -84,13 +84,24 @@ class SerialUrl:
 
 
 @dataclass(frozen=True)
+class PtyUrl:
+    """
+    A pseudo-terminal to be made: a serial line within this machine, without hardware.
+
+    :param link: path of a symbolic link to its device, '' for none.
+    """
+
+    link: str = ''
+
+
+@dataclass(frozen=True)
 class MemoryUrl:
     """An in-process link for tests and examples: both sides open the same name."""
 
     name: str
 
 
-Url = UdpUrl | TcpUrl | SerialUrl | MemoryUrl
+Url = UdpUrl | TcpUrl | SerialUrl | PtyUrl | MemoryUrl
 
 
 def parse_url(text: str) -> Url:
@@ -267,6 +278,11 @@ class _Parser:
                       '115200')
         return SerialUrl(match.group(1), self.baud(match.group(2)))
 
+    def pty(self, rest: str) -> Url:
+        if rest and not rest.startswith('/'):
+            self.fail(f'{rest!r} is not an absolute path, as in pty:///tmp/ttyDEVICE')
+        return PtyUrl(rest)
+
     def memory(self, rest: str) -> Url:
         if not rest:
             self.fail('no name after "memory://"')
@@ -315,6 +331,7 @@ _WITH_SLASHES: dict[str, _Reader] = {
     'serial': _Parser.serial,
     'serial-hwfc': _Parser.serial_hwfc,
     'serial_flowcontrol': _Parser.serial_hwfc,
+    'pty': _Parser.pty,
     'memory': _Parser.memory,
 }
 

@@ -23,6 +23,7 @@ from illuminator_ros.mavlink.url import (
     HostPort,
     MemoryUrl,
     parse_url,
+    PtyUrl,
     SerialUrl,
     TcpUrl,
     UdpUrl,
@@ -94,6 +95,8 @@ OURS: dict[str, Url] = {
     'tcp://[::1]': connect('::1', 5760),
     '/dev/x:20000000': SerialUrl('/dev/x', 20_000_000),
     '/dev/by-path/pci-0000:00-port0:1': SerialUrl('/dev/by-path/pci-0000:00-port0', 1),
+    'pty://': PtyUrl(),
+    'pty:///tmp/ttyCAMERA': PtyUrl('/tmp/ttyCAMERA'),
     'memory://bench': MemoryUrl('bench')}
 # Wrong URL -> the wrong part, and the reason.
 WRONG: dict[str, tuple[str, str]] = {
@@ -132,6 +135,7 @@ WRONG: dict[str, tuple[str, str]] = {
     'udpin://host:1\n': (r"'\n'", 'not allowed'),
     'udpin://höst:1': ("'höst'", 'not a valid host name'),
     'memory://': ('memory://', 'no name'),
+    'pty://ttyCAMERA': ("'ttyCAMERA'", 'not an absolute path'),
     'udpin://host:' + '1' * 5000: ('1' * 5000, 'outside 1..65535'),
     'serial:///dev/x:' + '1' * 5000: ('1' * 5000, 'not a baud rate')}
 

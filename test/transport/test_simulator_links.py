@@ -54,3 +54,14 @@ def test_the_simulator_sends_frames_on_a_serial_line(tmp_path: Path) -> None:
             frames = list(decoder.feed(data))
     device.pull_out()
     assert frames[0].source == Address(1, 243)
+
+
+def test_a_light_of_the_simulator_is_switched_on_over_a_pseudo_terminal_that_it_makes(
+    run: Callable[..., Any], tmp_path: Path,
+) -> None:
+    pytest.importorskip('serial', reason='pyserial is not installed')
+    link = tmp_path / 'ttyLIGHT'
+    with ended(python('illuminator_ros.simulator', f'pty://{link}')) as simulator:
+        simulator.wait_for(f'to be opened as serial://{link}:57600')
+        assert run(Bridge(f'serial://{link}:57600')).enable(True).success
+    assert not link.is_symlink()

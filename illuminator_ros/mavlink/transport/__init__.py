@@ -12,16 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Open channels for connection URLs: UDP, TCP, serial and in-memory."""
+"""Open channels for connection URLs: UDP, TCP, serial, pseudo-terminal and in-memory."""
 
 from __future__ import annotations
 
 from .base import Channel, ChannelLost, Peer
 from .memory import open_memory
-from .serial import open_serial
+from .serial import open_pty, open_serial
 from .tcp import TcpClient, TcpServer
 from .udp import UdpChannel
-from ..url import MemoryUrl, SerialUrl, TcpUrl, UdpUrl, Url
+from ..url import MemoryUrl, PtyUrl, SerialUrl, TcpUrl, UdpUrl, Url
 
 __all__ = ['Channel', 'ChannelLost', 'open_channel', 'Peer']
 
@@ -38,5 +38,7 @@ def open_channel(url: Url) -> Channel:
         return TcpServer(url.address) if url.listen else TcpClient(url.address)
     if isinstance(url, SerialUrl):
         return open_serial(url)
+    if isinstance(url, PtyUrl):
+        return open_pty(url)
     assert isinstance(url, MemoryUrl)
     return open_memory(url)

@@ -12,26 +12,29 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Serial ports: opened by pyserial, read and written without blocking."""
+"""Serial ports, opened by pyserial, and pseudo-terminals; neither blocks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import errno
+import fcntl
+import functools
 import os
+from pathlib import Path
 import selectors
+import struct
 import termios
-from typing import TYPE_CHECKING
+import tty
 
 from .base import Channel, ChannelLost, FrameQueue, Peer
-from ..url import SerialUrl
-
-if TYPE_CHECKING:
-    from serial import Serial
+from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
 # Size of the kernel's receive buffer.
 READ_SIZE = 4095
+# Bytes in a pseudo-terminal that no program has read; a serial line would have lost them.
+MAX_UNREAD = 2048
 
 
 def open_serial(url: SerialUrl) -> Channel:
@@ -59,16 +62,68 @@ def open_serial(url: SerialUrl) -> Channel:
     # FTDI adapters delay bytes by 16 ms otherwise; not every driver supports this.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         port.set_low_latency_mode(True)
-    return _SerialChannel(port, url)
+    return _LineChannel(
+        port.fileno(), f'serial {url.device} at {url.baud} baud', port.close)
 
 
-class _SerialChannel(Channel):
+def open_pty(url: PtyUrl) -> Channel:
+    """
+    Make a pseudo-terminal; another program opens its device, or the link to it, as a serial port.
 
-    def __init__(self, port: Serial, url: SerialUrl) -> None:
-        self._port = port
-        self._fd: int = port.fileno()
+    :raises OSError: if the link cannot be made, or its path is in use for something else.
+    """
+    far, near = os.openpty()
+    device = os.ttyname(near)
+    with contextlib.ExitStack() as stack:
+        stack.callback(os.close, far)
+        stack.callback(os.close, near)
+        # The terminal would otherwise return what it receives, and wait for whole lines.
+        tty.setraw(near)
+        os.set_blocking(far, False)
+        if url.link:
+            try:
+                _make_link(Path(url.link), device)
+            except OSError as error:
+                raise OSError(error.errno, f'cannot link {url.link} to {device}: '
+                              f'{error.strerror}') from None
+            stack.callback(_remove_link, Path(url.link), device)
+        return _LineChannel(
+            far, f'pseudo-terminal, to be opened as serial://{url.link or device}:{MAVROS_BAUD}',
+            stack.pop_all().close, functools.partial(_discard_unread, near))
+
+
+def _make_link(link: Path, device: str) -> None:
+    if link.exists() and not link.is_symlink():
+        raise OSError(errno.EEXIST, 'it exists and is not a symbolic link')
+    new = link.with_name(f'{link.name}.{os.getpid()}')
+    new.symlink_to(device)
+    new.replace(link)
+
+
+def _remove_link(link: Path, device: str) -> None:
+    # Another program may have replaced it.
+    if link.is_symlink() and str(link.readlink()) == device:
+        link.unlink()
+
+
+def _discard_unread(near: int) -> None:
+    """Discard what no program reads: the next one would take it for new."""
+    unread, = struct.unpack('i', fcntl.ioctl(near, termios.FIONREAD, bytes(4)))
+    if unread > MAX_UNREAD:
+        termios.tcflush(near, termios.TCIFLUSH)
+
+
+class _LineChannel(Channel):
+
+    def __init__(
+        self, fd: int, name: str, close: Callable[[], None],
+        before_sending: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.name = name
+        self._fd = fd
+        self._close = close
+        self._before_sending = before_sending
         self._queue = FrameQueue()
-        self.name = f'serial {url.device} at {url.baud} baud'
 
     def register(self, selector: selectors.BaseSelector) -> None:
         self._selector = selector
@@ -90,6 +145,7 @@ class _SerialChannel(Channel):
         return (None,)
 
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
+        self._before_sending()
         self.dropped += sum(self._queue.put(frame) for frame in frames)
         self.writable(self._fd)
 
@@ -110,4 +166,4 @@ class _SerialChannel(Channel):
         with contextlib.suppress(OSError, termios.error):
             termios.tcflush(self._fd, termios.TCOFLUSH)
         with contextlib.suppress(OSError):
-            self._port.close()
+            self._close()

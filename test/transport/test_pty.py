@@ -1,0 +1,84 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pseudo-terminals that a channel makes: bytes, the link to the device, and unread bytes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import select
+
+from illuminator_ros.mavlink.transport import open_channel
+from illuminator_ros.mavlink.transport.serial import MAX_UNREAD
+from illuminator_ros.mavlink.url import PtyUrl
+import pytest
+from support.open_channel import Open, OpenChannel
+from support.waiting import PATIENCE
+
+
+def device_of(channel: OpenChannel) -> int:
+    """Return a descriptor of the device that the channel's name announces."""
+    path = channel.channel.name.partition('serial://')[2].partition(':')[0]
+    return os.open(path, os.O_RDWR | os.O_NOCTTY)
+
+
+def read(device: int) -> bytes:
+    assert select.select([device], [], [], PATIENCE)[0]
+    return os.read(device, 4096)
+
+
+@pytest.mark.parametrize('linked', [False, True])
+def test_bytes_go_both_ways_unchanged(channel: Open, tmp_path: Path, linked: bool) -> None:
+    every = bytes(range(256))
+    one = channel(PtyUrl(str(tmp_path / 'tty') if linked else ''))
+    device = device_of(one)
+    one.broadcast(every)
+    os.write(device, every)
+
+    assert read(device) == every
+    assert one.receive_bytes(256) == every
+    os.close(device)
+
+
+def test_a_link_to_a_device_that_has_gone_is_replaced_and_removed_at_the_end(
+        tmp_path: Path) -> None:
+    link = tmp_path / 'tty'
+    link.symlink_to('/dev/pts/gone')
+    first, second = open_channel(PtyUrl(str(link))), open_channel(PtyUrl(str(link)))
+    first.close()
+    assert link.is_char_device()
+    second.close()
+    assert not link.is_symlink()
+
+
+@pytest.mark.parametrize(('path', 'reason'), [
+    ('file', 'exists and is not a symbolic link'), ('missing/tty', 'No such file or directory')])
+def test_a_path_that_cannot_be_the_link_is_named(tmp_path: Path, path: str, reason: str) -> None:
+    (tmp_path / 'file').write_text('precious')
+    with pytest.raises(OSError, match=f'{tmp_path / path} to /dev/pts/.*: .*{reason}'):
+        open_channel(PtyUrl(str(tmp_path / path)))
+    assert (tmp_path / 'file').read_text() == 'precious'
+
+
+def test_bytes_that_no_program_reads_are_discarded_and_the_newest_are_kept(channel: Open) -> None:
+    one = channel(PtyUrl())
+    for number in range(100):
+        one.broadcast(bytes((number,)) * 100)
+    device = device_of(one)
+    data = read(device)
+
+    assert len(data) <= MAX_UNREAD + 100
+    assert data.endswith(bytes((99,)) * 100)
+    os.close(device)
