@@ -60,8 +60,10 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            f'{prefix}{name} = illuminator_ros.cli.{name}:main'
-            for name in ('bridge', 'conformance', 'monitor', 'simulator')
+            *(f'{prefix}{name} = illuminator_ros.cli.{name}:main'
+              for name in ('bridge', 'conformance', 'monitor', 'simulator')),
+            *(f'{prefix}{name} = illuminator_ros.cli.bridge:{name}'
+              for name in ('gimbal', 'gimbal_manager', 'rededge')),
         ],
     },
 )

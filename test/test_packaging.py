@@ -145,8 +145,9 @@ def test_pip_installs_executables_with_names_that_hide_no_other_program(
            '--ignore-installed', '--prefix', str(tmp_path / 'prefix'), '.')
 
     assert {path.name for path in (tmp_path / 'prefix' / 'bin').iterdir()} == {
-        'illuminator-bridge', 'illuminator-conformance', 'illuminator-monitor',
-        'illuminator-simulator'}
+        f'illuminator-{name}' for name in (
+            'bridge', 'conformance', 'gimbal', 'gimbal_manager', 'monitor', 'rededge',
+            'simulator')}
 
 
 def test_workflow_builds_on_jazzy_and_runs_ci_run() -> None:

@@ -12,59 +12,95 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executable ``bridge``: a MAVLink illuminator as a ROS 2 node."""
+"""
+The executables that make MAVLink devices ROS 2 nodes.
+
+``bridge`` serves lights; each other one serves the payload that has its name.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 import json
 import os
 import sys
+from typing import TYPE_CHECKING
 
 from .entry_point import one_line, run_program
 from .payloads import PAYLOADS
 from .termination import Termination
 from ..payload.registry import PayloadType
 
-NODE_NAME = 'illuminator'
+if TYPE_CHECKING:
+    from ..ros.payload import RosPayload  # Slow to import.
+
+ILLUMINATOR = 'illuminator'
 
 
-def usage(payloads: Mapping[str, PayloadType] = PAYLOADS) -> str:
+@dataclass(frozen=True)
+class Executable:
+    """
+    One of the executables.
+
+    :param payload: it names the first node, and is the default of the parameter ``payloads``.
+    :param payloads: the kinds of payloads that this parameter may name.
+    """
+
+    payload: str = ILLUMINATOR
+    payloads: Mapping[str, PayloadType] = field(default_factory=lambda: PAYLOADS)
+
+    @property
+    def name(self) -> str:
+        """Return how it is called."""
+        return 'bridge' if self.payload == ILLUMINATOR else self.payload
+
+    def load(self) -> RosPayload:
+        """Return the ROS half of its payload."""
+        payload: RosPayload = self.payloads[self.payload].load('ros')
+        return payload
+
+    def refuse(self, reason: str) -> int:
+        """Say in one line what is wrong with the command line, and return the exit status."""
+        print(f'{self.name}: {one_line(reason)}', file=sys.stderr)
+        return 2
+
+
+def usage(executable: Executable) -> str:
     """Return what ``--help`` prints."""
     from ..ros.parameters import LINK_PARAMETERS, ParameterSpec
-    from ..ros.payload import RosPayload
 
-    kinds: list[RosPayload] = [payload.load('ros') for payload in payloads.values()]
+    kind, name = executable.load(), executable.name
+    defaults = {'payloads': [executable.payload], **kind.all_link_defaults}
 
     def row(spec: ParameterSpec, default: str) -> str:
         limits = f'{spec.shown_range} {spec.unit}'.strip()
         return (f'  {spec.name:22} {default:27} {spec.description}'
                 + (f' ({limits})' if limits else ''))
 
-    link = '\n'.join(row(spec, spec.shown_default) for spec in (
-        *LINK_PARAMETERS, *(spec for kind in kinds for spec in kind.parameters)))
-    device = '\n'.join(row(spec, '')
-                       for kind in kinds for spec in kind.device_parameters)
+    fixed = '\n'.join(
+        row(spec, replace(spec, default=defaults.get(spec.name, spec.default)).shown_default)
+        for spec in (*LINK_PARAMETERS, *kind.parameters))
+    variable = ''.join(row(spec, '') + '\n' for spec in kind.device_parameters)
+    variable = variable and f'parameters that may be set at any time:\n{variable}\n'
+    examples = '\n'.join(f'  {line}' for line in kind.examples)
     return f"""\
-usage: bridge [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
+usage: {name} [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
 
-Makes a MAVLink illuminator (searchlight, torch, strobe) a ROS 2 node, /illuminator.
+Makes {kind.summary} a ROS 2 node, /{kind.node_name}.
 
 examples:
-  ros2 run illuminator_ros bridge
-  ros2 run illuminator_ros bridge serial:///dev/ttyACM0:57600
-  ros2 run illuminator_ros bridge --ros-args -p connection_url:=udpin://0.0.0.0:14550
+  ros2 run illuminator_ros {name}
+  ros2 run illuminator_ros {name} serial:///dev/ttyACM0:57600
+  ros2 run illuminator_ros {name} --ros-args -p connection_url:=udpin://0.0.0.0:14550
 
-  ros2 service call /illuminator/enable std_srvs/srv/SetBool "{{data: true}}"
-  ros2 param set /illuminator brightness 60
+{examples}
 
-parameters of the link, fixed at the start, with their defaults:
-{link}
+parameters that are fixed at the start, with their defaults:
+{fixed}
 
-parameters of the light, sent to it when it connects and whenever they are set:
-{device}
-
-connection URLs, each meaning what it means in MAVROS, MAVSDK or pymavlink:
+{variable}connection URLs, each meaning what it means in MAVROS, MAVSDK or pymavlink:
   udp://[BIND][:PORT]@[HOST][:PORT]   udpin://BIND:PORT   udpout://HOST:PORT
   tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
   serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
@@ -75,32 +111,38 @@ parameter is wrong.
 
 
 def main(
-    args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+    args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS, *,
+    payload: str = ILLUMINATOR,
 ) -> int:
     """
-    Run the bridge until a signal; see :func:`usage`.
+    Run an executable until a signal; see :func:`usage`.
 
-    :param args: the command line without the program's name.
-    :param payloads: the kinds of payloads that the parameter ``payloads`` may name.
+    :param args: the command line without the executable's name.
+    :param payloads: and ``payload``, see :class:`Executable`.
     """
     arguments = sys.argv[1:] if args is None else args
+    executable = Executable(payload, payloads)
     return run_program(
-        'bridge', lambda termination: _run(arguments, termination, payloads), queued=[2])
+        executable.name, lambda termination: _run(arguments, termination, executable), queued=[2])
 
 
-def _run(
-    arguments: list[str], termination: Termination, payloads: Mapping[str, PayloadType],
-) -> int:
+# The other entry points of setup.py.
+rededge = partial(main, payload='rededge')
+gimbal = partial(main, payload='gimbal')
+gimbal_manager = partial(main, payload='gimbal_manager')
+
+
+def _run(arguments: list[str], termination: Termination, executable: Executable) -> int:
     own = arguments
     if '--ros-args' in arguments:
         # Slow to import, as all else that is imported in a function here.
         from rclpy.utilities import remove_ros_args
         try:
-            own = remove_ros_args(['bridge', *arguments])[1:]
+            own = remove_ros_args([executable.name, *arguments])[1:]
         except Exception as error:
-            return _wrong(f'wrong ROS arguments: {error}')
+            return executable.refuse(f'wrong ROS arguments: {error}')
     if '-h' in own or '--help' in own:
-        print(usage(payloads), end='')
+        print(usage(executable), end='')
         return 0
     if '--version' in own:
         from .. import __version__
@@ -112,20 +154,13 @@ def _run(
         arguments = [*(argument for argument in arguments if argument != url),
                      '--ros-args', '-p', f'connection_url:={json.dumps(url)}']
     if own:
-        return _wrong(f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
-                      'bridge --help')
-    return _serve(arguments, termination, payloads)
+        return executable.refuse(
+            f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
+            f'{executable.name} --help')
+    return _serve(arguments, termination, executable)
 
 
-def _wrong(what: str) -> int:
-    """Say in one line what is wrong with the command line, and return the exit status for it."""
-    print(f'bridge: {one_line(what)}', file=sys.stderr)
-    return 2
-
-
-def _serve(
-    arguments: list[str], termination: Termination, payloads: Mapping[str, PayloadType],
-) -> int:
+def _serve(arguments: list[str], termination: Termination, executable: Executable) -> int:
     import gc
 
     import rclpy
@@ -138,7 +173,7 @@ def _serve(
     # From here on the ROS graph has to be left in order, so a signal only has effect later.
     termination.calls(lambda: None)
     if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or _log_directory_refusal():
-        return _wrong(refusal)
+        return executable.refuse(refusal)
     _limit_memory()
     # On a terminal rcutils colours its lines; it sees a pipe in its place.
     if termination.is_terminal:
@@ -146,18 +181,19 @@ def _serve(
     # rclpy has an exception of its own for each thing that can be wrong with an argument.
     failed = 'wrong ROS arguments'
     try:
-        rclpy.init(args=['bridge', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = PayloadNode(NODE_NAME)
+        rclpy.init(
+            args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        node = PayloadNode(executable.load().node_name)
         # Such as two topics with one name.
         failed = 'cannot create the node'
-        bridge = Bridge(node, arguments, payloads)
+        bridge = Bridge(node, arguments, executable.payloads, executable.payload)
     except ParameterError as error:
-        return _wrong(f'parameter {error}')
+        return executable.refuse(f'parameter {error}')
     except Exception as error:
         # For a lack of descriptors or threads the middleware has none.
         if isinstance(error, OSError) or type(error) is RuntimeError:
             failed = 'cannot start'
-        return _wrong(f'{failed}: {error}')
+        return executable.refuse(f'{failed}: {error}')
     # All that exists now stays: to look for garbage among it would only hold up an answer.
     gc.collect()
     gc.freeze()

@@ -34,7 +34,9 @@ from .node import PayloadNode
 from .node_manager import NodeManager
 from .parameters import (
     declare_link_parameters,
+    declare_payloads,
     declare_read_only,
+    LinkParameters,
     misspelt,
     ParameterError,
 )
@@ -66,17 +68,19 @@ class Bridge:
     :param node: the node of the first payload.
     :param arguments: the command line, which the nodes of further devices follow too.
     :param types: the kinds of payloads that the parameter ``payloads`` may name.
+    :param payload: the default of that parameter.
     :raises ParameterError: if a parameter is wrong.
     """
 
     def __init__(
         self, node: Node, arguments: Sequence[str], types: Mapping[str, PayloadType],
+        payload: str,
     ) -> None:
         self.node = node
         self.log = NodeLog(node.get_logger())
         LogForwarder.install(self.log)
-        self.parameters = parameters = declare_link_parameters(node)
-        kinds = [_load(name, types) for name in parameters.payloads]
+        kinds = [_load(name, types) for name in declare_payloads(node, payload)]
+        self.parameters = parameters = _link_parameters(node, kinds)
         values = [declare_read_only(node, kind.parameters) for kind in kinds]
         commands = CommandSender(
             parameters.address, parameters.command_timeout, parameters.command_retries)
@@ -236,6 +240,18 @@ class Bridge:
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event), 'link')
         self._wake.set()
+
+
+def _link_parameters(node: Node, kinds: Sequence[RosPayload]) -> LinkParameters:
+    """Declare the parameters of a link that carries these payloads."""
+    parameters = declare_link_parameters(node, kinds[0].all_link_defaults)
+    needed = {kind.node_name: kind.mavlink_version for kind in kinds if kind.mavlink_version}
+    if set(needed.values()) - {parameters.mavlink_version}:
+        needs = ', '.join(f'{name} needs {version}' for name, version in needed.items())
+        raise ParameterError(
+            f'mavlink_version: {parameters.mavlink_version}, but {needs}; a link sends one '
+            'version, so payloads that need different ones need a process each')
+    return parameters
 
 
 def _load(name: str, types: Mapping[str, PayloadType]) -> RosPayload:

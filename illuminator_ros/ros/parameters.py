@@ -170,7 +170,6 @@ class LinkParameters:
 
     connection_url: str
     url: Url
-    payloads: tuple[str, ...]
     address: Address
     mavlink_version: int
     command_timeout: float
@@ -196,23 +195,34 @@ class LinkParameters:
             raise ParameterError(f'signing_key_file: {error}') from None
 
 
-def declare_link_parameters(node: Node) -> LinkParameters:
+def declare_payloads(node: Node, default: str) -> tuple[str, ...]:
     """
-    Declare the parameters of the link, read-only, and return them.
+    Declare the parameter ``payloads``, read-only, and return it.
 
+    :raises ParameterError: if it is wrong.
+    """
+    specs = [spec for spec in LINK_PARAMETERS if spec.name == 'payloads']
+    payloads = tuple(declare_read_only(node, specs, {'payloads': [default]})['payloads'])
+    if not payloads or len(set(payloads)) < len(payloads):
+        raise ParameterError(f'payloads: {list(payloads)} is empty or names one twice')
+    return payloads
+
+
+def declare_link_parameters(node: Node, defaults: Values | None = None) -> LinkParameters:
+    """
+    Declare the other parameters of the link, read-only, and return them.
+
+    :param defaults: replace those of :data:`LINK_PARAMETERS`.
     :raises ParameterError: if one is wrong.
     """
-    values = declare_read_only(node, LINK_PARAMETERS)
+    values = declare_read_only(
+        node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults)
     try:
         url = parse_url(values['connection_url'])
     except UrlError as error:
         raise ParameterError(f'connection_url: {error}') from None
-    payloads = tuple(values.pop('payloads'))
-    if not payloads or len(set(payloads)) < len(payloads):
-        raise ParameterError(f'payloads: {list(payloads)} is empty or names one twice')
     return LinkParameters(
-        url=url, payloads=payloads,
-        address=Address(values.pop('system_id'), values.pop('component_id')),
+        url=url, address=Address(values.pop('system_id'), values.pop('component_id')),
         signing_mode=SigningMode(values.pop('signing_mode')), **values)
 
 
@@ -232,6 +242,10 @@ def declare_read_only(
         # rcl reads an empty list, as "ros2 param dump" writes it, as a parameter without a value.
         value = spec.check(
             default if override is None or override.value is None else override.value)
+        values[spec.name] = value
+        if node.has_parameter(spec.name):
+            # Another payload has declared it.
+            continue
         # The type of an empty list cannot be inferred.
         node.declare_parameter(
             spec.name, spec.type if value == [] else value,
@@ -239,7 +253,6 @@ def declare_read_only(
         if value == []:
             node.set_parameters_atomically([Parameter(spec.name, spec.type, [])])
             node.set_descriptor(spec.name, spec.descriptor(read_only=True))
-        values[spec.name] = value
     return values
 
 

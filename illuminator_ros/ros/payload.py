@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rclpy.node import Node
@@ -81,10 +81,14 @@ class RosPayload:
 
     :param node_name: the default name of its first node.
     :param parameters: its read-only parameters, beside those of the link.
-    :param device_parameters: those that devices have; for ``--help``.
+    :param device_parameters: those that may be set at any time; for ``--help``.
     :param make_client: returns the MAVLink side, given the command sender and the parameters.
     :param serve: serves devices with nodes, given the client; may raise
         :class:`~.parameters.ParameterError`.
+    :param summary: the device, for ``--help``.
+    :param examples: commands, for ``--help``.
+    :param link_defaults: defaults of the link's parameters where it is the first payload.
+    :param mavlink_version: 1 or 2, which its devices need; None if both will do.
     """
 
     node_name: str
@@ -93,3 +97,13 @@ class RosPayload:
     serve: Callable[[Any, Host], ServedPayload]
     parameters: tuple[ParameterSpec, ...] = ()
     device_parameters: tuple[ParameterSpec, ...] = ()
+    summary: str = ''
+    examples: tuple[str, ...] = ()
+    link_defaults: Values = field(default_factory=dict)
+    mavlink_version: int | None = None
+
+    @property
+    def all_link_defaults(self) -> Values:
+        """Return :attr:`link_defaults` with the version that is needed."""
+        version = {'mavlink_version': self.mavlink_version} if self.mavlink_version else {}
+        return {**self.link_defaults, **version}

@@ -20,7 +20,7 @@ import re
 from typing import Any
 
 from bench.subjects import SUBJECTS
-from illuminator_ros.cli.bridge import usage
+from illuminator_ros.cli.bridge import Executable, usage
 from illuminator_ros.cli.monitor import graph, key_bindings, model
 from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.illuminator.messages import IlluminatorStatus
@@ -92,7 +92,7 @@ def test_parameter_file_and_help_have_each_parameter_with_its_unit(spec: Paramet
     shown = re.escape(spec.description + (f' ({limits})' if limits else ''))
     unit = f'# {re.escape(spec.unit)}(,|$)' if spec.unit else ''
 
-    assert re.search(rf'^  {spec.name} +.*{shown}$', usage(), re.MULTILINE)
+    assert re.search(rf'^  {spec.name} +.*{shown}$', usage(Executable()), re.MULTILINE)
     assert re.search(rf'^    (# )?{spec.name}: .+{unit}', YAML, re.MULTILINE)
 
 

@@ -34,12 +34,15 @@ import sys
 from illuminator_ros.cli import {name}
 from illuminator_ros.cli.payloads import PAYLOADS
 from payloads.winch import WINCH
-sys.exit({name}.main(payloads={{**PAYLOADS, 'winch': WINCH}}))
+sys.exit({name}.main(payloads={{**PAYLOADS, 'winch': WINCH}}{options}))
 """
 
 
-def program(name: str, *arguments: str, domain: int) -> AbstractContextManager[Program]:
-    return ended(Program(sys.executable, '-c', PROGRAM.format(name=name), *arguments, env={
+def program(
+    name: str, *arguments: str, domain: int, options: str = '',
+) -> AbstractContextManager[Program]:
+    code = PROGRAM.format(name=name, options=options)
+    return ended(Program(sys.executable, '-c', code, *arguments, env={
         'PYTHONPATH': os.pathsep.join(
             filter(None, (str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
         'ROS_DOMAIN_ID': str(domain)}))
@@ -72,3 +75,21 @@ def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
 
         eventually(is_released)
         eventually(lambda: bridge.count('confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED'))
+
+
+def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help() -> None:
+    with own_domain() as domain:
+        with program('bridge', '--help', domain=domain, options=", payload='winch'") as shown:
+            assert shown.wait() == 0
+        with (program('bridge', f'udpout://127.0.0.1:{free_port()}', '--ros-args', '--log-level',
+                      'debug', domain=domain, options=", payload='winch'") as winch,
+              contextlib.closing(Ros(domain)) as ros):
+            winch.wait_for('sent from 1/195: Heartbeat(')
+            eventually(lambda: ('winch', '/') in ros.node.get_node_names_and_namespaces())
+
+    lines = [' '.join(line.split()) for line in shown.lines]
+    assert lines[0].startswith('usage: winch ')
+    assert 'Makes a winch a ROS 2 node, /winch.' in lines
+    assert [line for line in lines if line.startswith(('payloads', 'component_id'))] == [
+        "payloads ['winch'] kinds of devices that the bridge serves",
+        'component_id 195 our MAVLink component id (1 to 255)']

@@ -45,4 +45,6 @@ class WinchNode(ServedPayload):
         self._log.info(f'~/cmd/release: {result.message}', 'release')
 
 
-WINCH = RosPayload('winch', lambda commands, values: WinchClient(commands), WinchNode)
+WINCH = RosPayload(
+    'winch', lambda commands, values: WinchClient(commands), WinchNode, summary='a winch',
+    link_defaults={'component_id': 195})

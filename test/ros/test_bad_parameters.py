@@ -39,8 +39,7 @@ COMMAND_LINES = {
     ('-p', 'signing_key_file:=KEYS/open'):
         'parameter signing_key_file: is given, but signing_mode is off',
     ('-p', 'mavlink_version:=1'):
-        'parameter mavlink_version: MAVLink 1 cannot carry ILLUMINATOR_STATUS, '
-        'COMPONENT_INFORMATION_BASIC: it has no message ids above 255; use MAVLink 2',
+        'parameter mavlink_version: 1, but illuminator needs 2; a link sends one version',
     ('-p', 'signing_mode:=maybe'): "parameter signing_mode: 'maybe' is",
     ('-p', 'signing_mode:=sign', '-p', 'signing_key_file:=KEYS/none'):
         "KEYS/none': No such file or directory",

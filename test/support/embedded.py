@@ -46,7 +46,8 @@ def embedded_bridge(domain: int, port: int, **parameters: object) -> Iterator[Br
     rclpy.init(context=context, domain_id=domain)
     with mock.patch.object(bridge_module, 'Link', SlowLink):
         process = Bridge(_node(context, {
-            'connection_url': f'udpin://127.0.0.1:{port}', **parameters}), [], PAYLOADS)
+            'connection_url': f'udpin://127.0.0.1:{port}', **parameters}), [], PAYLOADS,
+            'illuminator')
     thread = threading.Thread(target=process.run)
     thread.start()
     try:
@@ -62,7 +63,7 @@ def refusal(context: Context, **parameters: object) -> str:
     """Return why a bridge cannot start with these parameters."""
     node = _node(context, parameters)
     try:
-        Bridge(node, [], PAYLOADS)
+        Bridge(node, [], PAYLOADS, 'illuminator')
     except ParameterError as error:
         return str(error)
     finally:

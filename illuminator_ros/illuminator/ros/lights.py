@@ -218,4 +218,8 @@ def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:
 
 
 ILLUMINATOR = RosPayload(
-    'illuminator', _make_client, Lights, LIGHT_PARAMETERS, DEVICE_PARAMETERS)
+    'illuminator', _make_client, Lights, LIGHT_PARAMETERS, DEVICE_PARAMETERS,
+    summary='a MAVLink illuminator (searchlight, torch, strobe)', examples=(
+        'ros2 service call /illuminator/enable std_srvs/srv/SetBool "{data: true}"',
+        'ros2 param set /illuminator brightness 60'),
+    mavlink_version=2)
