@@ -326,7 +326,7 @@ class Light:
         """Return the temperature, degC; None where it is not measured, or the sensor fails."""
         status = self.status
         if (status is None or not self._measures_temperature
-                or status.error_flags & ErrorFlag.THERMISTOR_FAILURE):
+                or status.error_flags and status.error_flags & ErrorFlag.THERMISTOR_FAILURE):
             return None
         return status.temperature
 

@@ -50,14 +50,16 @@ class ErrorFlag(IntFlag):
     THERMISTOR_FAILURE = 4
 
 
-# The flags under which a light is less bright than it was told to be.
-DIMMING_FLAGS = ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN
-# An int: since Python 3.11 the complement of an IntFlag has no unknown bits.
-KNOWN_FLAGS = int(DIMMING_FLAGS | ErrorFlag.THERMISTOR_FAILURE)
+# The flags under which a light is less bright than it was told to be. Plain ints: each operation
+# of an IntFlag takes 1 us, and since Python 3.11 its complement has no unknown bits.
+DIMMING_FLAGS = int(ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
+KNOWN_FLAGS = DIMMING_FLAGS | int(ErrorFlag.THERMISTOR_FAILURE)
 
 
 def flag_names(flags: int) -> list[str]:
     """Return readable names of error flags; unknown bits as one hexadecimal number."""
+    if not flags:
+        return []
     names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlag
              if flag & flags and flag.name]
     if unknown := flags & ~KNOWN_FLAGS:

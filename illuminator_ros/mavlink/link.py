@@ -284,6 +284,8 @@ class Link:
         """Do what others asked for, and what is due."""
         self._work_pending = False
         self._run_calls()
+        # Before other work: a caller waits for the answer to a request.
+        self._flush()
         now = self.clock()
         if self._channel is not None:
             self._poll_channel(self._channel, now)
