@@ -15,41 +15,14 @@
 """``~/cmd/enable`` and ``~/cmd/brightness`` command the light; the newest message wins."""
 
 import math
-import threading
 
 import pytest
 from std_msgs.msg import Bool, Float32
 from support.light import CONFIGURE, eventually, MavResult, ON_OFF, params, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
-from support.waiting import PATIENCE
 
 ENABLE, BRIGHTNESS = '/illuminator/cmd/enable', '/illuminator/cmd/brightness'
-COUNT = 250
-
-
-@pytest.mark.parametrize('on', [True, False])
-def test_enable_message_switches_the_light(ros: Ros, light: ServedLight, on: bool) -> None:
-    ros.publish(Bool, ENABLE, on)
-
-    [command] = light.wait_for(ON_OFF)
-
-    assert command.param1 == float(on)
-
-
-def test_repeated_enable_message_is_sent_each_time_and_logged_once(
-    ros: Ros, light: ServedLight, bridge: Program,
-) -> None:
-    ros.enable(False)
-    light.forget()
-    before = bridge.count('was switched on by topic')
-    for count in (1, 2, 3):
-        ros.publish(Bool, ENABLE, True)
-        light.wait_for(ON_OFF, count)
-    ros.enable(False)
-    bridge.wait_for('was switched off by service')
-
-    assert bridge.count('was switched on by topic') == before + 1
 
 
 def test_newest_enable_message_wins_while_the_light_is_being_switched(
@@ -109,41 +82,3 @@ def test_invalid_or_early_brightness_is_logged_with_its_reason_and_not_sent(
             bridge.wait_for('~/cmd/brightness: brightness nan is not a finite number')
             light.wait_for(CONFIGURE)
             assert [params(c)[1] for c in light.commands(CONFIGURE)] == [50.0]
-
-
-def test_brightness_stream_at_500_hz_has_one_command_in_flight_and_ends_with_its_newest(
-    ros: Ros, light: ServedLight,
-) -> None:
-    light.fake.delays[CONFIGURE] = math.inf
-    publisher = ros.publisher(Float32, BRIGHTNESS)
-    values = iter(range(1, COUNT + 1))
-    done = threading.Event()
-
-    def publish() -> None:
-        value = next(values, None)
-        if value is None:
-            timer.cancel()
-            done.set()
-        else:
-            publisher.publish(Float32(data=value * 100.0 / COUNT))
-
-    timer = ros.node.create_timer(0.002, publish)
-
-    assert done.wait(PATIENCE)
-    light.release(CONFIGURE)
-    eventually(lambda: light.fake.fields['brightness'] == 100.0)
-    assert len(light.commands(CONFIGURE)) < COUNT / 4
-    assert light.fake.most_at_once == 1
-
-
-def test_brightness_that_the_light_has_already_is_not_sent_again(
-    ros: Ros, light: ServedLight, parameters: Parameters,
-) -> None:
-    ros.publish(Float32, BRIGHTNESS, 71.0)
-    parameters.wait(brightness=71.0)
-    light.forget()
-
-    ros.publish(Float32, BRIGHTNESS, 71.0, 72.0)
-
-    parameters.wait(brightness=72.0)
-    assert [params(command)[1] for command in light.commands(CONFIGURE)] == [72.0]

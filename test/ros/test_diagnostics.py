@@ -12,18 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The content of ``/diagnostics``: names, hardware ids, keys, values, period."""
+"""``/diagnostics`` as published: names, hardware ids, keys, period, and changes of level."""
 
-from collections.abc import Callable
 import math
 import re
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
-from support.light import ServedLight
+from support.light import CONFIGURE, ServedLight
 from support.processes import ROOT
-from support.recording import Recorder
-from support.ros import Ros, running_bridge, STREAM
+from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import CLOCK
 
 INFORMATION = 396
@@ -31,51 +29,15 @@ PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 # The values that are text; all others are one number, or true or false.
 TEXTS = {'url', 'address', 'mode', 'agreed', 'holder', 'vendor', 'model', 'software_version',
          'hardware_version', 'serial_number', 'node'}
-PARTS = ('link', 'lamp')
-Values = dict[str, str]
 
 
-@pytest.fixture(scope='module')
-def settings() -> dict[str, object]:
-    return {'diagnostics_period': 0.1, 'sources': "['safety']"}
-
-
-@pytest.fixture(scope='module')
-def recorder(ros: Ros, shared_bridge: object) -> Recorder:
-    """Return the arrays of the module's bridge, from the first with link and lamp on."""
-    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-    wait_for(recorder, 'lamp')
-    return recorder
-
-
-def values(status: DiagnosticStatus) -> Values:
+def values(status: DiagnosticStatus) -> dict[str, str]:
     return {entry.key: entry.value for entry in status.values}
 
 
 def complete(array: DiagnosticArray) -> bool:
     """Return whether an array has a lamp, too: the light's first status has come."""
     return len(array.status) == 2
-
-
-def wait_for(
-    recorder: Recorder, part: str, wanted: Callable[[Values], object] = lambda values: True,
-) -> Values:
-    """Wait until the values of the link or the lamp are as wanted, and return them."""
-    index = PARTS.index(part)
-    recorder.clear()
-    CLOCK.forward(0.1)
-    return values(recorder.wait(
-        lambda array: complete(array) and wanted(values(array.status[index]))).status[index])
-
-
-def test_array_has_link_and_lamp_with_url_and_serial_number_as_hardware_ids(
-    recorder: Recorder,
-) -> None:
-    link, lamp = recorder.wait(complete).status
-
-    assert (link.name, lamp.name) == ('illuminator: link', 'illuminator: lamp')
-    assert re.fullmatch(r'udpin://127\.0\.0\.1:\d+', link.hardware_id)
-    assert lamp.hardware_id == 'T-1'
 
 
 @pytest.mark.parametrize('period', [1.0, 2.0])
@@ -113,68 +75,40 @@ def test_hardware_id_of_a_light_without_serial_number_is_its_address_and_never_c
         assert told.status[1].hardware_id == 'mavlink:1/243'
 
 
-@pytest.mark.parametrize('part', PARTS)
-def test_keys_are_those_of_the_protocol_page_and_values_parse(
-    ros: Ros, light: ServedLight, recorder: Recorder, part: str,
+def test_statuses_have_the_keys_of_the_protocol_page_and_a_change_of_level_comes_at_once(
+    own_ros: Ros, port: int,
 ) -> None:
-    # Then the source `default` holds the light.
-    ros.enable(False)
-    _, _, rest = PROTOCOL.partition(f'| value of `illuminator: {part}` |')
-    rows = rest.partition('\n\n')[0].splitlines()[2:]
-    documented = [key for row in rows for key in re.findall('`([^`]+)`', row.split('|')[1])]
+    # So rarely that only changes of level are seen soon.
+    with running_bridge(own_ros.domain, port, diagnostics_period=60.0,
+                        sources="['safety']"), ServedLight(port) as light:
+        recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        parameters = Parameters(own_ros)
+        parameters.wait(mode='internal_control')
+        # Then the source `default` holds the light.
+        own_ros.enable(False)
+        light.report(error_status=2)
+        array = recorder.wait(
+            lambda array: complete(array) and array.status[1].level == DiagnosticStatus.ERROR)
+        light.report(error_status=0)
+        recorder.wait(
+            lambda array: complete(array) and array.status[1].level == DiagnosticStatus.OK)
+        light.fake.applies = False
+        call = parameters.start_set(brightness=30.0)
+        light.wait_for(CONFIGURE)
+        own_ros.catch_up()
+        CLOCK.forward(0.9)
+        assert not call.result().results[0].successful
+        recorder.wait(lambda array: array.status[1].level == DiagnosticStatus.WARN
+                      and 'brightness 30 % not confirmed' in array.status[1].message)
 
-    published = wait_for(recorder, part)
-
-    assert sorted(published) == sorted([*documented, 'node'])
-    for key, value in published.items():
-        if key not in TEXTS and value not in ('true', 'false'):
-            assert math.isfinite(float(value)), key
-
-
-def test_lamp_values_are_those_of_the_light(light: ServedLight, recorder: Recorder) -> None:
-    light.report(enable=1, mode=2, brightness=35.5, strobe_period=0.5,
-                 strobe_duty_cycle=20.0, temp_c=41.25, error_status=0)
-
-    lamp = wait_for(recorder, 'lamp', lambda values: values['temperature_c'] == '41.25')
-
-    assert lamp.items() >= {
-        'enabled': 'true', 'mode': 'external_sync', 'brightness_percent': '35.5',
-        'strobe_period_s': '0.5', 'strobe_duty_cycle_percent': '20', 'error_flags': '0',
-        'connected': 'true', 'address': '1/243', 'vendor': 'maker', 'model': 'torch',
-        'serial_number': 'T-1'}.items()
-
-
-def test_throttled_light_has_the_agreed_configuration_beside_the_reported_one(
-    light: ServedLight, recorder: Recorder,
-) -> None:
-    light.report(mode=1, brightness=90.0, strobe_period=0.0, strobe_duty_cycle=0.0)
-    light.report(brightness=45.0, error_status=1)
-
-    lamp = wait_for(recorder, 'lamp', lambda values: values['brightness_percent'] == '45')
-
-    light.report(brightness=90.0, error_status=0)
-    assert lamp['agreed'] == ('mode internal_control, brightness 90 %, strobe_period 0 s, '
-                              'strobe_duty_cycle 0 %')
-
-
-def test_link_values_count_frames_and_bytes(light: ServedLight, recorder: Recorder) -> None:
-    before = wait_for(recorder, 'link')
-
-    after = wait_for(recorder, 'link', lambda values: (
-        int(values['frames_received']) >= int(before['frames_received']) + 3))
-
-    assert int(after['bytes_received']) > int(before['bytes_received'])
-    assert (after['open'], after['peers'], after['lights']) == ('true', '1', '1')
-
-
-def test_restart_of_the_light_is_not_a_loss_of_frames(
-    recorder: Recorder, light: ServedLight,
-) -> None:
-    before = wait_for(recorder, 'lamp')
-    assert wait_for(recorder, 'link')['loss_percent'] == '0'
-
-    light.lose_frames(60)
-    light.restart()
-
-    wait_for(recorder, 'lamp', lambda values: values['restarts'] != before['restarts'])
-    assert wait_for(recorder, 'link')['loss_percent'] == '0'
+    for part, status in zip(('link', 'lamp'), array.status, strict=True):
+        _, _, rest = PROTOCOL.partition(f'| value of `illuminator: {part}` |')
+        rows = rest.partition('\n\n')[0].splitlines()[2:]
+        documented = [key for row in rows for key in re.findall('`([^`]+)`', row.split('|')[1])]
+        assert sorted(values(status)) == sorted([*documented, 'node'])
+        assert status.name == f'illuminator: {part}'
+        for key, value in values(status).items():
+            if key not in TEXTS and value not in ('true', 'false'):
+                assert math.isfinite(float(value)), key
+    assert re.fullmatch(r'udpin://127\.0\.0\.1:\d+', array.status[0].hardware_id)
+    assert array.status[1].hardware_id == 'T-1'

@@ -16,7 +16,6 @@
 
 from collections.abc import Iterator
 import contextlib
-import math
 
 import pytest
 from std_msgs.msg import Bool
@@ -24,7 +23,7 @@ from std_srvs.srv import SetBool
 from support.light import Address, eventually, MavResult, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
-from support.ros import Parameters, Ros, running_bridge
+from support.ros import Ros, running_bridge
 from support.slow import pass_time_until
 
 SOURCES = [Address(1, component) for component in (243, 244, 245)]
@@ -77,19 +76,6 @@ def test_one_request_switches_all_lights_and_names_each(
     assert are_on(lights) == [False] * 3
 
 
-def test_one_refusal_is_named_and_fails_the_request(
-    ros: Ros, lights: list[ServedLight],
-) -> None:
-    lights[1].fake.results[ON_OFF] = MavResult.DENIED
-
-    response = enable_all(ros)
-
-    assert not response.success
-    assert response.message.startswith('2 of 3 on; ')
-    assert f'{NAMES[1]}: refused: MAV_RESULT_DENIED' in response.message
-    assert are_on(lights) == [True, False, True]
-
-
 def test_topic_switches_all_lights_and_a_failure_is_logged(
     ros: Ros, group: tuple[Program, list[ServedLight]], lights: list[ServedLight],
 ) -> None:
@@ -99,23 +85,6 @@ def test_topic_switches_all_lights_and_a_failure_is_logged(
 
     eventually(lambda: are_on(lights) == [True, False, True])
     pass_time_until(lambda: group[0].count('~/cmd/enable_all: 2 of 3 on; '), step=0.1)
-
-
-def test_newest_message_wins_while_the_lights_are_being_switched(
-    ros: Ros, lights: list[ServedLight],
-) -> None:
-    lights[1].fake.delays[ON_OFF] = math.inf
-    ros.publish(Bool, '/illuminator/cmd/enable_all', *[True] * 50)
-    lights[1].wait_for(ON_OFF)
-    ros.publish(Bool, '/illuminator/cmd/enable_all', False)
-    # The node has taken what came before it answers.
-    Parameters(ros).get('frame_id')
-
-    lights[1].release(ON_OFF)
-
-    eventually(lambda: all(light.commands(ON_OFF)[-1:] and not light.commands(ON_OFF)[-1].param1
-                           for light in lights))
-    assert all(len(light.commands(ON_OFF)) < 10 for light in lights)
 
 
 def test_request_fails_while_no_light_is_connected(own_ros: Ros, port: int) -> None:

@@ -52,18 +52,6 @@ def light(served: tuple[Bridge, ServedLight]) -> ServedLight:
     return served[1]
 
 
-def test_queue_of_a_state_topic_holds_one_message_and_that_of_a_stream_ten(
-    served: tuple[Bridge, ServedLight],
-) -> None:
-    depths = {publisher.topic_name: publisher.qos_profile.depth
-              for publisher in served[0].node.publishers}
-
-    streams = {topic: depths[topic] for topic in ('/illuminator/temperature', '/diagnostics')}
-    assert set(streams.values()) == {10}
-    assert {depth for topic, depth in depths.items()
-            if topic.startswith('/illuminator/') and topic not in streams} == {1}
-
-
 def test_parameter_of_the_light_that_is_set_past_the_services_is_refused(
     served: tuple[Bridge, ServedLight],
 ) -> None:

@@ -23,7 +23,7 @@ import pytest
 from std_msgs.msg import Float32
 from support.light import Address, CONFIGURE, eventually, ServedLight
 from support.ports import free_port
-from support.processes import Program, run
+from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK
 
@@ -74,6 +74,8 @@ def light_of(ros: Ros, node: str, lights: list[ServedLight]) -> Address:
     ({'target_system': 7}, (FIRST, SECOND, OTHER), OTHER),
     ({'target_system': 1, 'target_component': 244}, (FIRST, SECOND, OTHER), SECOND),
 ], ids=['none', 'component', 'system', 'both'])
+
+
 def test_first_node_serves_the_target_or_else_the_first_light_heard(
     own_ros: Ros, start: Start, target: dict[str, int], sources: tuple[Address, ...],
     chosen: Address,
@@ -105,8 +107,7 @@ def test_only_target_leaves_other_lights_alone_and_unused_names_are_logged(
         bridge.wait_for('light 1/250 is served by /mast')
 
 
-@pytest.mark.parametrize('remap', [('-r', '__node:=spot'), ('--remap', '__node:=spot'),
-                                   ('-r', '__name:=spot')])
+@pytest.mark.parametrize('remap', [('--remap', '__node:=spot'), ('-r', '__name:=spot')])
 def test_remapped_node_name_is_that_of_the_first_node_only(
     own_ros: Ros, start: Start, remap: tuple[str, str],
 ) -> None:
@@ -161,11 +162,3 @@ def test_invalid_parameter_of_a_further_light_is_named_and_the_other_lights_are_
 
     bridge.wait_for('light 1/244 gets no node: brightness 400 % is out of range')
     assert light_of(own_ros, '/illuminator', lights) == FIRST
-
-
-def test_name_of_the_first_node_is_refused_for_another_light(own_ros: Ros) -> None:
-    done = run('illuminator_ros.bridge', '--ros-args', '-r', '__node:=spot',
-               '-p', 'names:=["1/244=spot"]', env={'ROS_DOMAIN_ID': str(own_ros.domain)})
-
-    assert done.returncode == 2
-    assert "parameter names: '1/244=spot' is the name of the first node" in done.stderr

@@ -14,19 +14,17 @@
 
 """The effect of the parameters of the link, and of use_sim_time."""
 
-import re
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Temperature
-from support.light import Address, MavCmd, ON_OFF, params, ServedLight
+from support.light import Address, MavCmd, ON_OFF, ServedLight
 from support.ros import Parameters, Ros, running_bridge, STREAM
-from support.slow import CLOCK, pass_time_until
+from support.slow import CLOCK
 
 INTERVAL = MavCmd.SET_MESSAGE_INTERVAL
-STATUS = 440.0
 
 
 @pytest.mark.parametrize(('given', 'address'), [
@@ -40,21 +38,6 @@ def test_bridge_sends_from_its_address_and_leaves_the_status_interval_alone(
 
         assert light.fake.heard_from == {address}
         assert light.commands(INTERVAL) == []
-
-
-def test_status_interval_is_requested_in_microseconds_and_again_after_a_restart(
-    own_ros: Ros, port: int,
-) -> None:
-    with (running_bridge(own_ros.domain, port, status_interval=0.05) as bridge,
-          ServedLight(port) as light):
-        [command] = light.wait_for(INTERVAL)
-        assert params(command)[:2] == (STATUS, 50_000.0)
-        Parameters(own_ros).wait(brightness=100.0)
-
-        light.restart()
-
-        bridge.wait_for('has restarted')
-        light.wait_for(INTERVAL, 2)
 
 
 @pytest.mark.parametrize(('retries', 'text'), [(0, '(1 try, '), (1, '(2 tries, ')])
@@ -72,19 +55,6 @@ def test_command_retries_and_command_timeout_bound_the_wait(
 
         assert not call.result().success
         assert text in call.result().message
-
-
-def test_light_is_lost_after_a_silence_of_heartbeat_timeout(own_ros: Ros, port: int) -> None:
-    with running_bridge(own_ros.domain, port, heartbeat_timeout=20) as bridge:
-        with ServedLight(port):
-            bridge.wait_for('connected')
-
-        pass_time_until(lambda: bridge.count('lost'))
-
-        [line] = [line for line in bridge.lines if 'light 1/243 lost' in line]
-        match = re.search(r'no heartbeat for (\d+)(\.\d+)? s', line)
-        assert match is not None
-        assert int(match[1]) >= 20
 
 
 def test_simulated_time_without_a_clock_affects_stamps_only(own_ros: Ros, port: int) -> None:

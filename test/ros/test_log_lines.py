@@ -12,87 +12,79 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The log while lights are missing, found, changed and too hot: each fact once, and no flood."""
+"""The log of a light's life: each fact once, and no flood; parameters follow meanwhile."""
 
-from collections.abc import Callable, Iterator
-import socket
+from collections.abc import Callable
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat, MavType
+from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat
 import pytest
+from std_msgs.msg import Float64
 from support.fake_light import status_message
-from support.frames import frame_of, spoilt
-from support.light import Address, MavResult, ON_OFF, ServedLight
-from support.processes import Program
-from support.ros import Ros, running_bridge, STREAM
-from support.slow import CLOCK
-from support.waiting import eventually
+from support.light import Address, CONFIGURE, ON_OFF, ServedLight
+from support.ros import Parameters, Ros, running_bridge
+from support.slow import CLOCK, pass_time_until
 
 AUTOPILOT = 2
 FLOOD = 2000
 # s before a missing light is logged.
 NO_LIGHT_GRACE = 10.0
-# s between two lines about the same flag, at least.
-PAUSE = 5.0
 
 
-@pytest.fixture(scope='module')
-def settings() -> dict[str, float]:
-    return {'diagnostics_period': 0.1}
-
-
-def new_lines(bridge: Program, before: int, text: str) -> list[str]:
-    return [line for line in bridge.lines[before:] if text in line]
-
-
-def test_missing_light_is_logged_once_and_answers_name_the_likeliest_reason(
+def test_light_that_is_missed_found_changed_by_others_lost_and_restarted_is_logged_once_each(
     own_ros: Ros, port: int,
 ) -> None:
-    with (running_bridge(own_ros.domain, port, target_component=9) as bridge,
-          socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger):
+    light = ServedLight(port)
+    with running_bridge(own_ros.domain, port, heartbeat_timeout=10) as bridge:
         CLOCK.forward(NO_LIGHT_GRACE)
         bridge.wait_for('no light connected: none heard yet on udp ')
         CLOCK.forward(5 * NO_LIGHT_GRACE)
-
-        stranger.sendto(bytes(range(90)), ('127.0.0.1', port))
-        while 'nothing is received' in (message := own_ros.enable().message):
-            pass
-        assert '90 bytes received, no valid frame; check the baud rate' in message
-        stranger.sendto(frame_of(heartbeat(AUTOPILOT), source=Address(1, 1)), ('127.0.0.1', port))
-        while 'no valid frame' in (message := own_ros.enable().message):
-            pass
-        assert '1 frames received, none from an illuminator' in message
-        with ServedLight(port), ServedLight(port, source=Address(1, 244)):
-            bridge.wait_for('light 1/243')
-            bridge.wait_for('light 1/244')
-            assert 'heard, none of which is the target' in own_ros.enable().message
-
-        [line] = [line for line in bridge.lines if 'no light connected' in line]
-        assert line.startswith('[WARN]')
-
-
-@pytest.mark.parametrize(('flags', 'severity', 'text'), [
-    (1, 'WARN', 'thermal throttling: dimmed because it is hot'),
-    (2, 'ERROR', 'over temperature shutdown: switched off because it is too hot'),
-    (4, 'WARN', 'thermistor failure: temperature sensor failed'),
-    (8, 'WARN', 'unknown flags 0x8'),
-])
-def test_error_flag_is_logged_once_with_its_severity_and_once_when_it_is_cleared(
-    ros: Ros, light: ServedLight, bridge: Program, flags: int, severity: str, text: str,
-) -> None:
-    before = len(bridge.lines)
-    for _ in range(3):
-        light.report(error_status=flags)
-    ros.catch_up()
-    ros.outlast(PAUSE, ['/illuminator'])
-    light.report(error_status=0)
-    bridge.wait_for(f'{text.partition(":")[0]} cleared')
-    ros.catch_up()
-
-    first, last = new_lines(bridge, before, 'light 1/243: ')
-    assert first.startswith(f'[{severity}]') and first.endswith(f'light 1/243: {text}\n')
-    assert last.startswith('[INFO]')
+        parameters = Parameters(own_ros)
+        with light:
+            bridge.wait_for('light 1/243 connected')
+            light.send(heartbeat(AUTOPILOT), Address(1, 1))
+            parameters.wait(brightness=100.0)
+            assert parameters.set(brightness=80.0)[0].successful
+            events = parameters.events()
+            light.forget()
+            # Float32 carries 80.1 as 80.099998; heat and values without a meaning are no change.
+            for report in ({'brightness': 80.000003}, {'brightness': 40.0, 'error_status': 1},
+                           {'brightness': float('nan'), 'error_status': 0}, {'mode': 0}):
+                light.report(**report)
+                # A flag is logged at most every 5 s.
+                own_ros.outlast(5.0, ['/illuminator'])
+            assert parameters.get('brightness', 'mode') == [80.0, 'internal_control']
+            light.report(mode=1, brightness=36.0, strobe_period=2.0)
+            parameters.wait(brightness=36.0, strobe_period=2.0)
+            own_ros.catch_up()
+            [event] = events.messages
+            assert {one.name for one in event.changed_parameters} == {
+                'brightness', 'strobe_period'}
+            assert light.commands(CONFIGURE) == []
+            light.fake.results[ON_OFF] = None
+            call = own_ros.start_enable()
+            light.wait_for(ON_OFF)
+        pass_time_until(lambda: call.answered)
+        assert not call.result().success
+        pass_time_until(lambda: bridge.count('light 1/243 lost: no heartbeat for 1'))
+        light.behave()
+        light.fake.boot = CLOCK()
+        light.fake.fields |= {'brightness': 100.0, 'strobe_period': 0.0}
+        with light:
+            bridge.wait_for('light 1/243 configured: ')
+            parameters.wait(brightness=36.0, strobe_period=2.0)
+            assert light.fake.fields['brightness'] == 36.0
+            own_ros.subscribe(Float64, '/illuminator/uptime').wait(count=3)
+            assert own_ros.enable().success
+        for severity, text in (
+                ('WARN', 'no light connected'),
+                ('INFO', 'light 1/243: thermal throttling cleared'),
+                ('WARN', 'light 1/243: thermal throttling: dimmed because it is hot'),
+                ('INFO', 'light 1/243 was changed: brightness 36 %, strobe_period 2 s'),
+                ('WARN', 'light 1/243 lost: '), ('INFO', 'light 1/243 has restarted')):
+            [line] = [line for line in bridge.lines if text in line]
+            assert line.startswith(f'[{severity}]')
+        assert (bridge.count('light 1/243 connected'), bridge.count('1/1 ')) == (2, 0)
 
 
 def another_identity(light: ServedLight, now: float, step: int) -> Any:
@@ -129,45 +121,3 @@ def test_flood_of_frames_is_not_a_flood_of_lines(
         own_ros.catch_up()
 
         assert 1 <= len(bridge.lines) - before < 40
-
-
-@pytest.fixture
-def counters(ros: Ros, bridge: Program) -> Iterator[Callable[[], dict[str, float]]]:
-    """Return a function that reads the counters of the link."""
-    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-
-    def read() -> dict[str, float]:
-        recorder.clear()
-        CLOCK.forward(0.1)
-        link = recorder.wait(lambda array: len(array.status) == 2).status[0]
-        return {value.key: float(value.value) for value in link.values
-                if value.key not in ('url', 'open', 'node')}
-
-    yield read
-
-
-def test_counters_of_the_link_count_lost_and_spoilt_frames_and_resent_commands(
-    ros: Ros, light: ServedLight, counters: Callable[[], dict[str, float]],
-) -> None:
-    light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
-    light.fake.stream = 0.0
-    before = counters()
-
-    call = ros.start_enable()
-    light.wait_for(ON_OFF)
-    CLOCK.forward(0.5)
-    assert call.result().success
-    light.lose_frames(5)
-    light.report()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        stranger.sendto(spoilt(frame_of(heartbeat(MavType.ILLUMINATOR), source=Address(9, 9))),
-                        ('127.0.0.1', light.port))
-    ros.catch_up()
-
-    expected = {'frames_lost': 5, 'crc_errors': 1, 'commands_resent': 1, 'commands_unanswered': 0}
-    # Diagnostics may be made of an older snapshot once.
-    eventually(lambda: {
-        key: now - before[key] for key, now in counters().items() if key in expected} == expected)
-    after = counters()
-    assert after['commands_sent'] >= before['commands_sent'] + 2
-    assert after['frames_sent'] > before['frames_sent']

@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.light import CONFIGURE, MavResult, ON_OFF, params, ServedLight
+from support.light import CONFIGURE, ON_OFF, params, ServedLight
 from support.ports import free_port
 from support.processes import ended, python
 from support.ros import Parameters, Ros, running_bridge
-from support.slow import CLOCK
 
 # The light's own configuration.
 OWN: dict[str, Any] = {
@@ -50,6 +49,8 @@ def write(path: Path, *sections: tuple[str, dict[str, Any]]) -> str:
       'strobe_duty_cycle': 50}, None, (1.0, 1.0, 3.5, 50.0)),
     *(({'brightness': 60}, section, (2.0, 60.0, 2.0, 10.0)) for section in (ALL, FULL, SHORT)),
 ])
+
+
 def test_overrides_are_sent_with_the_first_connection_in_one_command(
     own_ros: Ros, port: int, light: ServedLight, tmp_path: Path, given: dict[str, Any],
     section: str | None, sent: tuple[float, ...],
@@ -86,25 +87,6 @@ def test_last_section_of_a_file_wins_and_the_file_of_a_launch_argument_over_any(
             bridge.wait_for(f'link open: udp 127.0.0.1:{port}')
 
 
-@pytest.mark.parametrize('given', [{}, {'restore_configuration': False}])
-def test_light_without_overrides_is_not_configured_at_the_first_connection(
-    own_ros: Ros, port: int, light: ServedLight, given: dict[str, Any],
-) -> None:
-    with running_bridge(own_ros.domain, port, **given) as bridge, light:
-        Parameters(own_ros).wait(brightness=90.0, mode='external_sync')
-        assert light.commands(CONFIGURE) == []
-
-        light.restart()
-
-        bridge.wait_for('light 1/243 has restarted')
-        if given:
-            Parameters(own_ros).wait(brightness=100.0, mode='internal_control')
-            assert light.commands(CONFIGURE) == []
-        else:
-            bridge.wait_for('light 1/243 configured: ')
-            assert [params(c) for c in light.commands(CONFIGURE)] == [(2.0, 90.0, 2.0, 10.0)]
-
-
 def test_restarted_light_gets_overrides_and_later_changes_and_is_never_switched_on(
     own_ros: Ros, port: int, light: ServedLight,
 ) -> None:
@@ -122,22 +104,6 @@ def test_restarted_light_gets_overrides_and_later_changes_and_is_never_switched_
         assert Parameters(own_ros).get('brightness', 'strobe_period') == [60.0, 4.0]
         assert light.commands(ON_OFF) == []
         assert light.fake.fields['enable'] == 0
-
-
-def test_override_out_of_range_is_named_and_the_others_are_sent_again_until_acknowledged(
-    ros: Ros, port: int, light: ServedLight,
-) -> None:
-    light.fake.results[CONFIGURE] = None
-    with running_bridge(ros.domain, port, brightness=60, strobe_period=20.0,
-                        command_retries=0) as bridge, light:
-        bridge.wait_for('light 1/243 not configured: strobe_period 20 s is outside what '
-                        'the light reports: 0 (no strobe) or 0.05 to 10 s')
-        light.wait_for(CONFIGURE)
-        light.fake.results[CONFIGURE] = MavResult.ACCEPTED
-        CLOCK.forward(2.0)
-
-        bridge.wait_for('light 1/243 configured: brightness 60 %')
-        assert {params(c) for c in light.commands(CONFIGURE)} == {(2.0, 60.0, 2.0, 10.0)}
 
 
 def test_parameters_of_one_bridge_can_be_given_to_the_next(

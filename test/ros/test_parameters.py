@@ -73,6 +73,8 @@ def test_parameters_of_the_light_have_its_values_and_the_described_types(
     ('get_parameter_types', GetParameterTypes, 'types'),
     ('describe_parameters', DescribeParameters, 'descriptors'),
 ])
+
+
 def test_unknown_name_gets_an_empty_answer(
     parameters: Parameters, service: str, type_: Any, field: str,
 ) -> None:
@@ -97,12 +99,6 @@ def test_number_is_described_with_unit_range_and_constraint(
     assert not descriptor.read_only
 
 
-def test_mode_is_described_with_its_choices(parameters: Parameters) -> None:
-    [descriptor] = parameters.describe('mode')
-
-    assert descriptor.additional_constraints == 'one of: internal_control, external_sync'
-
-
 @pytest.mark.parametrize(('limits', 'high'), [
     ((0.1, 3.0), 3.0), ((0.0, 0.0), 3600.0), ((5.0, 1.0), 3600.0), ((0.05, 10.0), 10.0)])
 def test_strobe_range_follows_the_limits_that_the_light_reports(
@@ -114,16 +110,6 @@ def test_strobe_range_follows_the_limits_that_the_light_reports(
     light.fake.fields |= {'min_strobe_period': limits[0], 'max_strobe_period': limits[1]}
 
     parameters.wait_range('strobe_period', high)
-
-
-def test_period_beyond_the_reported_limit_is_shown(
-    light: ServedLight, parameters: Parameters,
-) -> None:
-    light.report(strobe_period=12.0, min_strobe_period=0.05, max_strobe_period=10.0)
-
-    parameters.wait(strobe_period=12.0)
-    light.report(strobe_period=0.0)
-    parameters.wait(strobe_period=0.0)
 
 
 def test_link_parameters_are_typed_described_and_read_only(parameters: Parameters) -> None:

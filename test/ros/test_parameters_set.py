@@ -40,24 +40,6 @@ def start(light: ServedLight, parameters: Parameters) -> None:
     light.forget()
 
 
-@pytest.mark.parametrize(('name', 'value', 'sent'), [
-    ('mode', 'external_sync', (2.0, 80.0, 0.0, 0.0)),
-    ('brightness', 60.5, (1.0, 60.5, 0.0, 0.0)),
-    ('brightness', 60, (1.0, 60.0, 0.0, 0.0)),
-    ('strobe_duty_cycle', 50.0, (1.0, 80.0, 0.0, 50.0)),
-])
-def test_one_parameter_is_sent_with_the_others_as_they_are(
-    light: ServedLight, parameters: Parameters, name: str, value: object,
-    sent: tuple[float, ...],
-) -> None:
-    [result] = parameters.set(**{name: value})
-
-    assert result.successful
-    assert [params(command) for command in light.commands(CONFIGURE)] == [sent]
-    assert parameters.get(name) == [value]
-    assert parameters.types(name) == parameters.types('mode' if name == 'mode' else 'brightness')
-
-
 @pytest.mark.parametrize('atomically', [False, True])
 def test_four_parameters_in_one_call_are_one_command_and_one_event(
     light: ServedLight, parameters: Parameters, atomically: bool,
@@ -72,16 +54,6 @@ def test_four_parameters_in_one_call_are_one_command_and_one_event(
     assert parameters.get(*FOUR) == list(FOUR.values())
     assert {p.name for p in events.wait().changed_parameters} == set(FOUR)
     assert len(events.messages) == 1
-
-
-def test_two_callers_at_once_both_change_the_light(
-    light: ServedLight, parameters: Parameters,
-) -> None:
-    calls = [parameters.start_set(brightness=30.0), parameters.start_set(strobe_duty_cycle=3.0)]
-
-    assert all(call.result().results[0].successful for call in calls)
-    assert parameters.get('brightness', 'strobe_duty_cycle') == [30.0, 3.0]
-    assert params(light.commands(CONFIGURE)[-1]) == (1.0, 30.0, 0.0, 3.0)
 
 
 @pytest.mark.parametrize('atomically', [False, True])
@@ -103,6 +75,8 @@ def test_two_callers_at_once_both_change_the_light(
     ('frame_id', 'other', 'read-only'),
     ('banana', 1.0, 'banana'),
 ])
+
+
 def test_invalid_value_is_refused_with_its_reason_and_nothing_is_sent(
     light: ServedLight, parameters: Parameters, name: str, value: object, reason: str,
     atomically: bool,

@@ -14,41 +14,17 @@
 
 """Limits, sources, the dead man's switch and changes by other senders, in the node."""
 
-import math
 import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import SetBool, Trigger
-from support.embedded import embedded_bridge, refusal
+from support.embedded import embedded_bridge
 from support.light import CONFIGURE, eventually, free_port, ON_OFF, ServedLight
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until
 from support.waiting import PATIENCE
-
-
-@pytest.mark.parametrize(('given', 'reason'), [
-    ({'max_brightness': 100.5}, 'max_brightness: 100.5 % is out of range: 0 to 100 %'),
-    ({'min_strobe_period': -1.0}, 'min_strobe_period: -1.0 s is out of range: 0 to 3600 s'),
-    ({'sources': ['safety', 'safety']}, "sources: 'safety' is given twice"),
-    ({'sources': ['default', 'safety', 'default']}, "sources: 'default' is given twice"),
-    ({'sources': ['1st']}, "sources: '1st' is not a valid name of a source"),
-    ({'sources': ['a__b']}, "sources: 'a__b' is not a valid name of a source"),
-    ({'sources': ['cmd']}, "sources: 'cmd' is not a valid name of a source"),
-    ({'sources': ['a'], 'source_timeout': -1.0}, 'source_timeout: -1.0 s is out of range'),
-    ({'source_timeout': 1.0}, 'source_timeout: is given, but sources is empty'),
-    ({'on_release': 'off'}, 'on_release: is given, but sources is empty'),
-    ({'on_release': 'dim'}, "on_release: 'dim' is not one of keep, off"),
-    ({'external_changes': 'fight'}, "external_changes: 'fight' is not one of follow, reassert"),
-    ({'off_after_silence': math.inf}, 'off_after_silence: inf s is out of range: 0 to 3600 s'),
-    ({'max_brightness': 60, 'brightness': 80},
-     'brightness 80 % is above max_brightness 60 %'),
-])
-def test_wrong_configuration_is_refused_at_the_start_with_its_reason(
-    ros: Ros, given: dict[str, object], reason: str,
-) -> None:
-    assert reason in refusal(ros.context, **given)
 
 
 def test_limits_are_shown_by_descriptors_refuse_parameters_and_clip_streams(own_ros: Ros) -> None:
@@ -156,23 +132,3 @@ def test_on_and_off_by_another_sender_are_logged_in_both_settings(
         if change == 'reassert':
             bridge.wait_for('is switched off by external_changes: another sender switched it on')
             eventually(lambda: light.fake.fields['enable'] == 0)
-
-
-def test_light_goes_off_after_silence_while_the_executor_is_blocked(own_ros: Ros) -> None:
-    port, released = free_port(), threading.Event()
-    with (embedded_bridge(own_ros.domain, port, off_after_silence=5.0) as process,
-          ServedLight(port) as light):
-        Parameters(own_ros).wait(mode='internal_control')
-        assert own_ros.enable(True).success
-        blocked = threading.Event()
-
-        def block() -> None:
-            blocked.set()
-            released.wait()
-
-        process.node.create_timer(0.001, block)
-        assert blocked.wait(PATIENCE)
-
-        pass_time_until(lambda: light.fake.fields['enable'] == 0)
-
-        released.set()

@@ -25,20 +25,12 @@ from support.fake_light import FakeLight
 from support.light import Address
 from support.ports import free_port
 from support.processes import Program
-from support.relay import Relay
 from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
 from support.shared_address import SharedAddress
-from support.slow import CLOCK, pass_time_until, SlowLink, SPEED
+from support.slow import CLOCK, SlowLink, SPEED
 
 CLASH = 'another sender uses our address 1/194'
 SHARED = 'several lights answer as 1/1: their statuses contradict one another'
-
-
-def says(text: str, name: str, level: bytes) -> Callable[[DiagnosticArray], bool]:
-    """Return a condition for arrays: a status has this level and contains this text."""
-    return lambda array: any(
-        status.name == name and status.level == level and text in status.message
-        for status in array.status)
 
 
 def is_of(node: str) -> Callable[[DiagnosticArray], bool]:
@@ -77,22 +69,6 @@ def test_two_bridges_of_different_addresses_share_the_lights_and_do_not_clash(
         assert not any(CLASH in array.status[0].message for array in arrays.messages)
 
 
-def test_two_bridges_of_one_address_both_report_the_clash(own_ros: Ros) -> None:
-    relay = Relay()
-    relay.start()
-    with contextlib.ExitStack() as stack:
-        stack.callback(relay.stop)
-        for name, port in (('first', relay.near_port), ('second', relay.far_port)):
-            stack.enter_context(running_bridge(
-                own_ros.domain, port, '-r', f'__node:={name}',
-                connection_url=f'udpout://127.0.0.1:{port}'))
-        arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-        clashes = [says(CLASH, f'{name}: link', DiagnosticStatus.ERROR)
-                   for name in ('first', 'second')]
-        pass_time_until(lambda: all(
-            any(map(clash, list(arrays.messages))) for clash in clashes))
-
-
 @pytest.fixture(scope='module')
 def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
     """Run a bridge and an autopilot with two lights, one on and one off."""
@@ -110,25 +86,21 @@ def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
         link.stop()
 
 
-def test_two_lights_at_one_address_are_a_warning_and_topics_show_each_status(
+def test_two_lights_at_one_address_are_a_warning_and_a_set_reaches_both(
     ros: Ros, contradiction: tuple[Program, SharedAddress],
 ) -> None:
     recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-    events = Parameters(ros).events()
+    parameters = Parameters(ros)
+    events = parameters.events()
     enabled = ros.subscribe(Bool, '/illuminator/enabled', STREAM)
-
     CLOCK.forward(1.0)
-    recorder.wait(says(SHARED, 'illuminator: lamp', DiagnosticStatus.WARN))
+    recorder.wait(lambda array: array.status[1].level == DiagnosticStatus.WARN
+                  and SHARED in array.status[1].message)
     enabled.wait(count=30)
-
     assert set(enabled.values) == {False, True}
     assert events.messages == []
     assert contradiction[0].count('was changed') <= 1
 
-
-def test_set_reaches_both_lights_at_one_address_and_is_shown(
-    ros: Ros, contradiction: tuple[Program, SharedAddress],
-) -> None:
-    assert Parameters(ros).set(brightness=60.0)[0].successful
+    assert parameters.set(brightness=60.0)[0].successful
     assert [light.fields['brightness'] for light in contradiction[1].lights] == [60.0, 60.0]
-    assert Parameters(ros).get('brightness') == [60.0]
+    assert parameters.get('brightness') == [60.0]

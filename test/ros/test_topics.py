@@ -29,9 +29,6 @@ from support.slow import CLOCK, pass_time_until
 STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
     'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64}
-THERMISTOR_FAILURE = 4
-
-
 @pytest.fixture(scope='module')
 def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
     """Return the topics of the module's bridge by their names."""
@@ -56,35 +53,26 @@ def topics(light: ServedLight, recorders: dict[str, Recorder]) -> dict[str, Reco
 @pytest.mark.parametrize(('topic', 'field', 'sent', 'published'), [
     ('enabled', 'enable', 1, True),
     ('brightness', 'brightness', 42.5, 42.5),
-    ('mode', 'mode', 0, 'unknown'),
-    ('mode', 'mode', 1, 'internal_control'),
-    ('mode', 'mode', 2, 'external_sync'),
-    ('mode', 'mode', 77, 'unknown'),
+    *(('mode', 'mode', mode, shown) for mode, shown in (
+        (0, 'unknown'), (1, 'internal_control'), (2, 'external_sync'), (77, 'unknown'))),
     ('strobe_period', 'strobe_period', 0.5, 0.5),
     ('strobe_duty_cycle', 'strobe_duty_cycle', 25.0, 25.0),
     ('error_flags', 'error_status', 0x80000005, 0x80000005),
+    ('uptime', 'temp_c', 20.0, None),
 ])
-def test_status_field_is_published_as_sent(
-    light: ServedLight, topics: dict[str, Recorder], topic: str, field: str, sent: float,
+
+
+def test_each_status_is_published_once_as_sent_and_kept_for_late_subscribers(
+    ros: Ros, light: ServedLight, topics: dict[str, Recorder], topic: str, field: str, sent: float,
     published: object,
 ) -> None:
-    light.report(**{field: sent})
-
-    assert topics[topic].wait().data == published
-
-
-@pytest.mark.parametrize('topic', STATUS_TOPICS)
-def test_status_is_published_once_on_each_topic_and_kept_for_late_subscribers(
-    ros: Ros, light: ServedLight, topics: dict[str, Recorder], topic: str,
-) -> None:
-    for count in range(1, 5):
-        uptime = light.report()
+    for count in (1, 2, 3):
+        uptime = light.report(**{field: sent})
         topics[topic].wait(count=count)
     late = ros.subscribe(STATUS_TOPICS[topic], f'/illuminator/{topic}')
-
-    assert late.wait() == topics[topic].messages[-1]
-    assert (len(topics[topic].messages), len(late.messages)) == (4, 1)
-    assert topic != 'uptime' or late.wait().data == pytest.approx(uptime)
+    expected = pytest.approx(uptime) if published is None else published
+    assert late.wait().data == topics[topic].values[-1] == expected
+    assert (len(topics[topic].messages), len(late.messages)) == (3, 1)
 
 
 @pytest.mark.parametrize(('topic', 'field', 'values'), [
@@ -94,6 +82,8 @@ def test_status_is_published_once_on_each_topic_and_kept_for_late_subscribers(
     ('strobe_duty_cycle', 'strobe_duty_cycle', (math.nan, 101.0)),
     ('temperature', 'temp_c', (math.nan, math.inf, -300.0, 1e6)),
 ])
+
+
 def test_implausible_value_is_not_published_while_the_others_are(
     light: ServedLight, topics: dict[str, Recorder], topic: str, field: str,
     values: tuple[float, ...],
@@ -124,32 +114,6 @@ def test_temperature_is_stamped_at_reception_in_the_default_frame(
         41.5, 0.0, 'illuminator')
 
 
-def test_temperature_of_a_failed_thermistor_is_not_published_and_zero_degrees_are(
-    light: ServedLight, topics: dict[str, Recorder],
-) -> None:
-    light.report(temp_c=30.0, error_status=THERMISTOR_FAILURE)
-    light.report(temp_c=0.0, error_status=0)
-
-    assert topics['temperature'].wait().temperature == 0.0
-
-
-def test_light_that_reports_zero_degrees_from_the_start_has_no_temperature(
-    own_ros: Ros, port: int,
-) -> None:
-    with (running_bridge(own_ros.domain, port, frame_id='belly') as bridge,
-          ServedLight(port, stream=0.0, temp_c=0.0) as light):
-        bridge.wait_for('connected')
-        recorder = own_ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
-        uptime = own_ros.subscribe(Float64, '/illuminator/uptime')
-        light.report()
-        uptime.wait()
-
-        light.report(temp_c=20.0)
-
-        assert recorder.wait().temperature == 20.0
-        assert [message.header.frame_id for message in recorder.messages] == ['belly']
-
-
 def test_connected_is_false_before_a_light_is_heard_and_published_on_change_only(
     own_ros: Ros, port: int,
 ) -> None:
@@ -172,6 +136,8 @@ def test_connected_is_false_before_a_light_is_heard_and_published_on_change_only
     (('-r', '~/connected:=/lamp/alive', '-r', '/diagnostics:=/uav1/diagnostics'),
      '/illuminator'),
 ])
+
+
 def test_all_names_follow_namespace_node_name_and_remapping(
     own_ros: Ros, port: int, arguments: tuple[str, ...], node: str,
 ) -> None:

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from illuminator_ros.mavlink.frame import Frame
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import EPOCH, signature, Signing, SigningMode
@@ -40,3 +42,9 @@ def checker(mode: SigningMode = SigningMode.REQUIRE, *, timestamp: int = 0,
             link_id: int = 0) -> Signing:
     """Return a signing state with the key."""
     return Signing(mode, KEY, link_id, timestamp)
+
+
+def signed_frame(stamp: int, **options: Any) -> bytes:
+    """Return the bytes of such a frame."""
+    frame = signed(stamp, **options)
+    return frame.signed_part + (frame.signature or b'')

@@ -12,21 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``~/enable`` succeeds only if the light has accepted the command and shows it."""
+"""``~/enable`` and ``~/refresh``: their answers, also while others wait or there is no light."""
 
 import re
 import socket
 
 import pytest
-from std_msgs.msg import Float64
+from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
-from support.light import MavResult, ON_OFF, ServedLight
+from support.light import MavCmd, MavResult, ON_OFF, ServedLight
+from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
-from support.slow import CLOCK, pass_time_until, SPEED
+from support.slow import pass_time_until
 
-ONCE = r'\(1 try, \d+ ms\)'
-# s for which each try is waited for at most.
-A_TRY = 0.5
+STATUS, INFORMATION = 440.0, 396.0
 
 
 @pytest.fixture
@@ -36,79 +35,36 @@ def off(light: ServedLight) -> ServedLight:
     return light
 
 
-@pytest.mark.parametrize('before', [True, False])
-@pytest.mark.parametrize('on', [True, False])
-def test_obedient_light_is_commanded_once_and_confirmed_whatever_it_showed_before(
-    ros: Ros, light: ServedLight, on: bool, before: bool,
-) -> None:
-    light.report(enable=int(before))
-
-    response = ros.enable(on)
-
-    assert response.success
-    assert re.fullmatch(f'{"on" if on else "off"}, confirmed by ILLUMINATOR_STATUS: '
-                        f'MAV_RESULT_ACCEPTED {ONCE}', response.message)
-    assert light.fake.fields['enable'] == int(on)
-    assert [command.param1 for command in light.commands(ON_OFF)] == [float(on)]
-
-
-@pytest.mark.parametrize(('result', 'name'), [
-    *((result, f'MAV_RESULT_{result.name}') for result in (
-        MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, MavResult.CANCELLED,
-        MavResult.NOT_IN_CONTROL)),
-    (42, 'MAV_RESULT 42 (unknown)')])
-def test_refusal_is_reported_with_the_name_of_its_result(
-    ros: Ros, off: ServedLight, result: int, name: str,
+@pytest.mark.parametrize(('result', 'answer'), [
+    (MavResult.ACCEPTED, 'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+    (MavResult.DENIED, 'refused: MAV_RESULT_DENIED')])
+def test_enable_is_answered_with_the_result_of_one_command(
+    ros: Ros, off: ServedLight, result: MavResult, answer: str,
 ) -> None:
     off.fake.results[ON_OFF] = result
-
     response = ros.enable()
+    assert response.success is (result is MavResult.ACCEPTED)
+    assert re.fullmatch(rf'{answer} \(1 try, \d+ ms\)', response.message)
+    assert [command.param1 for command in off.commands(ON_OFF)] == [1.0]
 
-    assert not response.success
-    assert re.fullmatch(rf'refused: {re.escape(name)} {ONCE}', response.message)
 
-
-def test_silent_light_fails_after_all_tries_which_are_numbered(
-    ros: Ros, off: ServedLight,
+def test_refresh_requests_both_messages_which_are_published_or_logged(
+    ros: Ros, off: ServedLight, bridge: Program,
 ) -> None:
-    off.fake.results[ON_OFF] = None
-    call = ros.start_enable()
-    for tries in range(1, 5):
-        off.wait_for(ON_OFF, tries)
-        CLOCK.forward(A_TRY)
+    brightness = ros.subscribe(Float32, '/illuminator/brightness')
+    off.fake.stream = 0.0
+    off.do(lambda now: off.fake.fields.update(brightness=12.0))
+    off.fake.identity = type(off.fake.identity)('other', 'maker', '', '', 'T-2')
 
-    assert not call.result().success
-    assert call.result().message.startswith('no acknowledgement (4 tries, ')
-    assert [command.confirmation for command in off.commands(ON_OFF)] == [0, 1, 2, 3]
+    answer = ros.refresh()
 
-
-def test_accepted_command_fails_if_the_status_contradicts_it(
-    ros: Ros, off: ServedLight,
-) -> None:
-    off.fake.applies = False
-    call = ros.start_enable()
-    off.wait_for(ON_OFF)
-    ros.catch_up()
-
-    CLOCK.forward(1.0)
-
-    assert not call.result().success
-    assert re.fullmatch(
-        r'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off '
-        r'\(1 try, 1\.\d\d s\)', call.result().message)
-
-
-def test_two_callers_each_get_the_answer_to_their_own_request(
-    ros: Ros, off: ServedLight,
-) -> None:
-    off.fake.delays[ON_OFF] = 0.1 * SPEED
-
-    on, also_off = ros.start_enable(True), ros.start_enable(False)
-
-    # Off overtakes on.
-    assert on.result().message == 'cancelled by a later request'
-    assert also_off.result().message.startswith('off, confirmed')
-    assert off.fake.fields['enable'] == 0
+    assert answer.success
+    assert re.fullmatch(r'ILLUMINATOR_STATUS: received, COMPONENT_INFORMATION_BASIC: received '
+                        r'\(\d+ ms\)', answer.message)
+    assert {command.param1 for command in off.commands(MavCmd.REQUEST_MESSAGE)} == {
+        STATUS, INFORMATION}
+    brightness.wait_value(12.0)
+    bridge.wait_for('light 1/243 is other maker, serial number T-2')
 
 
 def test_other_services_and_topics_go_on_while_an_enable_waits(

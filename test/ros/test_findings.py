@@ -1,0 +1,197 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The findings of ``/diagnostics``: levels and texts, as they follow from received frames."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from illuminator_ros.illuminator.events import LightSnapshot
+from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.ros.diagnostics import hardware_id, LightsHeard, reports
+from illuminator_ros.illuminator.ros.flag_log import FlagLog, PAUSE
+from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
+from illuminator_ros.mavlink.signing import Signing, SigningMode
+from illuminator_ros.ros.diagnostics import link_snapshot
+import pytest
+from support.client import Client
+from support.fake_light import LIGHT, status_message
+from support.frames import frame_of, spoilt
+from support.signers import KEY, signed_frame, WRONG_KEY
+from support.simulated_link import SimulatedLink
+
+BRIDGE, AUTOPILOT = Address(1, 194), Address(1, 1)
+PEER = ('127.0.0.1', 14550)
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+class Reported:
+    """A client on a link, and the statuses of its node."""
+
+    def __init__(self, mode: SigningMode = SigningMode.OFF) -> None:
+        self.client = Client(BRIDGE, Settings())
+        self.link = SimulatedLink(
+            self.client, lambda data, peer: None, signing=Signing(mode, KEY))
+        self._started = self.link.now
+        self._sequence = 0
+
+    def status(self, lost: int = 0, **fields: Any) -> None:
+        """Send a status after frames that are lost."""
+        self._sequence += 1 + lost
+        self.link.run(0.1)
+        self.link.receive((frame_of(status_message(
+            int(self.link.now * 1000), **fields), self._sequence & 0xFF, LIGHT), PEER))
+
+    def receive(self, *data: bytes) -> None:
+        self.link.receive(*((one, PEER) for one in data))
+
+    def snapshot(self) -> LightSnapshot | None:
+        light = self.client.lights.get(LIGHT)
+        return light.snapshot(self.link.now) if light else None
+
+    def statuses(self, heard: LightsHeard | None = None) -> dict[str, DiagnosticStatus]:
+        """Return the statuses by what they are of."""
+        light = self.snapshot()
+        made = reports(
+            link_snapshot(self.link, self.client, 'udpin://', self.link.now), light=light,
+            heard=heard or LightsHeard(0, (), False),
+            hardware_id=hardware_id(light) if light else '', started=self._started)
+        return {one.name: one.message('illuminator', '/illuminator') for one in made}
+
+
+def found(status: DiagnosticStatus) -> tuple[bytes, str]:
+    return status.level, status.message
+
+
+def value(status: DiagnosticStatus, key: str) -> str:
+    return {entry.key: entry.value for entry in status.values}[key]
+
+
+@pytest.mark.parametrize(('fields', 'level', 'text'), [
+    ({'enable': 1}, OK, 'on'),
+    ({}, OK, 'off'),
+    ({'error_status': 1}, WARN, 'dimmed because it is hot'),
+    ({'error_status': 4}, WARN, 'temperature sensor failed'),
+    ({'error_status': 3}, ERROR, 'switched off because it is too hot; dimmed because it is hot'),
+    ({'error_status': 0x80000000}, WARN, 'unknown flags 0x80000000'),
+    ({'brightness': math.nan}, WARN, 'implausible: brightness nan'),
+])
+
+
+def test_status_of_a_light_makes_its_finding_and_the_next_one_ends_it(
+    fields: dict[str, Any], level: bytes, text: str,
+) -> None:
+    reported = Reported()
+    reported.status(**fields)
+    assert found(reported.statuses()['lamp']) == (level, text)
+    reported.status(enable=1)
+    assert found(reported.statuses()['lamp']) == (OK, 'on')
+
+
+def test_lamp_values_are_those_of_the_light_beside_what_was_agreed() -> None:
+    reported = Reported()
+    reported.status(brightness=90.0)
+    reported.status(enable=1, brightness=45.5, temp_c=41.25, error_status=1)
+    lamp = reported.statuses()['lamp']
+    shown = {entry.key: entry.value for entry in lamp.values}
+    assert lamp.hardware_id == 'mavlink:1/243'
+    assert shown.items() >= {
+        'enabled': 'true', 'mode': 'internal_control', 'brightness_percent': '45.5',
+        'strobe_period_s': '0', 'temperature_c': '41.25', 'error_flags': '1', 'address': '1/243',
+        'connected': 'true', 'agreed': 'mode internal_control, brightness 90 %, strobe_period '
+        '0 s, strobe_duty_cycle 0 %'}.items()
+
+
+def test_silence_of_a_light_is_a_warning_and_its_loss_an_error() -> None:
+    reported = Reported()
+    reported.status()
+    for _ in range(11):
+        reported.link.run(1.0)
+        reported.receive(frame_of(heartbeat(MavType.ILLUMINATOR), 0, LIGHT))
+    assert found(reported.statuses()['lamp']) == (WARN, 'no status for 11.00 s')
+    reported.link.run(5.0)
+    level, text = found(reported.statuses()['lamp'])
+    assert (level, text) == (ERROR, 'light 1/243 is lost: no heartbeat for 5.00 s')
+
+
+def test_lost_frames_are_a_warning_unless_the_light_has_restarted() -> None:
+    reported = Reported()
+    for _ in range(3):
+        reported.status()
+    assert value(reported.statuses()['link'], 'loss_percent') == '0'
+    reported.status(lost=60)
+    reported.link.run(2.0)
+    link = reported.statuses()['link']
+    assert found(link) == (WARN, '95 % of the frames lost')
+    assert value(link, 'frames_lost') == '60'
+
+
+def test_another_sender_with_our_address_is_an_error() -> None:
+    reported = Reported()
+    reported.status()
+    reported.receive(frame_of(heartbeat(MavType.ONBOARD_CONTROLLER), 100, BRIDGE))
+    assert found(reported.statuses()['link']) == (
+        ERROR, 'another sender uses our address 1/194')
+
+
+FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
+
+
+@pytest.mark.parametrize(('mode', 'received', 'reason'), [
+    (SigningMode.OFF, [], 'nothing is received'),
+    (SigningMode.OFF, [bytes(range(90)), spoilt(FOREIGN)],
+     '111 bytes received, no valid frame; check the baud rate'),
+    (SigningMode.OFF, [FOREIGN], '1 frames received, none from an illuminator'),
+    (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed'),
+    (SigningMode.REQUIRE, [signed_frame(1, key=WRONG_KEY)],
+     '1 frames refused for their signature, made with another key'),
+    (SigningMode.REQUIRE, [signed_frame(1)],
+     '1 frames refused as replayed: their time stamps are not newer than the last; compare the '
+     'clocks'),
+])
+
+
+def test_missing_light_is_a_warning_with_its_likeliest_reason_and_an_error_after_10_s(
+    mode: SigningMode, received: list[bytes], reason: str,
+) -> None:
+    reported = Reported(mode)
+    reported.receive(*received)
+    for seconds, level in ((8, WARN), (11, ERROR)):
+        reported.link.run(1000.0 + seconds - reported.link.now)
+        link = reported.statuses()['link']
+        assert link.level == level
+        assert re.fullmatch(
+            rf'no light connected for {seconds}\.00 s: none heard yet on udp [\d.:]+: {reason}',
+            link.message)
+
+
+def test_lights_that_are_not_the_target_or_too_many_are_named() -> None:
+    link = Reported().statuses(LightsHeard(100, (LIGHT, AUTOPILOT), True))['link']
+    assert link.message == (
+        'no light connected for 0 ms: 1/243, 1/1 heard, none of which is the target; '
+        'more than 100 lights, some ignored')
+
+
+def test_each_flag_is_logged_when_it_is_set_and_cleared_and_not_more_often_than_in_the_pause(
+) -> None:
+    log = FlagLog()
+    hot = (WARN, 'thermal throttling: dimmed because it is hot')
+    assert [log.take(flags, now) for flags, now in (
+        (1, 0.0), (1, 1.0), (0, 2.0), (1, 3.0), (0, PAUSE), (8, PAUSE), (0x18, 2 * PAUSE))] == [
+        [hot], [], [], [], [(OK, 'thermal throttling cleared')], [(WARN, 'unknown flags 0x8')],
+        [(WARN, 'unknown flags 0x18')]]
