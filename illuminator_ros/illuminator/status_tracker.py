@@ -40,11 +40,12 @@ RESTART_PROOF_TIME = 0.1
 RESTART_PROOF_ERROR = 0.05
 # The same where the light seems to have started before its last status.
 CLOCK_JUMP_PROOF_TIME = 5.0
-# How wrong the clock of a light may be, as a share: an oscillator without a crystal.
-CLOCK_ERROR = 0.02
-# s for which a status is compared with. A clock with a larger error makes statuses look old, but
-# by no more than a part of this, so they confirm a change a little later.
-COMPARED_TIME = 5.0
+# s for which a status is compared with later ones. With an oscillator without a crystal, whose
+# error is 2 %, the second status after a change confirms it.
+COMPARED_TIME = 8.0
+# s; a clock that counts in larger steps does not distinguish statuses that follow one another.
+MAX_STEP = 0.02
+RESOLUTION = 0.001
 
 
 def uptime_difference(new_ms: int, old_ms: int) -> int:
@@ -118,33 +119,50 @@ class SendingTimes:
     """
     Tells when statuses were sent, at the latest, from their uptimes.
 
-    A frame that was delayed has an uptime that lags behind those of quicker frames. Where
-    nothing is known, or the light has no clock, a status counts as sent when it came.
+    A frame that was delayed has an uptime that lags behind those of quicker frames, by which the
+    difference between the clocks is known. No error of the light's clock is allowed for, since
+    that would make delayed statuses look new: those of a slow clock look old instead, by the
+    error times :data:`COMPARED_TIME` at most.
     """
 
     def __init__(self) -> None:
-        # The least delayed status of late, and when it came: by then it had been sent.
-        self._uptime_ms = 0
-        self._came_at = -math.inf
-        # The uptimes differ by multiples of this: some lights count in seconds. 0 means no clock.
+        self._uptime_ms: int | None = None
+        # Without wraps, from the first status on.
+        self._running_ms = 0
+        # The uptimes differ by multiples of this, 0 means no clock; and whether several statuses
+        # had the same: the light counts in such steps, and not only sends at such intervals.
         self._step_ms = 0
+        self._has_repeated = False
+        # The least difference between our clock and the uptime, s, in this half of the time for
+        # which statuses are compared and in the last one, and when this one ends.
+        self._least = self._least_before = math.inf
+        self._half_ends = -math.inf
 
-    @property
-    def has_clock(self) -> bool:
-        """Whether the uptimes progress, as far as is known."""
-        return bool(self._step_ms or self._uptime_ms)
+    def take(self, uptime_ms: int, now: float) -> tuple[float, bool]:
+        """
+        Return the latest time at which a status that has just come can have been sent, s.
 
-    def sent_by(self, uptime_ms: int, now: float) -> float:
-        """Return the latest time at which a status that has just come can have been sent, s."""
-        if self._came_at > -math.inf:
+        The second value tells whether the uptimes show that. Where the light has no clock, or
+        there is nothing to compare with, the status counts as sent when it came.
+        """
+        if self._uptime_ms is not None:
             ahead_ms = uptime_difference(uptime_ms, self._uptime_ms)
+            self._running_ms += ahead_ms
+            self._has_repeated |= not ahead_ms
             self._step_ms = math.gcd(self._step_ms, ahead_ms)
-            slack = self._step_ms / 1000 + CLOCK_ERROR * (now - self._came_at)
-            sent_by = self._came_at + ahead_ms / 1000 + slack
-            if self._step_ms and sent_by < now < self._came_at + COMPARED_TIME:
-                return sent_by
-        self._uptime_ms, self._came_at = uptime_ms, now
-        return now
+        self._uptime_ms = uptime_ms
+        if now >= self._half_ends:
+            is_next = now < self._half_ends + COMPARED_TIME / 2
+            self._least_before = self._least if is_next else math.inf
+            self._least, self._half_ends = math.inf, now + COMPARED_TIME / 2
+        known = min(self._least, self._least_before)
+        running, step = self._running_ms / 1000, self._step_ms / 1000
+        self._least = min(self._least, now - running)
+        if not step or known == math.inf:
+            return now, False
+        if step > MAX_STEP and not self._has_repeated:
+            step = RESOLUTION
+        return min(now, running + known + step), step <= MAX_STEP
 
 
 # Changes back to a state shown before that prove several lights: the sixth status of A B A B A B
@@ -333,9 +351,9 @@ class StatusTracker:
         restarted = meaning is Uptime.RESTARTED or meaning is Uptime.NO_CLOCK and was_lost
         if restarted:
             self._sending_times = SendingTimes()
-        sent_by = self._sending_times.sent_by(status.uptime_ms, now)
+        sent_by, is_told = self._sending_times.take(status.uptime_ms, now)
         sender = conflict.sender
-        return Report(status, sent_by, self._sending_times.has_clock, sender=sender,
+        return Report(status, sent_by, is_told, sender=sender,
                       senders=frozenset((sender,))), restarted
 
     def lost(self) -> None:

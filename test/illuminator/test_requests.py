@@ -120,16 +120,22 @@ def test_a_light_that_sends_no_status_by_itself_is_asked_until_it_shows_the_chan
     assert answer.seconds == pytest.approx(seconds, abs=0.02)
 
 
-def test_a_light_that_counts_in_seconds_is_confirmed_as_fast() -> None:
-    # Its statuses look up to a second older than they are.
+@pytest.mark.parametrize(('step_ms', 'rate', 'slowest'), [
+    # A status of the same second may be older than the command: the next one confirms.
+    (1000, 1.0, 0.26),
+    # So it does where the clock is slow, so that a status looks older than it is.
+    (1, 0.98, 0.26), (1, 1.02, 0.01), (1, 0.9999, 0.01)])
+def test_a_light_whose_clock_is_coarse_or_wrong_is_confirmed(
+        step_ms: int, rate: float, slowest: float) -> None:
     fake = FakeLight(stream=0.3)
     uptime_ms = fake.uptime_ms
-    fake.uptime_ms = lambda now: uptime_ms(now) // 1000 * 1000  # type: ignore[method-assign]
+    fake.uptime_ms = (  # type: ignore[method-assign]
+        lambda now: int(rate * uptime_ms(now)) // step_ms * step_ms)
     pair = Pair(fake).settle(20.35)
     for on in (True, False) * 5:
         answer = pair.ask_enable(on)
         assert pair.wait_for(answer).success
-        assert answer.seconds < 0.01
+        assert answer.seconds < slowest
         pair.run(0.17)
 
 
