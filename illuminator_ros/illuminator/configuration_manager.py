@@ -22,17 +22,8 @@ from enum import Enum
 import math
 from typing import Any
 
+from . import events
 from .commands import Configure
-from .events import (
-    AnyLightEvent,
-    Cause,
-    ChangedByOther,
-    ConfigurationChanged,
-    ConfigurationRestored,
-    LimitExceeded,
-    SetpointClipped,
-    SetpointFailed,
-)
 from .model import (
     checked,
     Configuration,
@@ -123,7 +114,7 @@ class ConfigurationManager:
     """
 
     def __init__(
-        self, target: Target, emit: Callable[[AnyLightEvent], None], *,
+        self, target: Target, emit: Callable[[events.AnyLightEvent], None], *,
         limits: SafetyLimits, instance: int = 0, restore: bool = True, reassert: bool = False,
     ) -> None:
         self.confirmed: Configuration | None = None
@@ -135,7 +126,7 @@ class ConfigurationManager:
         self._restore = restore
         self._safety = limits
         self._is_limited = limits != SafetyLimits()
-        self.limit_exceeded = LimitExceeded(target.address, (), '')
+        self.limit_exceeded = events.LimitExceeded(target.address, (), '')
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
         self._reassert = reassert
         self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
@@ -206,7 +197,7 @@ class ConfigurationManager:
         except InvalidValue as error:
             brightness = self._safety.max_brightness
             if (left_out := self._clipping.take(now)) is not None:
-                self._emit(SetpointClipped(self._address, str(error), left_out))
+                self._emit(events.SetpointClipped(self._address, str(error), left_out))
         current = self._queue.current
         if (current is not None and current.is_stream and not current.is_finished
                 and isinstance(current.change, Configure)
@@ -380,7 +371,7 @@ class ConfigurationManager:
                 self._unapplied, reported, status.error_flags, step=True):
             self._applied()
         if self.confirmed is None:
-            self._adopt(reported, Cause.FIRST_STATUS, now)
+            self._adopt(reported, events.Cause.FIRST_STATUS, now)
             if self._pending:
                 self._pending.due = min(self._pending.due, now)
         elif self._pending and self._pending.origin is not Origin.OVERRIDE:
@@ -405,21 +396,21 @@ class ConfigurationManager:
                 name: getattr(reported, name)
                 for name in goal.differences(reported, step=False) if name not in far})
         self._applied()
-        self._adopt(goal, Cause.REQUEST, 0.0)
+        self._adopt(goal, events.Cause.REQUEST, 0.0)
 
     def _applied(self) -> None:
         self._unapplied = None
         self.discrepancy = ''
 
-    def _adopt(self, configuration: Configuration, cause: Cause, now: float) -> None:
+    def _adopt(self, configuration: Configuration, cause: events.Cause, now: float) -> None:
         old, self.confirmed = self.confirmed, configuration
-        if cause is not Cause.ROUNDING:
+        if cause is not events.Cause.ROUNDING:
             self._reference = configuration
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
-            left_out = self._rate.take(now) if cause is Cause.LIGHT else 0
-            self._emit(ConfigurationChanged(
+            left_out = self._rate.take(now) if cause is events.Cause.LIGHT else 0
+            self._emit(events.ConfigurationChanged(
                 self._address, configuration, names, cause, left_out))
 
     def _follow(
@@ -434,11 +425,11 @@ class ConfigurationManager:
         far = unexpected_differences(
             self._reference or confirmed, reported, status.error_flags, step=True,
             external=False)
-        cause = Cause.ROUNDING
+        cause = events.Cause.ROUNDING
         if far:
             own = all(self._is_own(name, reported, switched_at, now) for name in far)
-            cause = Cause.REQUEST if own else Cause.LIGHT
-        if self._reassert and cause is Cause.LIGHT and self._undo_change(
+            cause = events.Cause.REQUEST if own else events.Cause.LIGHT
+        if self._reassert and cause is events.Cause.LIGHT and self._undo_change(
                 status, confirmed, reported, now):
             return
         self._adopt(confirmed.with_changes({name: getattr(reported, name) for name in names}),
@@ -456,13 +447,13 @@ class ConfigurationManager:
             self._undo({name: getattr(confirmed, name) for name in names},
                        Origin.OTHER_SENDER, due)
         left_out = self._rate.take(now) if due is not None else 0
-        self._emit(ChangedByOther(
+        self._emit(events.ChangedByOther(
             self._address, reported.describe(names), due is not None, left_out))
         return due is not None
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it, once."""
-        exceeded = LimitExceeded(self._address, self._safety.excess(reported),
+        exceeded = events.LimitExceeded(self._address, self._safety.excess(reported),
                                  self._safety.impossible(self._limits))
         if exceeded != self.limit_exceeded:
             self.limit_exceeded = exceeded
@@ -527,10 +518,10 @@ class ConfigurationManager:
             self._submit({'brightness': value}, now, finished, is_stream=True)
 
     def _setpoint_failed(self, message: str) -> None:
-        self._emit(SetpointFailed(self._address, message))
+        self._emit(events.SetpointFailed(self._address, message))
 
     def _restored(self, success: bool, message: str) -> None:
-        self._emit(ConfigurationRestored(self._address, success, message))
+        self._emit(events.ConfigurationRestored(self._address, success, message))
 
     def _send_pending(self, pending: Pending, now: float) -> None:
         pending.due = now + RESTORE_INTERVAL

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+from . import events
 from .commands import Switch
 from .configuration_manager import (
     ConfigurationManager,
@@ -29,22 +30,6 @@ from .configuration_manager import (
     REPEAT_INTERVAL,
     REPEATS,
     REPORT_INTERVAL,
-)
-from .events import (
-    AnyLightEvent,
-    AutomaticSwitch,
-    ChangedByOther,
-    LightConnected,
-    LightHeld,
-    LightIdentified,
-    LightLost,
-    LightRestarted,
-    LightSnapshot,
-    LightSwitched,
-    Origin,
-    SetpointFailed,
-    StatusReceived,
-    WishFailed,
 )
 from .messages import STATUS_ID
 from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
@@ -125,7 +110,7 @@ class Light:
 
     def __init__(
         self, address: Address, commands: CommandSender, settings: Settings,
-        emit: Callable[[AnyLightEvent], None], changed: Callable[[Light, float], None], *,
+        emit: Callable[[events.AnyLightEvent], None], changed: Callable[[Light, float], None], *,
         instance: int = 0,
     ) -> None:
         self.address = address
@@ -183,7 +168,7 @@ class Light:
             self.connected = True
             self.lost_at = math.inf
             self._set_up(now)
-            self._emit(LightConnected(self.address))
+            self._emit(events.LightConnected(self.address))
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
@@ -204,7 +189,7 @@ class Light:
         self._measures_temperature |= bool(status.temperature)
         if restarted:
             self._restarted(now)
-        event = StatusReceived(
+        event = events.StatusReceived(
             self.address, status, now, self.temperature, report.shared_address)
         # A request that waits for the status is answered before the status is published.
         is_awaited = (self._switching.is_confirming or self._configuration.is_confirming
@@ -247,32 +232,31 @@ class Light:
         is_own = (on == status.enabled and now <= self._late_until
                   or self._off_brightness == 0.0
                   and now <= self._configuration.sent_at + IMPLIED_TIME)
-        self._emit(LightSwitched(
-            self.address, status.enabled, Origin.REQUEST if is_own else Origin.OTHER_SENDER,
-            left_out=self._rate.take(now)))
+        origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
+        self._emit(events.LightSwitched(
+            self.address, status.enabled, origin, left_out=self._rate.take(now)))
         # A light is switched on again only where a request has switched it on.
         if self.settings.reassert and not is_own and (on or not before):
             self._undo_switch(before, now)
 
     def _undo_switch(self, before: bool, now: float) -> None:
-        due = self._undoing.take(now)
+        due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
-            self._emit(ChangedByOther(self.address, 'off' if before else 'on', undone=False))
+            self._emit(events.ChangedByOther(self.address, change, undone=False))
         else:
-            change = 'off' if before else 'on'
             self._switch_automatically(_AutomaticSwitch(
                 before, f'external_changes: another sender switched it {change}', due,
                 self._undoing))
 
     def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
         self._automatic = switch
-        self._emit(AutomaticSwitch(self.address, switch.on, switch.reason))
+        self._emit(events.AutomaticSwitch(self.address, switch.on, switch.reason))
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
         self.heard(now)
         self._identity_query.take(identity, now)
-        self._emit(LightIdentified(self.address, identity))
+        self._emit(events.LightIdentified(self.address, identity))
 
     def lose(self, reason: str, now: float) -> None:
         """Note that the light is not heard any more."""
@@ -282,7 +266,7 @@ class Light:
             self._was_lost = True
             self._status_due = math.inf
             self._tracker.lost()
-            self._emit(LightLost(self.address, reason))
+            self._emit(events.LightLost(self.address, reason))
             message = self.unreachable(now)
             self._switching.cancel(message, now, only_waiting=True)
             self._configuration.lost(message, now)
@@ -300,7 +284,7 @@ class Light:
         was_on, is_on = self._enabled, self.status.enabled if self.status else None
         self.restarts += 1
         self._automatic = None
-        self._emit(LightRestarted(self.address, was_on, is_on))
+        self._emit(events.LightRestarted(self.address, was_on, is_on))
         self._set_up(now)
         self._configuration.restarted(now)
 
@@ -338,9 +322,9 @@ class Light:
         reason = self._link_failure or f'no heartbeat for {format_seconds(now - self.heard_at)}'
         return f'light {self.address} is lost: {reason}'
 
-    def snapshot(self, now: float) -> LightSnapshot:
+    def snapshot(self, now: float) -> events.LightSnapshot:
         """Return the state, for any thread."""
-        return LightSnapshot(
+        return events.LightSnapshot(
             self.address, self.connected, self.heard_at, self.status, self.status_at,
             self.settings.status_interval, self.restarts, self.temperature,
             self._configuration.confirmed, self._configuration.discrepancy,
@@ -423,7 +407,7 @@ class Light:
             return
         if change.after is not None:
             self._end_requests(f'held by {change.after}', now)
-        self._emit(LightHeld(self.address, change))
+        self._emit(events.LightHeld(self.address, change))
         if change.after is None:
             if self._sources.settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
@@ -447,7 +431,7 @@ class Light:
 
         def done(result: Result, now: float) -> None:
             if not result.success:
-                self._emit(WishFailed(self.address, holder, result.message))
+                self._emit(events.WishFailed(self.address, holder, result.message))
 
         if not self._can_reach(now, done):
             return
@@ -475,7 +459,7 @@ class Light:
                 self._late_until = -math.inf
             done(result, now)
             if result.success:
-                self._emit(LightSwitched(self.address, on, Origin.REQUEST, detail))
+                self._emit(events.LightSwitched(self.address, on, events.Origin.REQUEST, detail))
 
         request = Request(
             self._target, prepare, finished, now=now, limit=now + PROGRESS_LIMIT,
@@ -514,7 +498,7 @@ class Light:
         def failed(result: Result, now: float) -> None:
             # While another source holds the light, a setpoint is remembered.
             if not self.is_held_by_other(source):
-                self._emit(SetpointFailed(self.address, result.message))
+                self._emit(events.SetpointFailed(self.address, result.message))
 
         if self._may_send(source, now, failed, brightness=brightness):
             self._configuration.set_brightness(brightness, now)
@@ -637,11 +621,12 @@ class Light:
             if result.success:
                 self._automatic = None
                 return
-            self._emit(AutomaticSwitch(self.address, switch.on, switch.reason, result.message))
+            self._emit(events.AutomaticSwitch(
+                self.address, switch.on, switch.reason, result.message))
             due = switch.limit.take(now) if switch.limit else now + REPEAT_INTERVAL
             if due is None:
                 self._automatic = None
-                self._emit(ChangedByOther(
+                self._emit(events.ChangedByOther(
                     self.address, 'off' if switch.on else 'on', undone=False))
             else:
                 switch.due = due

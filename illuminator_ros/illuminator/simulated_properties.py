@@ -22,14 +22,7 @@ from typing import NamedTuple
 from .model import ErrorFlag, Limits, Mode
 from .thermal import ThermalProperties
 from .. import __version__
-from ..mavlink.messages import (
-    Address,
-    MAV_AUTOPILOT_ARDUPILOTMEGA,
-    MAV_COMP_ID_AUTOPILOT1,
-    MAV_COMP_ID_ILLUMINATOR,
-    MAV_STATE_UNINIT,
-    MavType,
-)
+from ..mavlink import messages
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.identity import Identity
@@ -65,7 +58,7 @@ class IlluminatorBehaviour(Behaviour):
     :param thermistor_failed: whether its temperature sensor is broken.
     """
 
-    heartbeat_type: int = MavType.ILLUMINATOR
+    heartbeat_type: int = messages.MavType.ILLUMINATOR
     has_clock: bool = True
     measures: bool = True
     extension: Extension | None = None
@@ -114,7 +107,7 @@ class IlluminatorProperties:
     :param seed: of its random numbers.
     """
 
-    address: Address = Address(1, MAV_COMP_ID_ILLUMINATOR)
+    address: messages.Address = messages.Address(1, messages.MAV_COMP_ID_ILLUMINATOR)
     identity: Identity = Identity(
         'illuminator_ros', 'simulator', __version__, '1.0.0', 'SIM-1-243')
     limits: Limits = Limits(0.05, 10.0)
@@ -150,12 +143,12 @@ PROFILES = {
         'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
         'status at 1 Hz or not at all',
         IlluminatorProperties(
-            address=Address(255, 0), limits=Limits(0.0, 10.0),
+            address=messages.Address(255, 0), limits=Limits(0.0, 10.0),
             identity=Identity(
                 'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
                 'Illuminator Hardware Version', 'Illuminator Serial Number'),
             behaviour=IlluminatorBehaviour(
-                heartbeat_state=MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
+                heartbeat_state=messages.MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
                 status_on_change=False, terminates=False, filters_target=False,
                 answers_command_int=False, acks_target=False, apply_after=0.005,
                 accepts_nan=True))),
@@ -163,11 +156,11 @@ PROFILES = {
         "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
         'for what it does not measure, brightness 0 is off',
         IlluminatorProperties(
-            address=Address(1, MAV_COMP_ID_AUTOPILOT1), limits=Limits(0.0, 0.0),
+            address=messages.Address(1, messages.MAV_COMP_ID_AUTOPILOT1), limits=Limits(0.0, 0.0),
             modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True,
             behaviour=IlluminatorBehaviour(
-                heartbeat_type=MavType.SUBMARINE,
-                heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA, measures=False,
+                heartbeat_type=messages.MavType.SUBMARINE,
+                heartbeat_autopilot=messages.MAV_AUTOPILOT_ARDUPILOTMEGA, measures=False,
                 identifies=False, brightness_is_switch=True, status_on_change=False,
                 accepts_nan=True))),
     'extended': Profile(

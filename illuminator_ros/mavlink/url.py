@@ -51,6 +51,10 @@ class HostPort(NamedTuple):
         return f'[{self.host}]:{self.port}' if ':' in self.host else f'{self.host}:{self.port}'
 
 
+# Any free port of all interfaces.
+ANY = HostPort('', 0)
+
+
 @dataclass(frozen=True)
 class UdpUrl:
     """
@@ -131,24 +135,25 @@ class _Parser:
             query = text[text.index('?'):]
             self.fail(f'{query!r}: options are not supported; set the parameters system_id '
                       'and component_id')
-        scheme, separator, rest = text.partition('://')
-        if separator:
-            reader = _WITH_SLASHES.get(scheme.lower())
-            if reader is None:
+        scheme, slashes, rest = text.partition('://')
+        if slashes:
+            if scheme.lower() not in _WITH_SLASHES:
                 self.fail(f'unknown scheme {scheme!r}; known are '
                           + ', '.join(f'{name}://' for name in _WITH_SLASHES))
-            return reader(self, rest)
-        scheme, separator, rest = text.partition(':')
-        if separator and scheme in _WITHOUT_SLASHES:
-            return _WITHOUT_SLASHES[scheme](self, rest)
-        if separator and scheme in _NOT_HERE:
-            self.fail(f'{scheme + separator!r} of pymavlink is not supported here')
-        if separator and scheme in _WITH_SLASHES:
-            self.fail(f'{scheme + separator!r} needs "//" after it')
-        if separator:
-            # pymavlink takes a bare host:port as an address to listen on with UDP.
-            return UdpUrl(self.address(text))
-        return self.fail(f'{text!r} names neither a scheme nor a device path')
+            if not scheme.lower().startswith(('serial', 'pty', 'memory')):
+                rest = self.no_path(rest)
+            return _WITH_SLASHES[scheme.lower()](self, rest)
+        scheme, colon, rest = text.partition(':')
+        if not colon:
+            self.fail(f'{text!r} names neither a scheme nor a device path')
+        if scheme in _WITHOUT_SLASHES:
+            return _WITHOUT_SLASHES[scheme](self, self.no_path(rest))
+        if scheme in _NOT_HERE:
+            self.fail(f'{scheme + colon!r} of pymavlink is not supported here')
+        if scheme in _WITH_SLASHES:
+            self.fail(f'{scheme + colon!r} needs "//" after it')
+        # pymavlink takes a bare host:port as an address to listen on with UDP.
+        return UdpUrl(self.address(text))
 
     def fail(self, reason: str) -> NoReturn:
         raise UrlError(f'connection URL {self.text!r}: {reason}; for example '
@@ -162,7 +167,7 @@ class _Parser:
         """Return host and port of ``[host][:port]``; a part without a default is required."""
         if match := re.fullmatch(r'\[([^\[\]]*)\](?::(.*))?', text):
             host, port = match.groups()
-            if not _is_ip(host, 6):
+            if _ip_version(host) != 6:
                 self.fail(f'{host!r} in brackets is not an IPv6 address')
         else:
             host, colon, port = text.partition(':')
@@ -171,7 +176,7 @@ class _Parser:
                 self.fail(f'{text!r}: an IPv6 address must be in brackets, as in [::1]:14550')
             if not re.fullmatch(r'[A-Za-z0-9._-]*', host):
                 self.fail(f'{host!r} is not a valid host name')
-            if re.fullmatch(r'[0-9.]+', host) and not _is_ip(host, 4):
+            if re.fullmatch(r'[0-9.]+', host) and _ip_version(host) != 4:
                 self.fail(f'{host!r} is not an IPv4 address')
         if not host:
             if default_host is None:
@@ -207,17 +212,17 @@ class _Parser:
         MAVROS ignores a remote port without a host. MAVSDK listens if the host means "any" and
         sends otherwise.
         """
-        bind, at, remote = self.no_path(rest).partition('@')
+        bind, at, remote = rest.partition('@')
         if not at:
             address = self.address(bind)
-            return UdpUrl(address) if _means_any(address.host) else self.udp_out(bind)
+            return UdpUrl(address) if _means_any(address.host) else UdpUrl(ANY, self.remote(bind))
         bound = self.address(bind, default_port=MAVROS_UDP_BIND_PORT)
         if not self.address(remote, default_port=MAVROS_UDP_REMOTE_PORT).host:
             return UdpUrl(bound)
         return UdpUrl(bound, self.remote(remote, default_port=MAVROS_UDP_REMOTE_PORT))
 
     def udp_broadcast(self, rest: str, kind: str) -> Url:
-        bind, at, remote = self.no_path(rest).partition('@')
+        bind, at, remote = rest.partition('@')
         if not at:
             self.fail(f'{rest!r} lacks the "@" before the broadcast address')
         return UdpUrl(
@@ -225,32 +230,13 @@ class _Parser:
             self.address(remote, default_host='255.255.255.255',
                          default_port=MAVROS_UDP_REMOTE_PORT), kind)
 
-    def udp_in(self, rest: str) -> Url:
-        return UdpUrl(self.address(self.no_path(rest)))
-
-    def udp_out(self, rest: str) -> Url:
-        return UdpUrl(HostPort('', 0), self.remote(self.no_path(rest)))
-
-    def udp_bcast(self, rest: str) -> Url:
-        return UdpUrl(HostPort('', 0), self.address(self.no_path(rest), default_host=None),
-                      'always')
-
     def tcp(self, rest: str) -> Url:
         """Read ``tcp://``: a client with MAVROS's defaults; MAVSDK listens without a host."""
-        address = self.address(self.no_path(rest) or 'localhost', default_port=MAVROS_TCP_PORT)
+        address = self.address(rest or 'localhost', default_port=MAVROS_TCP_PORT)
         if _means_any(address.host):
             self.fail(f'{rest!r} connects to this machine in MAVROS and listens in MAVSDK: use '
                       f'tcpout://localhost:{address.port} or tcpin://0.0.0.0:{address.port}')
         return TcpUrl(address)
-
-    def tcp_listen(self, rest: str) -> Url:
-        return TcpUrl(self.address(self.no_path(rest), default_port=MAVROS_TCP_PORT), True)
-
-    def tcp_out(self, rest: str) -> Url:
-        return TcpUrl(self.remote(self.no_path(rest)))
-
-    def tcp_in(self, rest: str) -> Url:
-        return TcpUrl(self.address(self.no_path(rest)), True)
 
     def serial(self, rest: str, hardware_flow_control: bool = False) -> Url:
         if not rest.startswith('/'):
@@ -260,9 +246,6 @@ class _Parser:
         if not colon:
             return SerialUrl(rest, MAVROS_BAUD, hardware_flow_control)
         return SerialUrl(device, self.baud(baud), hardware_flow_control)
-
-    def serial_hwfc(self, rest: str) -> Url:
-        return self.serial(rest, True)
 
     def device(self, text: str) -> Url:
         """
@@ -301,19 +284,17 @@ class _Parser:
         return rest
 
 
-def _is_ip(host: str, version: int) -> bool:
+def _ip_version(host: str) -> int:
+    """Return 4 or 6, 0 for what is not an IP address."""
     try:
-        return ipaddress.ip_address(host).version == version
+        return ipaddress.ip_address(host).version
     except ValueError:
-        return False
+        return 0
 
 
 def _means_any(host: str) -> bool:
     """Return whether a host means all interfaces."""
-    try:
-        return not host or ipaddress.ip_address(host).is_unspecified
-    except ValueError:
-        return False
+    return not host or _ip_version(host) > 0 and ipaddress.ip_address(host).is_unspecified
 
 
 _Reader = Callable[[_Parser, str], Url]
@@ -322,26 +303,28 @@ _WITH_SLASHES: dict[str, _Reader] = {
     'udp': _Parser.udp,
     'udp-b': lambda parser, rest: parser.udp_broadcast(rest, 'until_peer'),
     'udp-pb': lambda parser, rest: parser.udp_broadcast(rest, 'always'),
-    'udpin': _Parser.udp_in,
-    'udpout': _Parser.udp_out,
+    'udpin': lambda parser, rest: UdpUrl(parser.address(rest)),
+    'udpout': lambda parser, rest: UdpUrl(ANY, parser.remote(rest)),
     'tcp': _Parser.tcp,
-    'tcp-l': _Parser.tcp_listen,
-    'tcpout': _Parser.tcp_out,
-    'tcpin': _Parser.tcp_in,
+    'tcp-l': lambda parser, rest: TcpUrl(
+        parser.address(rest, default_port=MAVROS_TCP_PORT), listen=True),
+    'tcpout': lambda parser, rest: TcpUrl(parser.remote(rest)),
+    'tcpin': lambda parser, rest: TcpUrl(parser.address(rest), listen=True),
     'serial': _Parser.serial,
-    'serial-hwfc': _Parser.serial_hwfc,
-    'serial_flowcontrol': _Parser.serial_hwfc,
+    'serial-hwfc': lambda parser, rest: parser.serial(rest, True),
+    'serial_flowcontrol': lambda parser, rest: parser.serial(rest, True),
     'pty': _Parser.pty,
     'memory': _Parser.memory,
 }
 
 _WITHOUT_SLASHES: dict[str, _Reader] = {
-    'udpin': _Parser.udp_in,
-    'udp': _Parser.udp_in,
-    'udpout': _Parser.udp_out,
-    'udpbcast': _Parser.udp_bcast,
-    'tcp': _Parser.tcp_out,
-    'tcpin': _Parser.tcp_in,
+    'udpin': _WITH_SLASHES['udpin'],
+    'udp': _WITH_SLASHES['udpin'],
+    'udpout': _WITH_SLASHES['udpout'],
+    'udpbcast': lambda parser, rest: UdpUrl(
+        ANY, parser.address(rest, default_host=None), 'always'),
+    'tcp': _WITH_SLASHES['tcpout'],
+    'tcpin': _WITH_SLASHES['tcpin'],
 }
 
 # Other schemes of pymavlink, which would be taken for a host name before a port.

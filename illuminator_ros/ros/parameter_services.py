@@ -26,16 +26,9 @@ from array import array
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
+from rcl_interfaces import srv
 from rcl_interfaces.msg import ListParametersResult, ParameterValue, SetParametersResult
 from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
 from rclpy.exceptions import ParameterNotDeclaredException, ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -88,12 +81,18 @@ class ParameterServices:
         def serve(type_: type[ServiceType[Q, A]], name: str, take: Take[Q, A]) -> None:
             node.create_service(type_, f'~/{name}', DeferredService(take), qos_profile=qos)
 
-        serve(DescribeParameters, 'describe_parameters', self._describe)
-        serve(GetParameters, 'get_parameters', self._get)
-        serve(GetParameterTypes, 'get_parameter_types', self._types)
-        serve(ListParameters, 'list_parameters', self._list)
-        serve(SetParameters, 'set_parameters', self._set)
-        serve(SetParametersAtomically, 'set_parameters_atomically', self._set_atomically)
+        each = self._each
+        serve(srv.DescribeParameters, 'describe_parameters', lambda request, respond: respond(
+            srv.DescribeParameters.Response(
+                descriptors=each(request.names, node.describe_parameter))))
+        serve(srv.GetParameters, 'get_parameters', lambda request, respond: respond(
+            srv.GetParameters.Response(values=each(request.names, self._value))))
+        serve(srv.GetParameterTypes, 'get_parameter_types', lambda request, respond: respond(
+            srv.GetParameterTypes.Response(
+                types=each(request.names, lambda name: self._value(name).type))))
+        serve(srv.ListParameters, 'list_parameters', self._list)
+        serve(srv.SetParameters, 'set_parameters', self._set)
+        serve(srv.SetParametersAtomically, 'set_parameters_atomically', self._set_atomically)
 
     def _is_short(self, names: Sequence[object]) -> bool:
         if len(names) <= MAX_NAMES:
@@ -104,23 +103,6 @@ class ParameterServices:
 
     # In the executor's thread. Where a name is unknown or the list too long, the answer is an
     # empty list, as that of rclpy and rclcpp; tools take it for "not set".
-
-    def _describe(
-        self, request: DescribeParameters.Request, respond: Respond[DescribeParameters.Response],
-    ) -> None:
-        respond(DescribeParameters.Response(
-            descriptors=self._each(request.names, self._node.describe_parameter)))
-
-    def _get(
-        self, request: GetParameters.Request, respond: Respond[GetParameters.Response],
-    ) -> None:
-        respond(GetParameters.Response(values=self._each(request.names, self._value)))
-
-    def _types(
-        self, request: GetParameterTypes.Request, respond: Respond[GetParameterTypes.Response],
-    ) -> None:
-        respond(GetParameterTypes.Response(
-            types=self._each(request.names, lambda name: self._value(name).type)))
 
     def _each(self, names: list[str], look_up: Callable[[str], T]) -> list[T]:
         try:
@@ -135,7 +117,7 @@ class ParameterServices:
             return ParameterValue()
 
     def _list(
-        self, request: ListParameters.Request, respond: Respond[ListParameters.Response],
+        self, request: srv.ListParameters.Request, respond: Respond[srv.ListParameters.Response],
     ) -> None:
         """Leave out what is not set, so that the output of ``ros2 param dump`` can be loaded."""
         result = ListParametersResult()
@@ -145,27 +127,25 @@ class ParameterServices:
             except (TypeError, ValueError) as error:
                 self._log.warning(f'list_parameters: {error}', 'list_parameters')
             result.names = [name for name in result.names if self._value(name).type]
-        respond(ListParameters.Response(result=result))
+        respond(srv.ListParameters.Response(result=result))
 
     def _set(
-        self, request: SetParameters.Request, respond: Respond[SetParameters.Response],
+        self, request: srv.SetParameters.Request, respond: Respond[srv.SetParameters.Response],
     ) -> None:
         messages = list(request.parameters) if self._is_short(request.parameters) else []
 
         def answer(reasons: list[str]) -> None:
-            respond(SetParameters.Response(results=[_result(reason) for reason in reasons]))
+            respond(srv.SetParameters.Response(results=[_result(reason) for reason in reasons]))
 
-        def start(now: float, done: Callable[[list[str]], None]) -> None:
-            self._set_each(messages, now, done)
-
-        self._calls.ask(start, answer, lambda reason: answer([reason] * len(messages)))
+        self._calls.ask(lambda now, done: self._set_each(messages, now, done), answer,
+                        lambda reason: answer([reason] * len(messages)))
 
     def _set_atomically(
-        self, request: SetParametersAtomically.Request,
-        respond: Respond[SetParametersAtomically.Response],
+        self, request: srv.SetParametersAtomically.Request,
+        respond: Respond[srv.SetParametersAtomically.Response],
     ) -> None:
         def answer(reason: str) -> None:
-            respond(SetParametersAtomically.Response(result=_result(reason)))
+            respond(srv.SetParametersAtomically.Response(result=_result(reason)))
 
         messages = request.parameters
         if not self._is_short(messages):

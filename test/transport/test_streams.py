@@ -28,7 +28,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import heartbeat
-from illuminator_ros.mavlink.transport import ChannelLost, serial, tcp
+from illuminator_ros.mavlink.transport import base, ChannelLost, tcp
 from illuminator_ros.mavlink.transport.base import FrameQueue, MAX_QUEUED
 from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 import pytest
@@ -141,8 +141,7 @@ def test_all_bytes_go_both_ways_unchanged(stream: Stream) -> None:
 
 def test_read_that_fills_the_buffer_says_that_there_may_be_more(
         stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tcp, 'READ_SIZE', 4)
-    monkeypatch.setattr(serial, 'READ_SIZE', 4)
+    monkeypatch.setattr(base, 'READ_SIZE', 4)
     stream.write(b'123456')
     for piece, more in ((b'1234', True), (b'56', False)):
         assert (stream.ours.receive_bytes(len(piece)), stream.ours.channel.more) == (piece, more)
@@ -342,7 +341,6 @@ def test_bytes_that_a_line_does_not_take_do_not_delay_closing(
     # A pseudo-terminal closes at once; a UART under flow control waits for what is still to go.
     from serial import Serial
     steps: list[object] = []
-    ours = channel(f'serial://{device.path}:57600')
     genuine = Serial.close
     monkeypatch.setattr(termios, 'tcflush', lambda fd, queue: steps.append(queue))
 
@@ -351,5 +349,6 @@ def test_bytes_that_a_line_does_not_take_do_not_delay_closing(
         genuine(port)
 
     monkeypatch.setattr(Serial, 'close', close)
+    ours = channel(f'serial://{device.path}:57600')
     ours.channel.close()
     assert steps[:2] == [termios.TCOFLUSH, 'closed']

@@ -30,18 +30,10 @@ from rclpy.utilities import remove_ros_args
 from rich.console import Console
 from rich.live import Live
 
+from . import terminal
 from .graph import Graph
 from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
-from .terminal import (
-    ESCAPE_TIMEOUT,
-    Keyboard,
-    quiet_errors,
-    suspend,
-    suspended_by,
-    unbuffered,
-    while_it_lasts,
-)
 from .view import plain, screen, ViewState
 from ..entry_point import discard_output, one_line
 from ..options import number, Parser
@@ -133,7 +125,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
                    and not console.is_dumb_terminal and not options.once)
     try:
         if interactive:
-            with while_it_lasts():
+            with terminal.while_it_lasts():
                 _watch(monitor, console, termination, ascii_only=options.ascii)
             return 0
         return _print_once(monitor, options, termination)
@@ -148,7 +140,7 @@ def _watch(
 ) -> None:
     """Show the lights until the end is requested."""
     bindings = KeyBindings(monitor.graph)
-    keyboard = Keyboard(sys.stdin.fileno())
+    keyboard = terminal.Keyboard(sys.stdin.fileno())
     decoder = KeyDecoder()
     stopped = threading.Event()
     ascii_only = ascii_only or console.options.ascii_only
@@ -163,7 +155,8 @@ def _watch(
 
     while not bindings.quit:
         stopped.clear()
-        with (quiet_errors(), unbuffered(sys.stdin.fileno()) as restore, suspended_by(stop),
+        with (terminal.quiet_errors(), terminal.unbuffered(sys.stdin.fileno()) as restore,
+              terminal.suspended_by(stop),
               Live(console=console, screen=True, auto_refresh=False) as live):
             termination.calls(end, last=restore)
             while not (bindings.quit or bindings.stop or stopped.is_set()):
@@ -172,11 +165,11 @@ def _watch(
                 view = ViewState(lights, bindings.selected, monitor.clock(), bindings.show_help,
                                  ascii_only=ascii_only)
                 live.update(screen(view, console.width, console.height), refresh=True)
-                data = keyboard.read(ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
+                data = keyboard.read(terminal.ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
                 for key in decoder.feed(data):
                     bindings.press(key, lights, monitor.clock())
         if not bindings.quit:
-            suspend(job=bindings.stop)
+            terminal.suspend(job=bindings.stop)
             bindings.stop = False
     keyboard.close()
 

@@ -23,35 +23,25 @@ from ..events import LightSnapshot
 from ..model import ErrorFlag, flag_names, KNOWN_FLAGS
 from ...mavlink.command import format_seconds
 from ...mavlink.messages import Address
-from ...ros.diagnostics import (
-    ERROR,
-    Finding,
-    link_findings,
-    link_report,
-    LinkSnapshot,
-    Report,
-    Value,
-    WARN,
-    why_nothing_is_heard,
-)
+from ...ros import diagnostics
 
 # s without a status from a light that has sent some; one is requested every 2.5 s.
 STATUS_SILENCE = 10.0
 
 # The consequence of each flag for the user of the light.
 FLAG_LEVELS: dict[ErrorFlag, tuple[bytes, str]] = {
-    ErrorFlag.THERMAL_THROTTLING: (WARN, 'dimmed because it is hot'),
-    ErrorFlag.OVER_TEMPERATURE_SHUTDOWN: (ERROR, 'switched off because it is too hot'),
-    ErrorFlag.THERMISTOR_FAILURE: (WARN, 'temperature sensor failed'),
+    ErrorFlag.THERMAL_THROTTLING: (diagnostics.WARN, 'dimmed because it is hot'),
+    ErrorFlag.OVER_TEMPERATURE_SHUTDOWN: (diagnostics.ERROR, 'switched off because it is too hot'),
+    ErrorFlag.THERMISTOR_FAILURE: (diagnostics.WARN, 'temperature sensor failed'),
 }
 
 
-def flag_findings(flags: int) -> dict[int, Finding]:
+def flag_findings(flags: int) -> dict[int, diagnostics.Finding]:
     """Return the finding on each error flag; the unknown ones share one."""
-    found: dict[int, Finding] = {
+    found: dict[int, diagnostics.Finding] = {
         flag: finding for flag, finding in FLAG_LEVELS.items() if flags & flag}
     if unknown := flags & ~KNOWN_FLAGS:
-        found[~KNOWN_FLAGS] = (WARN, flag_names(unknown)[0])
+        found[~KNOWN_FLAGS] = (diagnostics.WARN, flag_names(unknown)[0])
     return found
 
 
@@ -69,19 +59,20 @@ class LightsHeard:
     limit_reached: bool
 
 
-def why_no_light(link: LinkSnapshot, heard: LightsHeard) -> str:
+def why_no_light(link: diagnostics.LinkSnapshot, heard: LightsHeard) -> str:
     """Return why the node has no light, for people."""
     if link.state.failure:
         return link.state.failure
     if heard.some:
         return f'{", ".join(map(str, heard.some))} heard, none of which is the target'
-    return f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "an illuminator")}'
+    return (f'none heard yet on {link.state.name}: '
+            + diagnostics.why_nothing_is_heard(link, 'an illuminator'))
 
 
 def reports(
-    link: LinkSnapshot, *, light: LightSnapshot | None, heard: LightsHeard, hardware_id: str,
-    started: float,
-) -> list[Report]:
+    link: diagnostics.LinkSnapshot, *, light: LightSnapshot | None, heard: LightsHeard,
+    hardware_id: str, started: float,
+) -> list[diagnostics.Report]:
     """
     Return the reports of a node.
 
@@ -90,51 +81,51 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     """
     address = light.address if light else None
-    findings = link_findings(
+    findings = diagnostics.link_findings(
         link, address, what='light', absence=why_no_light(link, heard), started=started)
     if heard.limit_reached:
-        findings.append((WARN, f'more than {heard.count} lights, some ignored'))
-    made = [link_report(link, address, findings, {'lights': heard.count})]
+        findings.append((diagnostics.WARN, f'more than {heard.count} lights, some ignored'))
+    made = [diagnostics.link_report(link, address, findings, {'lights': heard.count})]
     if light is not None and hardware_id:
         made.append(lamp_report(light, hardware_id, link.taken_at))
     return made
 
 
-def lamp_findings(light: LightSnapshot, now: float) -> list[Finding]:
+def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]:
     """Return the findings on a light."""
     if not light.connected:
-        return [(ERROR, light.unreachable)]
-    findings: list[Finding] = []
+        return [(diagnostics.ERROR, light.unreachable)]
+    findings: list[diagnostics.Finding] = []
     status = light.status
     if status is not None:
         findings += flag_findings(status.error_flags).values()
         silence = now - light.status_at
         if silence > max(STATUS_SILENCE, 3 * light.status_interval):
-            findings.append((WARN, f'no status for {format_seconds(silence)}'))
+            findings.append((diagnostics.WARN, f'no status for {format_seconds(silence)}'))
         if status.invalid:
-            findings.append((WARN, f'implausible: {", ".join(status.invalid)}'))
+            findings.append((diagnostics.WARN, f'implausible: {", ".join(status.invalid)}'))
     if light.shared_address:
-        findings.append((WARN, f'several lights answer as {light.address}: their statuses '
-                               'contradict one another'))
+        findings.append((diagnostics.WARN, f'several lights answer as {light.address}: their '
+                                           'statuses contradict one another'))
     if light.limit_exceeded.impossible:
-        findings.append((ERROR, light.limit_exceeded.impossible))
-    findings += [(WARN, text) for text in light.limit_exceeded.excess]
+        findings.append((diagnostics.ERROR, light.limit_exceeded.impossible))
+    findings += [(diagnostics.WARN, text) for text in light.limit_exceeded.excess]
     if light.discrepancy:
-        findings.append((WARN, light.discrepancy))
+        findings.append((diagnostics.WARN, light.discrepancy))
     return findings
 
 
-def lamp_report(light: LightSnapshot, hardware_id: str, now: float) -> Report:
+def lamp_report(light: LightSnapshot, hardware_id: str, now: float) -> diagnostics.Report:
     """Return the report on a light."""
     on = light.status.enabled if light.status else None
     fine = {True: 'on', False: 'off', None: 'connected'}[on]
-    return Report('lamp', hardware_id, lamp_findings(light, now), fine,
+    return diagnostics.Report('lamp', hardware_id, lamp_findings(light, now), fine,
                   lambda: _lamp_values(light, now))
 
 
-def _lamp_values(light: LightSnapshot, now: float) -> dict[str, Value]:
+def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Value]:
     status, identity = light.status, light.identity
-    values: dict[str, Value] = {
+    values: dict[str, diagnostics.Value] = {
         'address': str(light.address),
         'connected': light.connected,
         'heard_s_ago': now - light.heard_at if math.isfinite(light.heard_at) else None,

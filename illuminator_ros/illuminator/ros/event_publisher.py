@@ -25,35 +25,7 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 from .flag_log import FlagLog
-from ..events import (
-    AnyLightEvent,
-    AutomaticSwitch,
-    Cause,
-    ChangedByOther,
-    ConfigurationChanged,
-    ConfigurationRestored,
-    LightConnected,
-    LightHeld,
-    LightIdentified,
-    LightLost,
-    LightRestarted,
-    LightSwitched,
-    LimitExceeded,
-    Origin,
-    SetpointClipped,
-    SetpointFailed,
-    StatusReceived,
-    WishFailed,
-)
-from ..model import (
-    Configuration,
-    Limits,
-    MAX_STROBE_PERIOD,
-    Mode,
-    SafetyLimits,
-    shortest,
-    Status,
-)
+from .. import events, model
 from ..sources import DEFAULT
 from ...payload.arbitration import Cause as HolderCause
 from ...ros.cdr import temperature
@@ -63,7 +35,7 @@ from ...ros.parameters import DeviceParameters
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
-STATUS_TOPICS: dict[str, tuple[Any, Callable[[Status], object]]] = {
+STATUS_TOPICS: dict[str, tuple[Any, Callable[[model.Status], object]]] = {
     'enabled': (Bool, lambda status: status.enabled),
     'brightness': (Float32, lambda status: status.brightness),
     'mode': (String, lambda status: status.mode.label),
@@ -96,7 +68,7 @@ class EventPublisher:
 
     def __init__(
         self, node: Node, interface: NodeInterface, parameters: DeviceParameters, log: NodeLog, *,
-        limits: SafetyLimits, frame_id: str, check_diagnostics: Callable[[], None],
+        limits: model.SafetyLimits, frame_id: str, check_diagnostics: Callable[[], None],
     ) -> None:
         self._clock = node.get_clock()
         self._interface = interface
@@ -107,39 +79,39 @@ class EventPublisher:
         self._identity: object = None
         self._max_brightness = limits.max_brightness
         # The last switch, and the source of setpoints as a part of its topics.
-        self._last_switch: LightSwitched | None = None
+        self._last_switch: events.LightSwitched | None = None
         self._source = ''
-        self._limits = Limits()
+        self._limits = model.Limits()
         self._condition: tuple[object, ...] = ()
         self._shared = False
         self._flags = FlagLog()
         # Events have no common content.
         self._handlers: dict[type, Callable[[Any], None]] = {
-            StatusReceived: self._status_received,
-            LightConnected: self._connected,
-            LightLost: self._lost,
-            LightRestarted: self._restarted,
-            LightIdentified: self._identified,
-            LightSwitched: self._switched,
-            ConfigurationChanged: self._configuration_changed,
-            ConfigurationRestored: self._configuration_restored,
-            SetpointFailed: self._setpoint_failed,
-            SetpointClipped: self._setpoint_clipped,
-            LimitExceeded: self._limit_exceeded,
-            AutomaticSwitch: self._automatic_switch,
-            ChangedByOther: self._changed_by_other,
-            LightHeld: self._held,
-            WishFailed: self._wish_failed,
+            events.StatusReceived: self._status_received,
+            events.LightConnected: self._connected,
+            events.LightLost: self._lost,
+            events.LightRestarted: self._restarted,
+            events.LightIdentified: self._identified,
+            events.LightSwitched: self._switched,
+            events.ConfigurationChanged: self._configuration_changed,
+            events.ConfigurationRestored: self._configuration_restored,
+            events.SetpointFailed: self._setpoint_failed,
+            events.SetpointClipped: self._setpoint_clipped,
+            events.LimitExceeded: self._limit_exceeded,
+            events.AutomaticSwitch: self._automatic_switch,
+            events.ChangedByOther: self._changed_by_other,
+            events.LightHeld: self._held,
+            events.WishFailed: self._wish_failed,
         }
         interface.publish('connected', False)
 
-    def take(self, event: AnyLightEvent) -> None:
+    def take(self, event: events.AnyLightEvent) -> None:
         """Publish an event."""
         handler = self._handlers.get(type(event))
         if handler is not None:
             handler(event)
 
-    def _status_received(self, event: StatusReceived) -> None:
+    def _status_received(self, event: events.StatusReceived) -> None:
         status = event.status
         publish = self._interface.publish
         for name, (_, read) in STATUS_TOPICS.items():
@@ -154,7 +126,7 @@ class EventPublisher:
             self._condition = condition
             self._condition_changed(event)
 
-    def _condition_changed(self, event: StatusReceived) -> None:
+    def _condition_changed(self, event: events.StatusReceived) -> None:
         if event.shared_address and not self._shared:
             self._log.warning(f'several lights answer as {event.address}: parameters stay as '
                               'they are', 'shared')
@@ -167,24 +139,24 @@ class EventPublisher:
                             'flags')
         self._check_diagnostics()
 
-    def _connected(self, event: LightConnected) -> None:
+    def _connected(self, event: events.LightConnected) -> None:
         self._log.info(f'light {event.address} connected', 'connection')
         self._interface.publish('connected', True)
         self._check_diagnostics()
 
-    def _lost(self, event: LightLost) -> None:
+    def _lost(self, event: events.LightLost) -> None:
         self._log.warning(f'light {event.address} lost: {event.reason}', 'connection')
         self._interface.publish('connected', False)
         self._check_diagnostics()
 
-    def _restarted(self, event: LightRestarted) -> None:
+    def _restarted(self, event: events.LightRestarted) -> None:
         self._last_switch = None
         self._log.info(f'light {event.address} has restarted', 'restart')
         if event.was_on and event.is_on is False:
             self._log.warning(f'light {event.address} was on before it restarted, and is off now',
                               'restart off')
 
-    def _identified(self, event: LightIdentified) -> None:
+    def _identified(self, event: events.LightIdentified) -> None:
         identity = event.identity
         if identity != self._identity:
             self._identity = identity
@@ -194,16 +166,16 @@ class EventPublisher:
             self._log.info(f'light {event.address} is {known or "nameless"}{serial}', 'identity')
             self._check_diagnostics()
 
-    def _switched(self, event: LightSwitched) -> None:
+    def _switched(self, event: events.LightSwitched) -> None:
         # Programs repeat a message to keep a light on, or to hold it.
         is_repeated = event == self._last_switch and event.detail.endswith('topic')
         self._last_switch = event
         if event.left_out is not None and not is_repeated:
-            way = event.detail if event.origin is Origin.REQUEST else event.origin.value
+            way = event.detail if event.origin is events.Origin.REQUEST else event.origin.value
             self._log.info(f'light {event.address} was switched {"on" if event.on else "off"} by '
                            f'{way or "a request"}{_left_out(event.left_out)}', 'switched')
 
-    def _held(self, event: LightHeld) -> None:
+    def _held(self, event: events.LightHeld) -> None:
         change = event.change
         reason = _REASONS[change.cause] if change.before else ''
         self._log.info(f'light {event.address} is held by {change.after or "no source"}'
@@ -212,11 +184,11 @@ class EventPublisher:
         self._interface.publish('source', change.after or '')
         self._check_diagnostics()
 
-    def _wish_failed(self, event: WishFailed) -> None:
+    def _wish_failed(self, event: events.WishFailed) -> None:
         self._log.warning(f'light {event.address} is not as {event.source} has asked for before: '
                           f'{event.message}', 'wish')
 
-    def _automatic_switch(self, event: AutomaticSwitch) -> None:
+    def _automatic_switch(self, event: events.AutomaticSwitch) -> None:
         on = 'on' if event.on else 'off'
         if event.failure:
             self._log.error(f'light {event.address} is not confirmed to be {on}, which is '
@@ -225,7 +197,7 @@ class EventPublisher:
             self._log.warning(f'light {event.address} is switched {on} by {event.reason}',
                               'automatic')
 
-    def _changed_by_other(self, event: ChangedByOther) -> None:
+    def _changed_by_other(self, event: events.ChangedByOther) -> None:
         if not event.undone:
             self._log.error(
                 f'light {event.address}: another sender insists on {event.change}, which stays '
@@ -235,9 +207,9 @@ class EventPublisher:
                 f'light {event.address} was changed by another sender, which is undone: '
                 f'{event.change}{_left_out(event.left_out)}', 'changed')
 
-    def _configuration_changed(self, event: ConfigurationChanged) -> None:
+    def _configuration_changed(self, event: events.ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names
-        if event.cause is Cause.LIGHT and event.left_out is not None:
+        if event.cause is events.Cause.LIGHT and event.left_out is not None:
             self._log.info(f'light {event.address} was changed: '
                            f'{configuration.describe(names)}{_left_out(event.left_out)}',
                            'changed')
@@ -254,7 +226,7 @@ class EventPublisher:
             self._fit_brightness(0.0)
         self._check_diagnostics()
 
-    def _configuration_restored(self, event: ConfigurationRestored) -> None:
+    def _configuration_restored(self, event: events.ConfigurationRestored) -> None:
         if event.success:
             self._log.info(f'light {event.address} configured: {event.message}', 'configured')
         else:
@@ -262,14 +234,14 @@ class EventPublisher:
                             'not configured')
         self._check_diagnostics()
 
-    def _setpoint_failed(self, event: SetpointFailed) -> None:
+    def _setpoint_failed(self, event: events.SetpointFailed) -> None:
         self._log.warning(f'~/{self._source}cmd/brightness: {event.message}', 'setpoint')
 
-    def _setpoint_clipped(self, event: SetpointClipped) -> None:
+    def _setpoint_clipped(self, event: events.SetpointClipped) -> None:
         self._log.warning(f'~/{self._source}cmd/brightness: {event.message}: the limit is sent'
                           f'{_left_out(event.left_out)}', 'clipped')
 
-    def _limit_exceeded(self, event: LimitExceeded) -> None:
+    def _limit_exceeded(self, event: events.LimitExceeded) -> None:
         if event.impossible:
             self._log.error(f'light {event.address}: {event.impossible}', 'impossible limit')
         if event.excess:
@@ -288,14 +260,14 @@ class EventPublisher:
 
         :param period: a value that must fit too, s: some lights report more than they allow.
         """
-        longest = shortest(self._limits.max_strobe_period) if self._limits.known else 0.0
+        longest = model.shortest(self._limits.max_strobe_period) if self._limits.known else 0.0
         self._parameters.set_high(
-            'strobe_period', max(longest if longest > 0 else MAX_STROBE_PERIOD, period))
+            'strobe_period', max(longest if longest > 0 else model.MAX_STROBE_PERIOD, period))
 
 
-def _value(configuration: Configuration, name: str) -> object:
+def _value(configuration: model.Configuration, name: str) -> object:
     value = getattr(configuration, name)
-    return value.label if isinstance(value, Mode) else value
+    return value.label if isinstance(value, model.Mode) else value
 
 
 def _left_out(changes: int) -> str:

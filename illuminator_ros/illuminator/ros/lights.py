@@ -25,23 +25,10 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
+from . import parameters
 from .light_node import LightNode
-from .parameters import (
-    BeamGeometry,
-    DEVICE_PARAMETERS,
-    ignored_parameters,
-    LIGHT_PARAMETERS,
-    Selection,
-    settings,
-)
+from .. import events
 from ..client import IlluminatorClient
-from ..events import (
-    AnyLightEvent,
-    LightConnected,
-    LightForgotten,
-    LightRestarted,
-    StatusReceived,
-)
 from ..group import enable_all
 from ..light import Light
 from ...mavlink.command import CommandSender
@@ -69,8 +56,8 @@ class Lights(ServedPayload):
     def __init__(self, client: IlluminatorClient, host: Host) -> None:
         self._client = client
         self._host = host
-        self._selection = Selection(host.values, host.node.get_name())
-        self._geometry = BeamGeometry.of(host.values)
+        self._selection = parameters.Selection(host.values, host.node.get_name())
+        self._geometry = parameters.BeamGeometry.of(host.values)
         self._switching = LatestOnly(self._switch_all)
         self._first = LightNode(
             host.node, host, host.log, client, self._geometry,
@@ -85,16 +72,16 @@ class Lights(ServedPayload):
         host.diagnostics.add(self._first.source)
         client.events.subscribe(self._take)
 
-    def _take(self, event: AnyLightEvent) -> None:
+    def _take(self, event: events.AnyLightEvent) -> None:
         node = self._nodes.get(event.address)
-        if isinstance(event, LightForgotten):
+        if isinstance(event, events.LightForgotten):
             self._forget(event.address)
         elif node is not None:
-            if isinstance(event, LightRestarted):
+            if isinstance(event, events.LightRestarted):
                 # Its sequence numbers have restarted, which is not a loss.
                 self._host.link.reset_loss(event.address)
             node.take(event)
-        elif isinstance(event, LightConnected | StatusReceived):
+        elif isinstance(event, events.LightConnected | events.StatusReceived):
             self._serve(event.address)
 
     def _serve(self, address: Address) -> None:
@@ -122,7 +109,7 @@ class Lights(ServedPayload):
         log = NodeLog(node.get_logger())
         geometry = self._geometry.declare(node)
         light_node = LightNode(node, self._host, log, self._client, geometry)
-        for warning in (*ignored_parameters(node, self._host.node), *misspelt(node)):
+        for warning in (*parameters.ignored_parameters(node, self._host.node), *misspelt(node)):
             log.warning(warning)
         self._host.log.info(f'light {address} is served by {light_node.full_name}', 'served')
         self._host.link.call(lambda now: self._bind(light_node, address, now))
@@ -213,12 +200,13 @@ class Lights(ServedPayload):
 
 
 def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:
-    return IlluminatorClient(
-        commands, settings(values), wanted=Selection(values, 'illuminator').is_served)
+    selection = parameters.Selection(values, 'illuminator')
+    return IlluminatorClient(commands, parameters.settings(values), wanted=selection.is_served)
 
 
 ILLUMINATOR = RosPayload(
-    'illuminator', _make_client, Lights, LIGHT_PARAMETERS, DEVICE_PARAMETERS,
+    'illuminator', _make_client, Lights, parameters.LIGHT_PARAMETERS,
+    parameters.DEVICE_PARAMETERS,
     summary='a MAVLink illuminator (searchlight, torch, strobe)', examples=(
         'ros2 service call /illuminator/enable std_srvs/srv/SetBool "{data: true}"',
         'ros2 param set /illuminator brightness 60'),

@@ -12,14 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The contract of an open transport."""
+"""The contract of an open transport, and the parts that transports share."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Hashable, Iterator, Sequence
+import contextlib
+import os
 import selectors
+import socket
+
+from ..url import HostPort
 
 # The origin of received bytes, to which an answer can be sent.
 Peer = Hashable
@@ -27,6 +32,8 @@ Peer = Hashable
 # Bytes that wait for a slow line. Whole frames beyond that are dropped, the oldest first: a
 # command that has waited longer than its time-out has been sent again.
 MAX_QUEUED = 16 * 1024
+# Bytes read from a stream before other work gets its turn.
+READ_SIZE = 16 * 1024
 
 
 class ChannelLost(OSError):
@@ -124,3 +131,102 @@ class FrameQueue:
         self._begun = count < len(frame)
         if self._begun:
             self._frames.appendleft(frame[count:])
+
+
+class Stream:
+    """
+    A connected socket or a serial port that does not block, with its queue of frames.
+
+    :ivar more: see :class:`Channel`.
+    """
+
+    def __init__(self, file: socket.socket | int) -> None:
+        self.file = file
+        self.more = False
+        self._descriptor = file if isinstance(file, int) else file.fileno()
+        self._queue = FrameQueue()
+
+    def receive(self) -> bytes | None:
+        """Return available bytes, None if there are none yet, b'' at the end."""
+        try:
+            data = os.read(self._descriptor, READ_SIZE)
+        except BlockingIOError:
+            return None
+        self.more = len(data) == READ_SIZE
+        return data
+
+    def send(self, frames: Sequence[bytes], selector: selectors.BaseSelector) -> int:
+        """Queue and write; return how many frames were dropped."""
+        dropped = sum(map(self._queue.put, frames))
+        with contextlib.suppress(BlockingIOError):
+            while self._queue:
+                self._queue.written(os.write(self._descriptor, self._queue.head()))
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
+        if selector.get_key(self.file).events != events:
+            selector.modify(self.file, events)
+        return dropped
+
+
+class StreamChannel(Channel):
+    """
+    A stream to one peer.
+
+    :param at_end: why the channel is lost when the stream ends.
+    """
+
+    def __init__(self, name: str, stream: Stream, at_end: str) -> None:
+        self.name = name
+        self._stream = stream
+        self._at_end = at_end
+
+    def register(self, selector: selectors.BaseSelector) -> None:
+        """See :meth:`Channel.register`."""
+        self._selector = selector
+        selector.register(self._stream.file, selectors.EVENT_READ)
+
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
+        """See :meth:`Channel.receive`."""
+        try:
+            data = self._stream.receive()
+        except OSError as error:
+            raise ChannelLost(error.errno, error.strerror) from None
+        if data == b'':
+            raise ChannelLost(self._at_end)
+        if data:
+            self.more = self._stream.more
+            yield None, data
+
+    def peers(self, now: float) -> Sequence[Peer]:
+        """See :meth:`Channel.peers`."""
+        return (None,)
+
+    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
+        """See :meth:`Channel.send`."""
+        try:
+            self.dropped += self._stream.send(frames, self._selector)
+        except OSError as error:
+            raise ChannelLost(error.errno, error.strerror) from None
+
+    def writable(self, handle: object) -> None:
+        """See :meth:`Channel.writable`."""
+        self.send((), ())
+
+
+# A family, and an address as sockets of that family have it.
+SocketAddress = tuple[int, tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]]
+
+
+def resolve(address: HostPort, kind: socket.SocketKind) -> list[SocketAddress]:
+    """
+    Return families and socket addresses; IPv4 first, since most MAVLink programs know only that.
+
+    :param address: an empty host means all IPv4 interfaces.
+    :raises OSError: if the name cannot be resolved.
+    """
+    try:
+        found = socket.getaddrinfo(address.host or '0.0.0.0', address.port, type=kind)
+    except (socket.gaierror, UnicodeError) as error:
+        reason = getattr(error, 'strerror', None) or 'not a host name'
+        raise OSError(f'cannot resolve {address.host!r}: {reason}') from None
+    found.sort(key=lambda entry: entry[0] != socket.AF_INET)
+    return [(family, sockaddr) for family, _, _, _, sockaddr in found]

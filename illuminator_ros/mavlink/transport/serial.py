@@ -16,23 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 import errno
 import fcntl
 import functools
 import os
 from pathlib import Path
-import selectors
 import struct
 import termios
 import tty
 
-from .base import Channel, ChannelLost, FrameQueue, Peer
+from .base import Channel, Peer, Stream, StreamChannel
 from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
-# Size of the kernel's receive buffer.
-READ_SIZE = 4095
 # Bytes in a pseudo-terminal that no program has read; a serial line would have lost them.
 MAX_UNREAD = 2048
 
@@ -113,53 +110,20 @@ def _discard_unread(near: int) -> None:
         termios.tcflush(near, termios.TCIFLUSH)
 
 
-class _LineChannel(Channel):
+class _LineChannel(StreamChannel):
 
     def __init__(
         self, fd: int, name: str, close: Callable[[], None],
         before_sending: Callable[[], None] = lambda: None,
     ) -> None:
-        self.name = name
+        super().__init__(name, Stream(fd), 'the device has gone')
         self._fd = fd
         self._close = close
         self._before_sending = before_sending
-        self._queue = FrameQueue()
-
-    def register(self, selector: selectors.BaseSelector) -> None:
-        self._selector = selector
-        selector.register(self._fd, selectors.EVENT_READ)
-
-    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
-        try:
-            data = os.read(self._fd, READ_SIZE)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
-        if not data:
-            raise ChannelLost('the device has gone')
-        self.more = len(data) == READ_SIZE
-        yield None, data
-
-    def peers(self, now: float) -> Sequence[Peer]:
-        return (None,)
 
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         self._before_sending()
-        self.dropped += sum(self._queue.put(frame) for frame in frames)
-        self.writable(self._fd)
-
-    def writable(self, handle: object) -> None:
-        try:
-            while self._queue:
-                self._queue.written(os.write(self._fd, self._queue.head()))
-        except BlockingIOError:
-            pass
-        except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
-        if self._selector.get_key(self._fd).events != events:
-            self._selector.modify(self._fd, events)
+        super().send(frames, peers)
 
     def close(self) -> None:
         # Closing would otherwise wait up to 30 s for bytes that flow control holds back.

@@ -17,15 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-import contextlib
+from dataclasses import dataclass
 import errno
 import math
 import selectors
 import socket
-from typing import Any
 
-from .base import Channel, ChannelLost, FrameQueue, MAX_QUEUED, Peer
-from .resolve import resolve
+from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, Stream, StreamChannel
 from ..url import HostPort
 
 # s for all addresses of a name together; the link must return within 1 s of the other side.
@@ -38,98 +36,34 @@ MAX_CLIENTS = 16
 EXPIRY = 10.0
 # Our process or the system lacks descriptors or memory for another connection.
 NO_ROOM = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
-# Bytes read before other work gets its turn.
-READ_SIZE = 16 * 1024
 
 
-class _Stream:
-    """One connected, non-blocking socket with its queue of frames."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self.socket = connection
-        self.queue = FrameQueue()
-        connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        # The kernel would queue megabytes: minutes of commands that have timed out.
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        # Detect a vanished peer in seconds, not in hours.
-        for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
-                              ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
-            if hasattr(socket, option):
-                connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
-
-    def receive(self) -> bytes | None:
-        """Return available bytes, None if there are none yet, b'' at the end."""
-        try:
-            return self.socket.recv(READ_SIZE)
-        except BlockingIOError:
-            return None
-
-    def send(self, frames: Sequence[bytes]) -> int:
-        """Queue and write; return how many frames were dropped."""
-        dropped = sum(self.queue.put(frame) for frame in frames)
-        self.flush()
-        return dropped
-
-    def flush(self) -> None:
-        with contextlib.suppress(BlockingIOError):
-            while self.queue:
-                self.queue.written(self.socket.send(self.queue.head()))
-
-    def watch(self, selector: selectors.BaseSelector) -> None:
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self.queue else 0)
-        if selector.get_key(self.socket).events != events:
-            selector.modify(self.socket, events)
+def _stream(connection: socket.socket) -> Stream:
+    """Return the stream of a connected socket."""
+    connection.setblocking(False)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    # The kernel would queue megabytes: minutes of commands that have timed out.
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    # Detect a vanished peer in seconds, not in hours.
+    for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
+                          ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
+        if hasattr(socket, option):
+            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+    return Stream(connection)
 
 
-class TcpClient(Channel):
+class TcpClient(StreamChannel):
     """A connection to a server."""
 
     def __init__(self, address: HostPort) -> None:
-        self._stream = _Stream(_connect(address))
-        self.name = f'tcp to {address}'
-
-    def register(self, selector: selectors.BaseSelector) -> None:
-        """See :meth:`Channel.register`."""
-        self._selector = selector
-        selector.register(self._stream.socket, selectors.EVENT_READ)
-
-    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
-        """See :meth:`Channel.receive`."""
-        try:
-            data = self._stream.receive()
-        except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
-        if data == b'':
-            raise ChannelLost('the other side closed the connection')
-        if data:
-            self.more = len(data) == READ_SIZE
-            yield None, data
-
-    def peers(self, now: float) -> Sequence[Peer]:
-        """See :meth:`Channel.peers`."""
-        return (None,)
-
-    def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
-        """See :meth:`Channel.send`."""
-        try:
-            self.dropped += self._stream.send(frames)
-        except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
-        self._stream.watch(self._selector)
-
-    def writable(self, handle: object) -> None:
-        """See :meth:`Channel.writable`."""
-        try:
-            self._stream.flush()
-        except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
-        self._stream.watch(self._selector)
+        self._connection = _connect(address)
+        super().__init__(f'tcp to {address}', _stream(self._connection),
+                         'the other side closed the connection')
 
     def close(self) -> None:
         """See :meth:`Channel.close`."""
-        self._stream.socket.close()
+        self._connection.close()
 
 
 def _connect(address: HostPort) -> socket.socket:
@@ -153,6 +87,15 @@ def _connect(address: HostPort) -> socket.socket:
     raise reason
 
 
+@dataclass
+class _Client:
+    """:param heard_at: time of the last valid frame, s."""
+
+    connection: socket.socket
+    stream: Stream
+    heard_at: float = -math.inf
+
+
 class TcpServer(Channel):
     """
     A listening socket and its clients, each a peer. The link survives the loss of a client.
@@ -172,9 +115,7 @@ class TcpServer(Channel):
         except OSError as error:
             self._listener.close()
             raise OSError(error.errno, f'cannot listen on {address}: {error.strerror}') from None
-        self._clients: dict[socket.socket, _Stream] = {}
-        # Time of the last valid frame, s.
-        self._heard: dict[socket.socket, float] = {}
+        self._clients: dict[Peer, _Client] = {}
         self._now = -math.inf
         self.name = f'tcp server {HostPort(*self._listener.getsockname()[:2])}'
 
@@ -183,23 +124,20 @@ class TcpServer(Channel):
         self._selector = selector
         selector.register(self._listener, selectors.EVENT_READ)
 
-    def receive(self, handle: Any) -> Iterator[tuple[Peer, bytes]]:
+    def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         if handle is self._listener:
             self._accept()
-            return
-        stream = self._clients.get(handle)
-        if stream is None:
-            return
-        try:
-            data = stream.receive()
-        except OSError:
-            data = b''
-        if data == b'':
-            self._drop(handle)
-        elif data:
-            self.more = len(data) == READ_SIZE
-            yield handle, data
+        elif client := self._clients.get(handle):
+            try:
+                data = client.stream.receive()
+            except OSError:
+                data = b''
+            if data == b'':
+                self._drop(client)
+            elif data:
+                self.more = client.stream.more
+                yield handle, data
 
     def _accept(self) -> None:
         try:
@@ -210,31 +148,31 @@ class TcpServer(Channel):
             # The client has gone, or the fault is the connection's and not the listener's.
             return
         if len(self._clients) >= MAX_CLIENTS:
-            silent = min(self._clients, key=lambda c: self._heard.get(c, -math.inf))
-            if self._now - self._heard.get(silent, -math.inf) <= EXPIRY:
+            silent = min(self._clients.values(), key=lambda client: client.heard_at)
+            if self._now - silent.heard_at <= EXPIRY:
                 connection.close()
                 return
             self._drop(silent)
         try:
-            self._clients[connection] = _Stream(connection)
+            self._clients[connection] = _Client(connection, _stream(connection))
         except OSError:
             connection.close()
-            return
-        self._selector.register(connection, selectors.EVENT_READ)
+        else:
+            self._selector.register(connection, selectors.EVENT_READ)
 
-    def _drop(self, connection: socket.socket) -> None:
-        self._heard.pop(connection, None)
-        if self._clients.pop(connection, None):
-            self._selector.unregister(connection)
-            connection.close()
+    def _drop(self, client: _Client) -> None:
+        del self._clients[client.connection]
+        self._selector.unregister(client.connection)
+        client.connection.close()
 
-    def heard(self, peer: object, now: float) -> bool:
+    def heard(self, peer: Peer, now: float) -> bool:
         """See :meth:`Channel.heard`."""
         self._now = now
-        new = peer in self._clients and peer not in self._heard
-        if peer in self._clients:
-            self._heard[peer] = now
-        return new
+        client = self._clients.get(peer)
+        if client is None:
+            return False
+        before, client.heard_at = client.heard_at, now
+        return before == -math.inf
 
     def peers(self, now: float) -> Sequence[Peer]:
         """See :meth:`Channel.peers`."""
@@ -244,27 +182,19 @@ class TcpServer(Channel):
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
         for peer in peers:
-            self._write(peer, frames)
+            if client := self._clients.get(peer):
+                try:
+                    self.dropped += client.stream.send(frames, self._selector)
+                except OSError:
+                    self._drop(client)
 
     def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""
-        self._write(handle, ())
-
-    def _write(self, peer: Any, frames: Sequence[bytes]) -> None:
-        stream = self._clients.get(peer)
-        if stream is None:
-            return
-        try:
-            self.dropped += stream.send(frames)
-        except OSError:
-            self._drop(peer)
-        else:
-            stream.watch(self._selector)
+        self.send((), (handle,))
 
     def close(self) -> None:
         """See :meth:`Channel.close`."""
-        for client in list(self._clients):
-            client.close()
+        for client in self._clients.values():
+            client.connection.close()
         self._clients.clear()
-        self._heard.clear()
         self._listener.close()

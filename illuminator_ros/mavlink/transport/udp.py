@@ -24,8 +24,7 @@ import selectors
 import socket
 from typing import Any
 
-from .base import Channel, ChannelLost, Peer
-from .resolve import resolve
+from .base import Channel, ChannelLost, Peer, resolve
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
