@@ -79,6 +79,14 @@ class ErrorFlags(IntFlag):
     NO_MANAGER = 512
 
 
+def flag_names(flags: IntFlag) -> list[str]:
+    """Return readable names of the flags that are set; unknown ones as one hexadecimal number."""
+    known = [flag for flag in type(flags) if flag & flags]
+    names = [str(flag.name).lower().replace('_', ' ') for flag in known]
+    unknown = int(flags) & ~sum(known)
+    return [*names, f'unknown flags 0x{unknown:x}'] if unknown else names
+
+
 @mav.define(280, 'GIMBAL_MANAGER_INFORMATION')
 @dataclass(slots=True)
 class GimbalManagerInformation(mav.Message):

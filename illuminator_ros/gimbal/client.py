@@ -1,0 +1,218 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Finds gimbals by the managers that announce them, and keeps each of them up to date."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import math
+
+from .events import GimbalEvent, GimbalForgotten, GimbalFound, GimbalKey
+from .gimbal import Gimbal, GimbalSettings, Repetition
+from .messages import (
+    GimbalDeviceInformation,
+    GimbalManagerInformation,
+    GimbalManagerSetAttitude,
+    GimbalManagerStatus,
+    MAV_TYPE_GIMBAL,
+    NON_MAVLINK_IDS,
+)
+from ..mavlink.command import Command, CommandSender
+from ..mavlink.component import Payload
+from ..mavlink.deadline_queue import DeadlineQueue
+from ..mavlink.messages import Address, Heartbeat, MAV_AUTOPILOT_INVALID, MavCmd, Message
+from ..payload.events import Listeners
+from ..payload.vehicle import GimbalDeviceAttitudeStatus
+
+# Gimbals; one more is ignored, so that memory is bounded.
+MAX_GIMBALS = 32
+# Components that may be managers. One more takes the place of one that was silent for long.
+MAX_COMPONENTS = 256
+# s of silence after which a component or a gimbal that was never commanded is forgotten.
+FORGET_AFTER = 60.0
+# s of silence after which a component that is heard again may have restarted.
+RETURN_AFTER = 5.0
+# s between requests to different components, so that a slow line is not filled.
+REQUEST_SPACING = 0.25
+# s by which a component that is less likely to manage a gimbal is asked later.
+UNLIKELY_DELAY = 1.0
+
+
+@dataclass
+class _Component:
+    heard_at: float
+    query: Repetition = field(default_factory=Repetition)
+
+
+class GimbalClient(Payload):
+    """
+    Finds gimbals on a link by GIMBAL_MANAGER_INFORMATION.
+
+    It is requested from each component that is heard, less and less often where it does not come:
+    the capability bits of managers are optional.
+
+    :param commands: the command sender of the component that carries this payload.
+    :ivar events: the events of all gimbals.
+    :ivar gimbals: in the order in which they were found.
+    :ivar limit_reached: whether there are more than :data:`MAX_GIMBALS`.
+    """
+
+    messages = (Heartbeat, GimbalManagerInformation, GimbalManagerStatus, GimbalDeviceInformation,
+                GimbalDeviceAttitudeStatus)
+    sends = (GimbalManagerSetAttitude,)
+
+    def __init__(self, commands: CommandSender, settings: GimbalSettings) -> None:
+        self.events: Listeners[GimbalEvent] = Listeners()
+        self.limit_reached = False
+        self._gimbals: dict[GimbalKey, Gimbal] = {}
+        self.gimbals: Mapping[GimbalKey, Gimbal] = self._gimbals
+        self._commands = commands
+        self._settings = settings
+        self._components: dict[Address, _Component] = {}
+        self._queries: DeadlineQueue[Address] = DeadlineQueue()
+        self._next_query = -math.inf
+
+    # Link
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
+        for gimbal in self._gimbals.values():
+            gimbal.link_closed(now, reason)
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        """See :meth:`Payload.receive`."""
+        if isinstance(message, GimbalDeviceAttitudeStatus):
+            if gimbal := self._sender(source, message.gimbal_device_id):
+                gimbal.take_attitude(message, now)
+        elif isinstance(message, Heartbeat):
+            self._hear(source, message, now)
+            for gimbal in self._gimbals.values():
+                gimbal.heard(source, now, message.autopilot)
+        elif isinstance(message, GimbalManagerStatus):
+            if gimbal := self._managed(source, message.gimbal_device_id):
+                gimbal.take_status(source, message, now)
+                if gimbal.is_managed_by(source) and not gimbal.has_information_of(source):
+                    self._reopen(source, now)
+        elif isinstance(message, GimbalManagerInformation):
+            if gimbal := self._managed(source, message.gimbal_device_id):
+                gimbal.take_information(source, message, now)
+                if gimbal.has_information_of(source):
+                    self._component(source, now).query.finish()
+                    self._queries.set(source, math.inf)
+        elif (isinstance(message, GimbalDeviceInformation)
+                and (gimbal := self._sender(source, message.gimbal_device_id))):
+            gimbal.take_device_information(message)
+
+    # Gimbals
+
+    def _managed(self, manager: Address, device_id: int) -> Gimbal | None:
+        """Return the gimbal that a manager announces, None if there are too many."""
+        if not device_id:
+            # PX4 announces 0 until it has found its device.
+            return None
+        key = (GimbalKey(manager, device_id) if device_id in NON_MAVLINK_IDS else
+               GimbalKey(Address(manager.system, device_id)))
+        gimbal = self._gimbals.get(key)
+        if gimbal is None:
+            if len(self._gimbals) >= MAX_GIMBALS:
+                self.limit_reached = True
+                return None
+            gimbal = self._gimbals[key] = Gimbal(
+                key, self._commands, self._settings, self.events.emit)
+            self.events.emit(GimbalFound(key))
+        return gimbal
+
+    def _sender(self, source: Address, number: int) -> Gimbal | None:
+        """
+        Return the gimbal that has sent a message of a device.
+
+        Implementations that are older than the field send 0 for each device.
+        """
+        found = self._gimbals.get(GimbalKey(source, number))
+        if found is None and not number:
+            own = [one for key, one in self._gimbals.items() if key.address == source]
+            found = own[0] if len(own) == 1 else None
+        return found
+
+    # Discovery
+
+    def _component(self, address: Address, now: float) -> _Component:
+        component = self._components.get(address)
+        if component is None:
+            component = self._components[address] = _Component(now)
+        return component
+
+    def _hear(self, source: Address, heartbeat: Heartbeat, now: float) -> None:
+        if component := self._components.get(source):
+            if now >= component.heard_at + RETURN_AFTER:
+                component.query = Repetition()
+                self._queries.set(source, now)
+            component.heard_at = now
+            return
+        if len(self._components) >= MAX_COMPONENTS and not self._forget_component(now):
+            return
+        likely = (heartbeat.autopilot != MAV_AUTOPILOT_INVALID
+                  or heartbeat.type == MAV_TYPE_GIMBAL)
+        self._component(source, now)
+        self._queries.set(source, now if likely else now + UNLIKELY_DELAY)
+
+    def _forget_component(self, now: float) -> bool:
+        address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
+        if now < component.heard_at + FORGET_AFTER:
+            return False
+        del self._components[address]
+        self._queries.remove(address)
+        return True
+
+    def _reopen(self, manager: Address, now: float) -> None:
+        """Request the information of a manager, which has sent a status without it."""
+        component = self._component(manager, now)
+        if component.query.due == math.inf:
+            component.query = Repetition()
+        if component.query.due == -math.inf:
+            self._queries.set(manager, now)
+
+    def _request_information(self, now: float) -> None:
+        due = self._queries.due(now)
+        if not due or now < self._next_query:
+            return
+        address = due[0]
+        component = self._components[address]
+        component.query.take(now)
+        self._queries.set(address, component.query.due)
+        self._next_query = now + REQUEST_SPACING
+        if now < component.heard_at + FORGET_AFTER:
+            self._commands.start(Command(
+                address, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)), now,
+                lambda result, now: None)
+
+    # Time
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        self._request_information(now)
+        for key, gimbal in list(self._gimbals.items()):
+            if not gimbal.was_commanded and now >= gimbal.silent_since + FORGET_AFTER:
+                del self._gimbals[key]
+                self.limit_reached = False
+                self.events.emit(GimbalForgotten(key))
+            elif now >= gimbal.next_deadline():
+                gimbal.poll(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return min((max(self._next_query, self._queries.next_deadline()),
+                    *(gimbal.next_deadline() for gimbal in self._gimbals.values())))

@@ -1,0 +1,200 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The events of gimbals, and snapshots of gimbals for other threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .commands import Control
+from .messages import Capabilities, ErrorFlags, GimbalDeviceInformation, GimbalManagerInformation
+from ..mavlink.messages import Address
+from ..payload.identity import text
+from ..payload.mount import MountAttitude, MountFlags
+
+
+class GimbalKey(NamedTuple):
+    """
+    A gimbal device.
+
+    :param address: of the component that sends its attitude: itself, or its manager.
+    :param number: 1..6 of a device that is not a component of its own, else 0.
+    """
+
+    address: Address
+    number: int = 0
+
+    @property
+    def device_id(self) -> int:
+        """Return the gimbal device id that messages to its manager carry."""
+        return self.number or self.address.component
+
+    def __str__(self) -> str:
+        return f'{self.number} of {self.address}' if self.number else str(self.address)
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """The smallest and largest roll, pitch and yaw, rad, positive as in MAVLink."""
+
+    roll: tuple[float, float]
+    pitch: tuple[float, float]
+    yaw: tuple[float, float]
+
+    @classmethod
+    def of(cls, message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:
+        """Return those of a message."""
+        return cls((message.roll_min, message.roll_max), (message.pitch_min, message.pitch_max),
+                   (message.yaw_min, message.yaw_max))
+
+
+@dataclass(frozen=True)
+class DeviceIdentity:
+    """A GIMBAL_DEVICE_INFORMATION; a text that the device leaves empty is ''."""
+
+    vendor: str
+    model: str
+    custom_name: str
+    firmware_version: str
+    hardware_version: str
+    uid: int
+
+    @classmethod
+    def of(cls, message: GimbalDeviceInformation) -> DeviceIdentity:
+        """Read a message."""
+        return cls(text(message.vendor_name), text(message.model_name), text(message.custom_name),
+                   _version(message.firmware_version), _version(message.hardware_version),
+                   message.uid)
+
+
+def _version(number: int) -> str:
+    """Return a version as major.minor.patch, '' for none."""
+    return '.'.join(str(number >> shift & 0xFF) for shift in (0, 8, 16)) if number else ''
+
+
+@dataclass(frozen=True)
+class GimbalEvent:
+    """An event of a gimbal."""
+
+    key: GimbalKey
+
+
+@dataclass(frozen=True)
+class GimbalFound(GimbalEvent):
+    """A manager has announced the gimbal."""
+
+
+@dataclass(frozen=True)
+class GimbalForgotten(GimbalEvent):
+    """A gimbal that stayed silent was dropped, so that another one can take its place."""
+
+
+@dataclass(frozen=True)
+class GimbalConnected(GimbalEvent):
+    """Manager and device are heard, for the first time or again."""
+
+    manager: Address
+
+
+@dataclass(frozen=True)
+class GimbalLost(GimbalEvent):
+    """Manager or device is not heard any more."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class AttitudeReceived(GimbalEvent):
+    """
+    The device has sent GIMBAL_DEVICE_ATTITUDE_STATUS.
+
+    :param attitude: None if the status has none.
+    """
+
+    attitude: MountAttitude | None
+    flags: MountFlags
+    errors: ErrorFlags
+
+
+@dataclass(frozen=True)
+class ControlChanged(GimbalEvent):
+    """
+    Other components control the gimbal.
+
+    :param before: None where that was not known, and ``after``.
+    :param ours: whether we have primary control.
+    :param was_lost: whether we had primary control and have not released it.
+    """
+
+    before: Control | None
+    after: Control | None
+    ours: bool
+    was_lost: bool
+
+
+@dataclass(frozen=True)
+class SecondManager(GimbalEvent):
+    """Another manager announces the gimbal, although only one may be active."""
+
+    manager: Address
+    other: Address
+
+
+@dataclass(frozen=True)
+class ManagerChanged(GimbalEvent):
+    """The gimbal is controlled through another manager, since the one before is lost."""
+
+    before: Address
+    after: Address
+
+
+@dataclass(frozen=True)
+class AutomaticTakeFailed(GimbalEvent):
+    """Control was not obtained automatically."""
+
+    message: str
+
+
+@dataclass(frozen=True)
+class GimbalSnapshot:
+    """
+    A gimbal at one moment, for any thread.
+
+    :param unreachable: why it is not connected, for people; '' if it is.
+    :param managers: those that announce it and are heard; the first one is used.
+    :param capabilities: None if the manager has not told them.
+    :param attitude_at: when the last attitude status came, s; -inf if none has.
+    :param attitude_problem: why that has no attitude, '' if it has one.
+    :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
+    :param enforces_control: False if the manager is known to obey everyone.
+    """
+
+    key: GimbalKey
+    unreachable: str
+    managers: tuple[Address, ...]
+    capabilities: Capabilities | None
+    ranges: Ranges | None
+    identity: DeviceIdentity | None
+    attitude: MountAttitude | None
+    attitude_at: float
+    attitude_problem: str
+    flags: MountFlags
+    errors: ErrorFlags
+    control: Control | None
+    in_control: bool
+    status_at: float
+    enforces_control: bool
+    setpoints_sent: int

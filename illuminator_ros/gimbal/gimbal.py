@@ -1,0 +1,623 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One gimbal: its managers and its device, control of it, requests and setpoints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+import math
+
+from .commands import Configure, Control, SetFlags, setpoint_flags
+from .events import (
+    AttitudeReceived,
+    AutomaticTakeFailed,
+    ControlChanged,
+    DeviceIdentity,
+    GimbalConnected,
+    GimbalEvent,
+    GimbalKey,
+    GimbalLost,
+    GimbalSnapshot,
+    ManagerChanged,
+    Ranges,
+    SecondManager,
+)
+from .messages import (
+    Capabilities,
+    ErrorFlags,
+    GimbalCommand,
+    GimbalDeviceInformation,
+    GimbalManagerInformation,
+    GimbalManagerSetAttitude,
+    GimbalManagerStatus,
+)
+from ..mavlink.command import Command, CommandResult, CommandSender, format_seconds, Position
+from ..mavlink.messages import Address, MAV_AUTOPILOT_ARDUPILOTMEGA, MavCmd
+from ..payload import request
+from ..payload.mount import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.rotation import flu_frd, Quaternion, Vector
+from ..payload.vehicle import GimbalDeviceAttitudeStatus
+
+# s of silence after which a manager or a device is lost.
+SILENCE_LIMIT = 3.0
+# s for a request, confirmation included.
+REQUEST_LIMIT = 5.0
+# s after which an attitude is sent again, since the message is not acknowledged.
+REPEATS = (0.2, 0.4, 0.8)
+# Managers of one gimbal; more are ignored.
+MAX_MANAGERS = 4
+MAV_FRAME_GLOBAL = 0
+_STILL = (0.0, 0.0, 0.0)
+
+
+@dataclass
+class _Manager:
+    """One manager of the gimbal; times are s."""
+
+    target: request.Target
+    requests: request.RequestQueue[GimbalManagerStatus]
+    heard_at: float = -math.inf
+    autopilot: int | None = None
+    information: GimbalManagerInformation | None = None
+    control: Control | None = None
+    status_at: float = -math.inf
+
+    def is_heard(self, now: float) -> bool:
+        return now < self.heard_at + SILENCE_LIMIT
+
+
+@dataclass
+class Repetition:
+    """Requests a message until it has come, less and less often; times are s."""
+
+    due: float = -math.inf
+    _interval: float = 1.0
+
+    def take(self, now: float) -> bool:
+        """Return whether the message must be requested now."""
+        if now < self.due:
+            return False
+        self.due = now + self._interval
+        self._interval = min(2 * self._interval, 60.0)
+        return True
+
+    def finish(self) -> None:
+        """Request nothing more: the message has come."""
+        self.due = math.inf
+
+
+@dataclass(frozen=True)
+class GimbalSettings:
+    """
+    How gimbals are treated.
+
+    :param setpoint_timeout: s after the last rate until a rate of zero is sent.
+    :param attitude_interval: s between attitudes of the device; 0 for its own.
+    :param auto_take_control: whether control is taken once a gimbal is connected that no
+        component controls.
+    """
+
+    setpoint_timeout: float = 0.5
+    attitude_interval: float = 0.0
+    auto_take_control: bool = False
+
+
+@dataclass
+class _Setpoint:
+    """The last setpoint, and when it is sent again or ends, s."""
+
+    message: GimbalManagerSetAttitude
+    attitude: tuple[Quaternion, YawFrame] | None = None
+    repeats: list[float] = field(default_factory=list)
+    zero_at: float = math.inf
+
+
+class Gimbal:
+    """
+    One gimbal device, as a component that may control it sees it; for the link's thread.
+
+    Its first manager that is heard is used. Every change needs primary control, as
+    GIMBAL_MANAGER_STATUS shows it.
+
+    :param emit: takes its events.
+    :ivar was_commanded: whether a user has ever sent it a request or a setpoint.
+    :ivar in_control: whether we have primary control, and its manager is heard.
+    """
+
+    def __init__(
+        self, key: GimbalKey, commands: CommandSender, settings: GimbalSettings,
+        emit: Callable[[GimbalEvent], None],
+    ) -> None:
+        self.key = key
+        self.was_commanded = False
+        self.in_control = False
+        self._commands = commands
+        self._settings = settings
+        self._emit = emit
+        self._managers: dict[Address, _Manager] = {}
+        self._manager = Address(0, 0)
+        self._others: set[Address] = set()
+        self._announced_at = self._device_heard_at = -math.inf
+        self._manager_heard = self._connected = False
+        self._control: Control | None = None
+        self._may_take = settings.auto_take_control
+        self._releasing = False
+        self._identity: DeviceIdentity | None = None
+        self._device_ranges: Ranges | None = None
+        self._identity_query = Repetition()
+        self._interval_query = Repetition(
+            -math.inf if settings.attitude_interval else math.inf)
+        self._attitude: MountAttitude | None = None
+        self._attitude_at = -math.inf
+        self._problem = ''
+        self._flags = MountFlags(0)
+        self._errors = ErrorFlags(0)
+        self._setpoint: _Setpoint | None = None
+        self._setpoints_sent = 0
+        self._link_problem = ''
+
+    # Liveness
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """Note that nothing can be sent any more, and why."""
+        self._link_problem = reason
+        for manager in self._managers.values():
+            manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
+        self._check(now)
+
+    @property
+    def silent_since(self) -> float:
+        """Return when a manager last announced it, or its device was heard, s."""
+        return max(self._announced_at, self._device_heard_at)
+
+    def heard(self, address: Address, now: float, autopilot: int) -> None:
+        """Note the heartbeat of a component, which may be the device or one of its managers."""
+        manager = self._managers.get(address)
+        is_device = address == self.key.address and not self.key.number
+        if manager is not None:
+            manager.heard_at, manager.autopilot = now, autopilot
+        if is_device:
+            self._device_heard_at = now
+        if manager is not None or is_device:
+            self._check(now)
+
+    def is_managed_by(self, address: Address) -> bool:
+        """Return whether a manager announces the gimbal."""
+        return address in self._managers
+
+    def unreachable(self, now: float) -> str:
+        """Return why the gimbal is not connected, for people; '' if it is."""
+        manager = self._managers.get(self._manager)
+        if manager is None or not manager.is_heard(now):
+            return self._link_problem or _silence(
+                f'manager {self._manager}', manager.heard_at if manager else -math.inf, now)
+        if now >= self._device_heard_at + SILENCE_LIMIT:
+            return _silence(f'device {self.key}', self._device_heard_at, now)
+        return ''
+
+    def _check(self, now: float) -> None:
+        """Choose the manager, and report changes of connection and control."""
+        self._choose(now)
+        manager = self._active
+        self._manager_heard = manager is not None and manager.is_heard(now)
+        reason = self.unreachable(now)
+        if self._connected is bool(reason):
+            self._connected = not reason
+            if reason:
+                self._emit(GimbalLost(self.key, reason))
+            else:
+                self._link_problem = ''
+                self._may_take = self._settings.auto_take_control
+                self._identity_query = Repetition()
+                if self._settings.attitude_interval:
+                    self._interval_query = Repetition()
+                self._emit(GimbalConnected(self.key, self._manager))
+        control = manager.control if manager and self._manager_heard else None
+        if control != self._control:
+            before, self._control = self._control, control
+            self._control_changed(before, control)
+
+    def _control_changed(self, before: Control | None, after: Control | None) -> None:
+        had, us = self.in_control, self._commands.address
+        self.in_control = after is not None and after.primary == us
+        if after is None:
+            # The zero that ends a rate is still sent when the manager is heard again.
+            if self._setpoint is not None:
+                self._setpoint.repeats.clear()
+        elif not self.in_control:
+            self._stop()
+        self._emit(ControlChanged(
+            self.key, before, after, self.in_control,
+            was_lost=had and after is not None and not self.in_control and not self._releasing))
+
+    def _choose(self, now: float) -> None:
+        heard = [address for address, one in self._managers.items() if one.is_heard(now)]
+        if not heard:
+            return
+        if self._manager not in heard:
+            before, self._manager = self._manager, heard[0]
+            if before in self._managers:
+                self._managers[before].requests.cancel('the manager was lost', now)
+                self._emit(ManagerChanged(self.key, before, self._manager))
+        others = set(heard) - {self._manager}
+        for other in others - self._others:
+            self._emit(SecondManager(self.key, self._manager, other))
+        self._others = others
+
+    # Messages
+
+    def _manager_at(self, address: Address, now: float) -> _Manager | None:
+        manager = self._managers.get(address)
+        if manager is None and len(self._managers) < MAX_MANAGERS:
+            target = request.Target(
+                address, self._commands, lambda result, now: None, kind='gimbal manager',
+                status_id=GimbalManagerStatus.id, status_name='GIMBAL_MANAGER_STATUS')
+            manager = self._managers[address] = _Manager(target, request.RequestQueue(target))
+        self._announced_at = now
+        if manager is not None:
+            manager.heard_at = now
+        return manager
+
+    def take_information(
+        self, source: Address, message: GimbalManagerInformation, now: float,
+    ) -> None:
+        """Take GIMBAL_MANAGER_INFORMATION of the gimbal."""
+        if manager := self._manager_at(source, now):
+            manager.information = message
+            self._check(now)
+
+    def has_information_of(self, manager: Address) -> bool:
+        """Return whether a manager has sent its GIMBAL_MANAGER_INFORMATION."""
+        return manager in self._managers and self._managers[manager].information is not None
+
+    def take_status(self, source: Address, status: GimbalManagerStatus, now: float) -> None:
+        """Take GIMBAL_MANAGER_STATUS of the gimbal."""
+        manager = self._manager_at(source, now)
+        if manager is None:
+            return
+        manager.status_at, manager.control = now, Control.of(status)
+        self._check(now)
+        manager.requests.take(request.Report(status, sent_by=now, has_clock=False), now)
+
+    def take_device_information(self, message: GimbalDeviceInformation) -> None:
+        """Take GIMBAL_DEVICE_INFORMATION of the device."""
+        self._identity = DeviceIdentity.of(message)
+        self._device_ranges = Ranges.of(message)
+        self._identity_query.finish()
+
+    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
+        self._device_heard_at = self._attitude_at = now
+        self._flags, self._errors = MountFlags(status.flags), ErrorFlags(status.failure_flags)
+        try:
+            self._attitude, self._problem = MountAttitude.from_status(status), ''
+        except ValueError as error:
+            self._attitude, self._problem = None, str(error)
+        self._check(now)
+        self._emit(AttitudeReceived(self.key, self._attitude, self._flags, self._errors))
+
+    # Control
+
+    @property
+    def _active(self) -> _Manager | None:
+        return self._managers.get(self._manager)
+
+    def obstacle(self, now: float) -> str:
+        """Return why the gimbal cannot be commanded now, for people; '' if it can."""
+        if not self._manager_heard:
+            return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
+        if self._control is None:
+            return f'manager {self._manager} has sent no GIMBAL_MANAGER_STATUS'
+        return '' if self.in_control else f'no control of gimbal {self.key}: {self._control}'
+
+    @property
+    def enforces_control(self) -> bool:
+        """Whether the manager is not known to obey components without control."""
+        manager = self._active
+        return manager is None or manager.autopilot != MAV_AUTOPILOT_ARDUPILOTMEGA
+
+    def take_control(self, now: float, done: request.Done) -> None:
+        """Take primary control; a success only if GIMBAL_MANAGER_STATUS shows it."""
+        self.was_commanded = True
+        self._take_control(now, done)
+
+    def _take_control(self, now: float, done: request.Done) -> None:
+        def ended(result: request.Result, now: float) -> None:
+            if result.success and not self.enforces_control:
+                result = replace(result, message=f'{result.message}; ArduPilot also obeys '
+                                 'components without control')
+            done(result, now)
+
+        self._configure(True, now, ended)
+
+    def release_control(self, now: float, done: request.Done) -> None:
+        """Release control; a success only if GIMBAL_MANAGER_STATUS shows it."""
+        def ended(result: request.Result, now: float) -> None:
+            self._releasing = False
+            done(result, now)
+
+        self.was_commanded = True
+        if self._setpoint is not None and self._setpoint.zero_at < math.inf:
+            self._send_rates(_STILL, now)
+        self._stop()
+        self._releasing = True
+        self._configure(False, now, ended)
+
+    def _configure(self, take: bool, now: float, done: request.Done) -> None:
+        def ended(result: request.Result, now: float) -> None:
+            if result.success and self._control is None:
+                result = request.Result(False, f'{result.message}; a manager without '
+                                        'GIMBAL_MANAGER_STATUS does not show who has control')
+            done(result, now)
+
+        manager = self._active
+        if manager is None or not self._manager_heard:
+            done(request.Result(False, self.obstacle(now)), now)
+        elif self._control is not None and self.in_control is take:
+            state = 'in control already' if take else 'not in control'
+            done(request.Result(True, f'{state}: {self._control}'), now)
+        else:
+            self._submit(manager, Configure(
+                self._commands.address, self.key.device_id, take), now, ended)
+
+    def _submit(
+        self, manager: _Manager, change: request.Change[GimbalManagerStatus], now: float,
+        done: request.Done,
+    ) -> None:
+        manager.requests.submit(request.Request(
+            manager.target, lambda now: change,
+            lambda result, change, status, now: done(result, now), now=now,
+            limit=now + REQUEST_LIMIT), now)
+
+    # Requests
+
+    def set_neutral(self, now: float, done: request.Done) -> None:
+        """Turn the gimbal to its neutral position."""
+        flags = setpoint_flags(YawFrame.VEHICLE) | MountFlags.NEUTRAL
+        self._set_flag(MountFlags.NEUTRAL, flags, Capabilities.HAS_NEUTRAL, 'neutral position',
+                       now, done)
+
+    def retract(self, now: float, done: request.Done) -> None:
+        """Turn the gimbal to its retracted position."""
+        flags = setpoint_flags(YawFrame.VEHICLE) | MountFlags.RETRACT
+        self._set_flag(MountFlags.RETRACT, flags, Capabilities.HAS_RETRACT, 'retracted', now,
+                       done)
+
+    def set_yaw_lock(self, lock: bool, now: float, done: request.Done) -> None:
+        """Hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
+        frame = YawFrame.EARTH if lock else YawFrame.VEHICLE
+        self._set_flag(
+            MountFlags.YAW_LOCK, setpoint_flags(frame),
+            Capabilities.HAS_YAW_LOCK if lock else Capabilities(0),
+            'yaw locked' if lock else 'yaw follows the vehicle', now, done)
+
+    def _set_flag(
+        self, flag: MountFlags, flags: MountFlags, needed: Capabilities, goal: str, now: float,
+        done: request.Done,
+    ) -> None:
+        self.was_commanded = True
+        missing = self._missing(needed)
+        reason = self.obstacle(now) or missing
+        manager = self._active
+        if reason or manager is None:
+            done(request.Result(False, reason), now)
+            return
+        self._stop()
+        self._submit(manager, SetFlags(flags, flag, self.key.device_id, goal), now, done)
+
+    def _capabilities(self) -> Capabilities | None:
+        manager = self._active
+        if manager is None or manager.information is None:
+            return None
+        return Capabilities(manager.information.cap_flags)
+
+    def _missing(self, *enough: Capabilities) -> str:
+        """Return that the gimbal has none of some capabilities, for people; '' if it has."""
+        known = self._capabilities()
+        if known is None or any(one in known for one in enough):
+            return ''
+        return (f'gimbal {self.key} does not have '
+                f'{" or ".join(str(one.name) for one in enough)}')
+
+    def set_roi(
+        self, latitude: float, longitude: float, altitude: float, now: float, done: request.Done,
+    ) -> None:
+        """
+        Point at a place.
+
+        :param latitude: deg, and longitude.
+        :param altitude: m above mean sea level.
+        """
+        self._command(Command(
+            self._manager, GimbalCommand.DO_SET_ROI_LOCATION, (float(self.key.device_id),),
+            position=Position(MAV_FRAME_GLOBAL, latitude, longitude, altitude)), now, done)
+
+    def clear_roi(self, now: float, done: request.Done) -> None:
+        """Stop pointing at a place."""
+        self._command(Command(
+            self._manager, GimbalCommand.DO_SET_ROI_NONE, (float(self.key.device_id),)), now,
+            done)
+
+    def _command(self, command: Command, now: float, done: request.Done) -> None:
+        def ended(result: CommandResult, now: float) -> None:
+            done(request.Result(result.accepted, str(result)), now)
+
+        self.was_commanded = True
+        if reason := self.obstacle(now):
+            done(request.Result(False, reason), now)
+        else:
+            self._stop()
+            self._commands.start(command, now, ended, limit=now + REQUEST_LIMIT)
+
+    # Setpoints
+
+    def set_attitude(self, rotation: Quaternion, frame: YawFrame, now: float) -> str:
+        """
+        Send an attitude.
+
+        :param rotation: with norm 1, from the FLU axes of the gimbal as in
+            :class:`~..payload.mount.MountAttitude`.
+        :return: why it was not sent, for people; '' if it was.
+        """
+        self.was_commanded = True
+        absolute = (Capabilities.HAS_YAW_LOCK, Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+        reason = self.obstacle(now) or (
+            self._missing(*absolute) if frame is YawFrame.EARTH else '')
+        if not reason:
+            message = self._message(setpoint_flags(frame), to_mavlink(rotation, frame),
+                                    (math.nan,) * 3)
+            self._setpoint = _Setpoint(
+                message, (rotation, frame), [now + delay for delay in REPEATS])
+            self._send(message)
+        return reason
+
+    def set_angles(self, angles: Vector, frame: YawFrame, now: float) -> str:
+        """
+        Send an attitude as roll, pitch and yaw in ROS, rad; NaN leaves an axis as it is.
+
+        An axis is left where the last attitude that was sent has it, else where it is.
+
+        :return: why it was not sent, for people; '' if it was.
+        """
+        if not any(map(math.isnan, angles)):
+            return self.set_attitude(Quaternion.from_euler(*angles), frame, now)
+        self.was_commanded = True
+        if reason := self.obstacle(now):
+            return reason
+        base = None
+        if self._setpoint and self._setpoint.attitude and self._setpoint.attitude[1] is frame:
+            base = self._setpoint.attitude[0]
+        elif self._attitude is not None:
+            base = self._attitude.seen_from(frame)
+        if base is None:
+            return (f'gimbal {self.key} has not reported its attitude with a yaw relative to the '
+                    f'{frame.value}, so no axis can be left as it is')
+        return self.set_attitude(Quaternion.from_euler(*(
+            old if math.isnan(new) else new
+            for new, old in zip(angles, base.euler(), strict=True))), frame, now)
+
+    def set_rates(self, rates: Vector, now: float) -> str:
+        """
+        Send rates of roll, pitch and yaw in ROS, rad/s; zero follows after the time-out.
+
+        :return: why they were not sent, for people; '' if they were.
+        """
+        self.was_commanded = True
+        reason = self.obstacle(now)
+        if not reason:
+            self._send_rates(rates, now)
+        return reason
+
+    def _send_rates(self, rates: Vector, now: float) -> None:
+        frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
+        message = self._message(setpoint_flags(frame), UNSET, flu_frd(rates))
+        self._setpoint = _Setpoint(message, zero_at=math.inf if rates == _STILL else
+                                   now + self._settings.setpoint_timeout)
+        self._send(message)
+
+    def _message(
+        self, flags: MountFlags, q: tuple[float, float, float, float], rates: Vector,
+    ) -> GimbalManagerSetAttitude:
+        return GimbalManagerSetAttitude(*self._manager, flags, self.key.device_id, q, *rates)
+
+    def _send(self, message: GimbalManagerSetAttitude) -> None:
+        self._setpoints_sent += 1
+        self._commands.send(message)
+
+    def _stop(self) -> None:
+        """Send no setpoint again."""
+        self._setpoint = None
+
+    # Time
+
+    def poll(self, now: float) -> None:
+        """Do everything that is due."""
+        self._check(now)
+        manager = self._active
+        if manager is None:
+            return
+        manager.requests.poll(now)
+        self._poll_setpoint(now)
+        if not self._connected:
+            return
+        if self._may_take and self._control is not None:
+            self._may_take = False
+            if self._control.primary is None:
+                self._take_control(now, self._taken_automatically)
+        device = self.key.address
+        if self._identity_query.take(now):
+            self._commands.start(Command(
+                device, MavCmd.REQUEST_MESSAGE, (float(GimbalDeviceInformation.id),)), now,
+                lambda result, now: None)
+        if self._interval_query.take(now):
+            self._commands.start(Command(
+                device, MavCmd.SET_MESSAGE_INTERVAL, (
+                    float(GimbalDeviceAttitudeStatus.id),
+                    self._settings.attitude_interval * 1e6)), now, self._interval_answered)
+
+    def _taken_automatically(self, result: request.Result, now: float) -> None:
+        if not result.success:
+            self._emit(AutomaticTakeFailed(self.key, result.message))
+
+    def _interval_answered(self, result: CommandResult, now: float) -> None:
+        if result.result is not None:
+            self._interval_query.finish()
+
+    def _poll_setpoint(self, now: float) -> None:
+        setpoint = self._setpoint
+        if setpoint is None or not self.in_control:
+            return
+        if now >= setpoint.zero_at:
+            self._send_rates(_STILL, now)
+        elif setpoint.repeats and now >= setpoint.repeats[0]:
+            del setpoint.repeats[0]
+            self._send(setpoint.message)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        manager = self._active
+        if manager is None:
+            return math.inf
+        deadlines = [manager.requests.next_deadline()]
+        if self._manager_heard:
+            deadlines.append(manager.heard_at + SILENCE_LIMIT)
+        if self._connected:
+            deadlines += (self._device_heard_at + SILENCE_LIMIT, self._identity_query.due,
+                          self._interval_query.due)
+            if self._may_take and self._control is not None:
+                return -math.inf
+        if self._setpoint is not None and self.in_control:
+            deadlines += self._setpoint.zero_at, *self._setpoint.repeats[:1]
+        return min(deadlines)
+
+    def snapshot(self, now: float) -> GimbalSnapshot:
+        """Return the gimbal at this moment."""
+        manager = self._active
+        information = manager.information if manager else None
+        return GimbalSnapshot(
+            self.key, self.unreachable(now), (self._manager, *sorted(self._others)),
+            self._capabilities(),
+            self._device_ranges or (Ranges.of(information) if information else None),
+            self._identity, self._attitude, self._attitude_at, self._problem, self._flags,
+            self._errors, self._control, self.in_control,
+            manager.status_at if manager else -math.inf, self.enforces_control,
+            self._setpoints_sent)
+
+
+def _silence(what: str, heard_at: float, now: float) -> str:
+    if heard_at == -math.inf:
+        return f'{what} has not been heard'
+    return f'nothing from {what} for {format_seconds(now - heard_at)}'

@@ -1,0 +1,224 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Discovery and liveness of gimbals and their managers."""
+
+from __future__ import annotations
+
+from illuminator_ros.gimbal import client as limits
+from illuminator_ros.gimbal.events import (
+    AttitudeReceived,
+    GimbalConnected,
+    GimbalForgotten,
+    GimbalFound,
+    GimbalKey,
+    GimbalLost,
+    ManagerChanged,
+    SecondManager,
+)
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, MavCmd, MavResult
+import pytest
+from support.gimbals import AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
+
+INFORMATION, DEVICE_INFORMATION = 280, 283
+
+
+def requests(rig: Rig, message_id: int = INFORMATION) -> list[tuple[float, Address]]:
+    """Return when a message was requested, and of which component."""
+    return [(at, Address(one.target_system, one.target_component)) for at, one in rig.sent
+            if isinstance(one, CommandLong) and one.command == MavCmd.REQUEST_MESSAGE
+            and one.param1 == message_id]
+
+
+def test_gm_27_gimbal_is_found_by_the_information_of_its_manager() -> None:
+    rig = Rig(FakeManager()).run(3.0)
+
+    assert rig.all_of(GimbalFound) == [GimbalFound(GimbalKey(DEVICE))]
+    assert rig.all_of(GimbalConnected) == [GimbalConnected(GimbalKey(DEVICE), AUTOPILOT)]
+    assert [target for _, target in requests(rig)].count(AUTOPILOT) == 1
+    snapshot = rig.gimbal.snapshot(rig.now)
+    assert (snapshot.unreachable, snapshot.managers) == ('', (AUTOPILOT,))
+    assert snapshot.identity is not None
+    assert (snapshot.identity.vendor, snapshot.identity.firmware_version,
+            snapshot.identity.uid) == ('Maker', '1.2.3', 77)
+
+
+@pytest.mark.parametrize(('managers', 'found'), [
+    # Two gimbals behind the autopilot, one of them without MAVLink.
+    ((FakeManager(), FakeManager(device_id=2)), [GimbalKey(DEVICE), GimbalKey(AUTOPILOT, 2)]),
+    # Two devices without MAVLink behind one manager.
+    ((FakeManager(device_id=1), FakeManager(device_id=6)),
+     [GimbalKey(AUTOPILOT, 1), GimbalKey(AUTOPILOT, 6)]),
+    # The same number behind two managers is two gimbals.
+    ((FakeManager(device_id=1), FakeManager(OTHER, 1)),
+     [GimbalKey(AUTOPILOT, 1), GimbalKey(OTHER, 1)]),
+    # A manager on the device itself, and another vehicle.
+    ((FakeManager(DEVICE), FakeManager(Address(2, 1))),
+     [GimbalKey(DEVICE), GimbalKey(Address(2, 154))])])
+def test_gm_25_gm_26_several_gimbals_behind_one_or_several_managers_are_told_apart(
+        managers: tuple[FakeManager, ...], found: list[GimbalKey]) -> None:
+    for number, manager in enumerate(managers):
+        manager.delta_yaw = number / 10
+    rig = Rig(*managers).run(6.0)
+
+    assert sorted(keys(rig)) == sorted(found)
+    assert {event.key for event in rig.all_of(GimbalConnected)} == set(found)
+    headings = {event.key: event.attitude.heading for event in rig.all_of(AttitudeReceived)
+                if event.attitude}
+    assert len(set(headings.values())) == len(managers)
+
+
+def test_attitude_of_an_older_device_without_an_id_is_that_of_the_only_gimbal() -> None:
+    rig = Rig(FakeManager(device_id=1, attitude_number=0)).run(3.0)
+
+    assert rig.all_of(GimbalConnected)
+    assert rig.all_of(AttitudeReceived)[0].key == GimbalKey(AUTOPILOT, 1)
+
+
+def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one() -> None:
+    manager = FakeManager(device_id=0, device_alive=False)
+    rig = Rig(manager).run(20.0)
+    assert keys(rig) == []
+    asked = len(requests(rig))
+
+    manager.device_id, manager.device_alive = 154, True
+    rig.run(1.0)
+
+    assert asked < 8
+    assert keys(rig) == [GimbalKey(DEVICE)]
+
+
+def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> None:
+    rig = Rig(FakeManager(announces=False)).run(30.0)
+
+    assert rig.all_of(GimbalConnected)
+    assert rig.gimbal.snapshot(rig.now).capabilities is None
+    # Less and less often.
+    assert 3 <= len(requests(rig)) <= 15
+
+
+@pytest.mark.parametrize('answer', [MavResult.UNSUPPORTED, None])
+def test_gm_27_hundred_components_are_asked_one_after_the_other(answer: int | None) -> None:
+    rig = Rig()
+    others = [Address(1, number) for number in range(30, 130)]
+    for _ in range(60):
+        for other in others:
+            rig.receive(other, heartbeat(18))
+        rig.run(1.0)
+
+    asked = requests(rig)
+    first: dict[Address, float] = {}
+    for at, target in asked:
+        first.setdefault(target, at)
+    assert set(first) == set(others)
+    # Four frames for each that stays silent.
+    busiest = max(sum(at <= other < at + 10 for other, _ in asked) for at, _ in asked)
+    assert busiest <= 10 / limits.REQUEST_SPACING * 4 + 4
+    starts = sorted(first.values())
+    assert all(after - before >= limits.REQUEST_SPACING - 0.021
+               for before, after in zip(starts, starts[1:], strict=False))
+
+
+def test_autopilot_is_asked_before_other_components() -> None:
+    rig = Rig()
+    for number in range(30, 60):
+        rig.receive(Address(1, number), heartbeat(18))
+    rig.managers.append(FakeManager())
+    rig.run(1.0)
+
+    assert requests(rig)[0][1] == AUTOPILOT
+
+
+def test_forged_components_take_no_memory_without_end() -> None:
+    rig = Rig(FakeManager()).run(3.0)
+    for system in range(1, 5):
+        for component in range(1, 255):
+            rig.receive(Address(system, component), heartbeat(26))
+            rig.receive(Address(system, component), FakeManager(device_id=component).status())
+            rig.receive(Address(system, component), FakeManager().information())
+    rig.run(1.0)
+
+    assert len(keys(rig)) == limits.MAX_GIMBALS
+    assert rig.client.limit_reached
+    assert len(rig.client._components) <= limits.MAX_COMPONENTS + 4 * limits.MAX_GIMBALS
+    rig.run(70.0)
+    assert keys(rig) == [GimbalKey(DEVICE)]
+    assert not rig.client.limit_reached
+
+
+@pytest.mark.parametrize(('silent', 'reason'), [
+    ('alive', 'nothing from manager 1/1 for 3.'),
+    ('device_alive', 'nothing from device 1/154 for 3.')])
+def test_gimbal_is_lost_with_its_manager_or_its_device(silent: str, reason: str) -> None:
+    rig = Rig(FakeManager()).run(3.0)
+    setattr(rig.managers[0], silent, False)
+    rig.run(4.5)
+    assert rig.all_of(GimbalLost)[-1].reason.startswith(reason)
+
+    setattr(rig.managers[0], silent, True)
+    rig.run(2.0)
+
+    assert len(rig.all_of(GimbalConnected)) == 2
+    assert rig.gimbal.snapshot(rig.now).unreachable == ''
+
+
+def test_closed_link_loses_the_gimbal_at_once() -> None:
+    rig = Rig(FakeManager()).run(3.0)
+
+    rig.component.link_closed(rig.now, 'cable pulled')
+
+    assert rig.all_of(GimbalLost)[-1].reason == 'cable pulled'
+    assert not rig.run(3.0).gimbal.snapshot(rig.now).unreachable
+
+
+@pytest.mark.parametrize('was_commanded', [False, True])
+def test_silent_gimbal_is_forgotten_unless_it_was_commanded(was_commanded: bool) -> None:
+    rig = Rig(FakeManager()).run(3.0)
+    if was_commanded:
+        rig.gimbal.release_control(rig.now, rig.done)
+    rig.managers.clear()
+    rig.run(70.0)
+
+    assert bool(rig.all_of(GimbalForgotten)) is not was_commanded
+    assert bool(keys(rig)) is was_commanded
+
+
+def test_gm_18_second_manager_of_a_gimbal_is_told_and_takes_over_when_the_first_is_lost() -> None:
+    rig = Rig(FakeManager(), FakeManager(OTHER, device_alive=False)).run(4.0)
+    key = GimbalKey(DEVICE)
+    first, second = rig.gimbal.snapshot(rig.now).managers
+    assert rig.all_of(SecondManager) == [SecondManager(key, first, second)]
+
+    rig.managers[0 if first == AUTOPILOT else 1].alive = False
+    rig.run(5.0)
+
+    assert rig.all_of(ManagerChanged) == [ManagerChanged(key, first, second)]
+    assert rig.gimbal.snapshot(rig.now).managers == (second,)
+
+
+def test_gm_20_attitude_is_taken_from_the_device_itself_whoever_manages_it() -> None:
+    rig = Rig(FakeManager(q=(NAN,) * 4)).run(3.0)
+
+    assert rig.all_of(AttitudeReceived)[-1].attitude is None
+    assert 'not a rotation' in rig.gimbal.snapshot(rig.now).attitude_problem
+    assert {target for _, target in requests(rig, DEVICE_INFORMATION)} == {DEVICE}
+
+
+def test_attitude_interval_is_set_once_at_the_device() -> None:
+    rig = Rig(FakeManager(), attitude_interval=0.05).run(20.0)
+
+    intervals = [one for one in rig.messages(CommandLong)
+                 if one.command == MavCmd.SET_MESSAGE_INTERVAL]
+    assert [(one.target_component, one.param1, one.param2) for one in intervals] == [
+        (154, 285, 50_000)]

@@ -1,0 +1,228 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Control of a gimbal: taking, releasing and losing it, and the requests that need it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+from illuminator_ros.gimbal.commands import Control
+from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
+from illuminator_ros.gimbal.gimbal import Gimbal
+from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandInt,
+    CommandLong,
+    MAV_AUTOPILOT_ARDUPILOTMEGA,
+    MavResult,
+)
+from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.request import Done
+import pytest
+from support.gimbals import ALL, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
+
+CONFIGURE = GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+NONE = Address(0, 0)
+Ask = Callable[[Gimbal, float, Done], None]
+
+
+def commands(rig: Rig, command: int) -> list[tuple[float, ...]]:
+    """Return the params of the commands of a kind that were sent."""
+    return [(one.param1, one.param2, one.param3, one.param4, one.param5, one.param6, one.param7)
+            for one in rig.messages(CommandLong) if one.command == command]
+
+
+def asked(rig: Rig, ask: Ask, seconds: float = 3.0) -> tuple[bool, str]:
+    """Return the outcome of a request."""
+    ask(rig.gimbal, rig.now, rig.done)
+    rig.run(seconds)
+    (result,) = rig.results
+    rig.results.clear()
+    return result.success, result.message
+
+
+@pytest.mark.parametrize('secondary', [NONE, Address(255, 190)])
+def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: Address) -> None:
+    rig = Rig(FakeManager(primary=OTHER, secondary=secondary)).run(3.0)
+
+    success, message = asked(rig, Gimbal.take_control)
+
+    assert success, message
+    assert message.startswith('control taken, confirmed by GIMBAL_MANAGER_STATUS')
+    assert (rig.managers[0].primary, rig.managers[0].secondary) == (OURS, secondary)
+    # Explicit ids, never -2; the secondary component is left unchanged.
+    assert commands(rig, CONFIGURE) == [(1, 194, -1, -1, 0, 0, 154)]
+    success, message = asked(rig, Gimbal.release_control)
+    assert success, message
+    assert commands(rig, CONFIGURE)[1:] == [(-3, -3, -3, -3, 0, 0, 154)]
+    assert [(event.ours, event.was_lost) for event in rig.all_of(ControlChanged)] == [
+        (False, False), (True, False), (False, False)]
+
+
+@pytest.mark.parametrize(('fields', 'text'), [
+    ({'results': {CONFIGURE: MavResult.DENIED}}, 'refused: MAV_RESULT_DENIED'),
+    ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
+    ({'reports': False}, 'a manager without GIMBAL_MANAGER_STATUS does not show'),
+    ({'answers': False}, 'no acknowledgement')])
+def test_gm_16_control_that_no_status_shows_is_not_a_success(
+        fields: dict[str, object], text: str) -> None:
+    rig = Rig(FakeManager(primary=OTHER, **fields)).run(8.0)  # type: ignore[arg-type]
+
+    success, message = asked(rig, Gimbal.take_control, 8.0)
+
+    assert not success
+    assert text in message
+    assert not rig.gimbal.in_control
+
+
+@pytest.mark.parametrize(('primary', 'ask', 'text'), [
+    (OURS, Gimbal.take_control, 'in control already: primary 1/194, secondary none'),
+    (OTHER, Gimbal.release_control, 'not in control: primary 1/195, secondary none')])
+def test_request_for_what_the_status_shows_already_sends_nothing(
+        primary: Address, ask: Ask, text: str) -> None:
+    rig = Rig(FakeManager(primary=primary)).run(3.0)
+
+    assert asked(rig, ask, 0.1) == (True, text)
+    assert commands(rig, CONFIGURE) == []
+
+
+def test_gm_17_lost_control_is_told_and_not_taken_back() -> None:
+    rig = in_control(auto_take_control=True)
+
+    rig.managers[0].primary = OTHER
+    rig.run(10.0)
+
+    assert rig.all_of(ControlChanged)[-1] == ControlChanged(
+        GimbalKey(DEVICE), Control(OURS), Control(OTHER), False, was_lost=True)
+    rig.managers[0].primary = NONE
+    rig.run(10.0)
+    assert commands(rig, CONFIGURE) == []
+
+
+def test_control_is_not_known_while_the_manager_is_silent() -> None:
+    rig = in_control()
+
+    rig.managers[0].alive = False
+    rig.run(4.0)
+
+    assert not rig.gimbal.in_control
+    assert rig.all_of(ControlChanged)[-1].after is None
+    assert not rig.all_of(ControlChanged)[-1].was_lost
+    assert 'not connected: nothing from manager 1/1' in asked(rig, Gimbal.take_control, 0.1)[1]
+
+
+@pytest.mark.parametrize(('primary', 'taken'), [(NONE, True), (OTHER, False)])
+def test_control_is_taken_automatically_only_where_no_component_has_it(
+        primary: Address, taken: bool) -> None:
+    rig = Rig(FakeManager(primary=primary), auto_take_control=True).run(5.0)
+
+    assert rig.gimbal.in_control is taken
+    assert len(commands(rig, CONFIGURE)) == taken
+
+
+def test_automatic_take_that_fails_is_told() -> None:
+    rig = Rig(FakeManager(results={CONFIGURE: MavResult.DENIED}), auto_take_control=True).run(5.0)
+
+    assert [event.message.partition(' (')[0] for event in rig.all_of(AutomaticTakeFailed)] == [
+        'refused: MAV_RESULT_DENIED']
+
+
+def test_gm_19_ardupilot_is_not_taken_for_a_manager_that_enforces_control() -> None:
+    rig = Rig(FakeManager(autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA)).run(3.0)
+
+    success, message = asked(rig, Gimbal.take_control)
+
+    assert success
+    assert message.endswith('; ArduPilot also obeys components without control')
+    assert not rig.gimbal.snapshot(rig.now).enforces_control
+    assert in_control().gimbal.snapshot(0.0).enforces_control
+
+
+FLAG_REQUESTS: list[tuple[Ask, MountFlags, bool, Capabilities]] = [
+    (Gimbal.set_neutral, MountFlags.NEUTRAL, True, Capabilities.HAS_NEUTRAL),
+    (Gimbal.retract, MountFlags.RETRACT, True, Capabilities.HAS_RETRACT),
+    (lambda gimbal, now, done: gimbal.set_yaw_lock(True, now, done), MountFlags.YAW_LOCK, True,
+     Capabilities.HAS_YAW_LOCK),
+    (lambda gimbal, now, done: gimbal.set_yaw_lock(False, now, done), MountFlags.YAW_LOCK,
+     False, Capabilities(0))]
+
+
+@pytest.mark.parametrize(('ask', 'flag', 'on', 'needed'), FLAG_REQUESTS)
+def test_gm_3_flag_is_set_by_command_and_shown_by_the_status(
+        ask: Ask, flag: MountFlags, on: bool, needed: Capabilities) -> None:
+    rig = in_control()
+    rig.managers[0].flags = MountFlags(0) if on else flag
+    rig.run(1.0)
+
+    success, message = asked(rig, ask)
+
+    assert success, message
+    ((p1, p2, p3, p4, flags, p6, device_id),) = commands(
+        rig, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW)
+    # Angles and rates are left as they are, and the yaw frame is named.
+    assert all(map(math.isnan, (p1, p2, p3, p4)))
+    assert (p6, device_id) == (0, 154)
+    frame = (MountFlags.YAW_IN_EARTH_FRAME if int(flags) & MountFlags.YAW_LOCK else
+             MountFlags.YAW_IN_VEHICLE_FRAME)
+    assert int(flags) & frame
+    rig.managers[0].applies = False
+    rig.managers[0].flags = MountFlags(0) if on else flag
+    rig.run(1.0)
+    success, message = asked(rig, ask)
+    assert not success
+    assert 'but GIMBAL_MANAGER_STATUS shows' in message
+
+
+@pytest.mark.parametrize(('ask', 'needed'), [
+    (ask, needed) for ask, _, _, needed in FLAG_REQUESTS if needed])
+def test_gm_3_request_for_what_the_gimbal_lacks_is_refused(
+        ask: Ask, needed: Capabilities) -> None:
+    rig = Rig(FakeManager(primary=OURS, capabilities=ALL & ~needed)).run(3.0)
+
+    assert asked(rig, ask) == (False, f'gimbal 1/154 does not have {needed.name}')
+    assert commands(rig, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW) == []
+
+
+def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() -> None:
+    rig = in_control()
+
+    success, message = asked(rig, lambda gimbal, now, done: gimbal.set_roi(
+        47.3977419, 8.5455938, 488.5, now, done))
+
+    assert success
+    assert message.startswith('MAV_RESULT_ACCEPTED (1 try')
+    (sent,) = rig.messages(CommandInt)
+    assert (sent.command, sent.frame, sent.param1, sent.x, sent.y, sent.z) == (
+        195, 0, 154, 473977419, 85455938, 488.5)
+    assert asked(rig, Gimbal.clear_roi)[0]
+    assert commands(rig, GimbalCommand.DO_SET_ROI_NONE) == [(154, 0, 0, 0, 0, 0, 0)]
+    rig.managers[0].results[195] = MavResult.UNSUPPORTED
+    assert asked(rig, lambda gimbal, now, done: gimbal.set_roi(0, 0, 0, now, done))[1].startswith(
+        'MAV_RESULT_UNSUPPORTED')
+
+
+@pytest.mark.parametrize('ask', [
+    *(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi,
+    lambda gimbal, now, done: gimbal.set_roi(0, 0, 0, now, done)])
+def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(ask: Ask) -> None:
+    rig = Rig(FakeManager(primary=OTHER)).run(3.0)
+
+    success, message = asked(rig, ask)
+
+    assert not success
+    assert message == 'no control of gimbal 1/154: primary 1/195, secondary none'
+    assert not {one.command for one in rig.managers[0].commands} & set(GimbalCommand)

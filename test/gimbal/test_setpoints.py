@@ -1,0 +1,214 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Setpoints of a gimbal: attitudes, angles and rates, and when they stop."""
+
+from __future__ import annotations
+
+import math
+
+from illuminator_ros.gimbal.gimbal import REPEATS
+from illuminator_ros.gimbal.messages import Capabilities, GimbalManagerSetAttitude
+from illuminator_ros.payload.mount import from_mavlink, MountFlags, to_mavlink, YawFrame
+from illuminator_ros.payload.rotation import Quaternion, Vector
+import pytest
+from pytest import approx
+from support.gimbals import ALL, FakeManager, in_control, NAN, OTHER, OURS, Rig
+
+EARTH, VEHICLE = YawFrame.EARTH, YawFrame.VEHICLE
+LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+# 45 degrees down and 30 to the left, in ROS and in MAVLink.
+DOWN_LEFT = (0.0, math.radians(45), math.radians(30))
+
+
+def setpoints(rig: Rig) -> list[tuple[float, GimbalManagerSetAttitude]]:
+    return [(at, one) for at, one in rig.sent if isinstance(one, GimbalManagerSetAttitude)]
+
+
+def euler(message: GimbalManagerSetAttitude) -> Vector:
+    """Return roll, pitch and yaw of a setpoint in MAVLink, deg."""
+    roll, pitch, yaw = map(math.degrees, Quaternion(*message.q).euler())
+    return roll, pitch, yaw
+
+
+def test_gm_2_gm_4_attitude_is_sent_in_the_frame_and_the_signs_of_mavlink() -> None:
+    rig = in_control()
+
+    assert rig.gimbal.set_attitude(Quaternion.from_euler(*DOWN_LEFT), VEHICLE, rig.now) == ''
+    assert rig.gimbal.set_attitude(Quaternion.from_euler(*DOWN_LEFT), EARTH, rig.now) == ''
+    rig.run(0.1)
+
+    (_, relative), (_, absolute) = setpoints(rig)
+    assert euler(relative) == approx((0, -45, -30))
+    # A yaw of 30 degrees from east to the left is 60 degrees from north to the right.
+    assert euler(absolute) == approx((0, -45, 60))
+    assert relative.flags == LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME
+    # PX4 and ArduPilot read the lock as the frame.
+    assert absolute.flags == LEVEL | MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_LOCK
+    assert (relative.target_system, relative.target_component, relative.gimbal_device_id) == (
+        1, 1, 154)
+    assert all(map(math.isnan, (relative.angular_velocity_x, relative.angular_velocity_y,
+                                relative.angular_velocity_z)))
+
+
+def test_attitude_is_sent_again_a_few_times_unless_another_replaces_it() -> None:
+    rig = in_control()
+    rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    start = rig.now
+    rig.run(5.0)
+
+    assert [at - start for at, _ in setpoints(rig)] == approx([0.0, *REPEATS], abs=0.03)
+    rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    rig.gimbal.set_attitude(Quaternion.from_euler(*DOWN_LEFT), VEHICLE, rig.now)
+    rig.run(5.0)
+    assert [one.q[0] == 1.0 for _, one in setpoints(rig)[1 + len(REPEATS):]] == [
+        True, *[False] * (1 + len(REPEATS))]
+
+
+def test_rate_is_a_message_in_rad_per_s_and_ends_with_one_zero() -> None:
+    rig = in_control(setpoint_timeout=0.5)
+    start = rig.now
+    for _ in range(3):
+        assert rig.gimbal.set_rates((0.0, 0.2, -0.1), rig.now) == ''
+        rig.run(0.3)
+    rig.run(5.0)
+
+    sent = setpoints(rig)
+    assert [at - start for at, _ in sent] == approx([0.0, 0.3, 0.6, 1.1], abs=0.03)
+    assert [(one.angular_velocity_x, one.angular_velocity_y, one.angular_velocity_z)
+            for _, one in sent] == [(0.0, -0.2, 0.1)] * 3 + [(0.0, 0.0, 0.0)]
+    assert all(map(math.isnan, setpoints(rig)[0][1].q))
+
+
+def test_rate_of_zero_needs_no_second_zero() -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.0, 0.0), rig.now)
+
+    assert len(setpoints(rig.run(3.0))) == 1
+
+
+@pytest.mark.parametrize(('shown', 'sent'), [
+    (MountFlags.YAW_IN_VEHICLE_FRAME, LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME),
+    (MountFlags.YAW_LOCK, LEVEL | MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_LOCK)])
+def test_gm_2_rate_leaves_the_yaw_lock_as_the_device_has_it(shown: int, sent: int) -> None:
+    rig = in_control()
+    rig.managers[0].flags = shown
+    rig.run(1.0)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+
+    assert setpoints(rig.run(0.1))[0][1].flags == sent
+
+
+def test_gm_17_setpoints_stop_when_control_is_lost() -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.02)
+
+    rig.managers[0].primary = OTHER
+    rig.run(0.3)
+    rig.run(3.0)
+
+    assert len(setpoints(rig)) == 1
+    assert rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now) == (
+        'no control of gimbal 1/154: primary 1/195, secondary none')
+    assert len(setpoints(rig.run(3.0))) == 1
+
+
+def test_zero_that_a_closed_link_has_held_back_is_sent_when_control_is_shown_again() -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.1)
+    rig.component.link_closed(rig.now, 'cable pulled')
+    rig.now += 10.0
+    before = len(setpoints(rig))
+
+    rig.component.link_opened(rig.now)
+    rig.run(2.0)
+
+    assert [one.angular_velocity_y for _, one in setpoints(rig)[before:]] == [0.0]
+
+
+def test_release_stops_a_rate_first() -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(3.0)
+
+    assert [one.angular_velocity_y for _, one in setpoints(rig)] == [approx(-0.2), 0.0]
+    assert rig.results[0].success
+
+
+@pytest.mark.parametrize(('primary', 'reports', 'reason'), [
+    (OTHER, True, 'no control of gimbal 1/154: primary 1/195, secondary none'),
+    (OURS, False, 'manager 1/1 has sent no GIMBAL_MANAGER_STATUS')])
+def test_gm_14_setpoint_without_control_is_not_sent(
+        primary: object, reports: bool, reason: str) -> None:
+    rig = Rig(FakeManager(primary=primary, reports=reports)).run(3.0)  # type: ignore[arg-type]
+
+    assert [rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
+            rig.gimbal.set_angles((0.0, NAN, 0.0), VEHICLE, rig.now),
+            rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now)] == [reason] * 3
+    assert setpoints(rig.run(1.0)) == []
+
+
+@pytest.mark.parametrize(('has', 'sent'), [
+    (Capabilities(0), False), (Capabilities.HAS_YAW_LOCK, True),
+    (Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, True)])
+def test_gm_3_yaw_relative_to_the_earth_is_sent_only_to_a_gimbal_that_has_it(
+        has: Capabilities, sent: bool) -> None:
+    lacking = ALL & ~Capabilities.HAS_YAW_LOCK & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
+    rig = Rig(FakeManager(primary=OURS, capabilities=lacking | has)).run(3.0)
+
+    reason = rig.gimbal.set_attitude(Quaternion(), EARTH, rig.now)
+
+    assert reason == ('' if sent else 'gimbal 1/154 does not have HAS_YAW_LOCK or '
+                      'SUPPORTS_YAW_IN_EARTH_FRAME')
+    assert rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now) == ''
+
+
+def turned(roll: float, pitch: float, yaw: float, frame: YawFrame) -> FakeManager:
+    """Return a manager whose device has an attitude, given in ROS, rad."""
+    lock = MountFlags.YAW_LOCK if frame is EARTH else MountFlags(0)
+    return FakeManager(primary=OURS, flags=frame.flag | lock,
+                       q=to_mavlink(Quaternion.from_euler(roll, pitch, yaw), frame))
+
+
+def test_angle_that_is_nan_stays_where_it_is_and_then_where_it_was_sent() -> None:
+    rig = Rig(turned(0.1, 0.2, 0.3, VEHICLE)).run(3.0)
+
+    assert rig.gimbal.set_angles((NAN, 0.5, NAN), VEHICLE, rig.now) == ''
+    assert rig.gimbal.set_angles((NAN, NAN, -0.4), VEHICLE, rig.now) == ''
+    rig.run(0.1)
+
+    first, second = (from_mavlink(one.q, VEHICLE).euler() for _, one in setpoints(rig)[:2])
+    assert first == approx((0.1, 0.5, 0.3))
+    assert second == approx((0.1, 0.5, -0.4))
+
+
+@pytest.mark.parametrize(('delta_yaw', 'sent'), [(math.radians(90), True), (NAN, False)])
+def test_gm_2_axis_is_left_as_it_is_in_the_other_frame_only_if_the_heading_is_known(
+        delta_yaw: float, sent: bool) -> None:
+    manager = turned(0.0, 0.2, 0.3, VEHICLE)
+    manager.delta_yaw = delta_yaw
+    rig = Rig(manager).run(3.0)
+
+    reason = rig.gimbal.set_angles((0.0, 0.5, NAN), EARTH, rig.now)
+    rig.run(0.1)
+
+    assert bool(reason) is not sent
+    if sent:
+        # The vehicle looks east, which is a yaw of 0 in ROS.
+        assert from_mavlink(setpoints(rig)[0][1].q, EARTH).euler() == approx((0.0, 0.5, 0.3))
+    else:
+        assert 'yaw relative to the earth' in reason

@@ -1,0 +1,248 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A gimbal client beside gimbal managers that do what a test says, on one simulated clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+import math
+from typing import Any, TypeVar
+
+from illuminator_ros.gimbal import messages as gm
+from illuminator_ros.gimbal.client import GimbalClient
+from illuminator_ros.gimbal.events import GimbalEvent, GimbalKey
+from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    heartbeat,
+    MAV_AUTOPILOT_ARDUPILOTMEGA,
+    MavCmd,
+    MavResult,
+    Message,
+)
+from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
+
+OURS, AUTOPILOT, DEVICE, OTHER = Address(1, 194), Address(1, 1), Address(1, 154), Address(1, 195)
+NAN = math.nan
+ALL = gm.Capabilities(sum(gm.Capabilities))
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+E = TypeVar('E', bound=GimbalEvent)
+M = TypeVar('M', bound=Message)
+
+
+@dataclass
+class FakeManager:
+    """
+    A gimbal manager, and its device, which turns at once.
+
+    :ivar results: the results of commands that are not accepted, by MAV_CMD.
+    :ivar announces: whether it answers requests for GIMBAL_MANAGER_INFORMATION.
+    :ivar reports: whether it sends GIMBAL_MANAGER_STATUS.
+    :ivar applies: whether it does what it accepts.
+    :ivar answers: whether it acknowledges commands.
+    :ivar received: the setpoints that came.
+    """
+
+    address: Address = AUTOPILOT
+    device_id: int = 154
+    capabilities: int = ALL
+    autopilot: int = MAV_AUTOPILOT_ARDUPILOTMEGA + 9
+    results: dict[int, int] = field(default_factory=dict)
+    announces: bool = True
+    reports: bool = True
+    applies: bool = True
+    answers: bool = True
+    alive: bool = True
+    device_alive: bool = True
+    primary: Address = Address(0, 0)
+    secondary: Address = Address(0, 0)
+    flags: int = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK | MountFlags.YAW_IN_VEHICLE_FRAME
+    q: tuple[float, float, float, float] = LEVEL
+    rates: tuple[float, float, float] = (NAN, NAN, NAN)
+    delta_yaw: float = NAN
+    failure_flags: int = 0
+    attitude_number: int | None = None
+    received: list[gm.GimbalManagerSetAttitude] = field(default_factory=list)
+    commands: list[CommandLong | CommandInt] = field(default_factory=list)
+
+    @property
+    def device(self) -> Address:
+        number = self.device_id in gm.NON_MAVLINK_IDS
+        return self.address if number else Address(self.address.system, self.device_id)
+
+    def information(self) -> gm.GimbalManagerInformation:
+        return gm.GimbalManagerInformation(
+            0, self.capabilities, self.device_id, -0.5, 0.5, -1.57, 0.5, -3.0, 3.0)
+
+    def status(self) -> gm.GimbalManagerStatus:
+        return gm.GimbalManagerStatus(
+            0, self.flags, self.device_id, *self.primary, *self.secondary)
+
+    def attitude(self) -> GimbalDeviceAttitudeStatus:
+        number = self.device_id if self.device_id in gm.NON_MAVLINK_IDS else 0
+        return GimbalDeviceAttitudeStatus(
+            0, 0, 0, self.flags, self.q, *self.rates, self.failure_flags, self.delta_yaw, NAN,
+            number if self.attitude_number is None else self.attitude_number)
+
+    def sent_each(self, tenth: int) -> list[tuple[Address, Message]]:
+        """Return what it sends in a tenth of a second: heartbeats 1 Hz, statuses 5 Hz."""
+        sent: list[tuple[Address, Message]] = []
+        if self.alive and tenth % 10 == 0:
+            sent.append((self.address, Heartbeat(2, self.autopilot, 0, 0, 4, 3)))
+        if self.alive and self.reports and tenth % 2 == 0:
+            sent.append((self.address, self.status()))
+        if self.device_alive:
+            if tenth % 10 == 5 and self.device != self.address:
+                sent.append((self.device, heartbeat(gm.MAV_TYPE_GIMBAL)))
+            if tenth % 2 == 1:
+                sent.append((self.device, self.attitude()))
+        return sent
+
+    def take(self, source: Address, message: Message) -> list[tuple[Address, Message]]:
+        """Return the answers to a message."""
+        if not self.alive or getattr(message, 'target_system', None) is None:
+            return []
+        target = Address(message.target_system, message.target_component)  # type: ignore
+        if isinstance(message, gm.GimbalManagerSetAttitude) and target == self.address:
+            self.received.append(message)
+        if not isinstance(message, CommandLong | CommandInt) or (
+                target not in (self.address, self.device)):
+            return []
+        self.commands.append(message)
+        if not self.answers:
+            return []
+        result = self.results.get(message.command, MavResult.ACCEPTED)
+        sent: list[tuple[Address, Message]] = [
+            (target, CommandAck(message.command, result, 0, 0, *source))]
+        if result == MavResult.ACCEPTED:
+            sent += self._execute(message, target)
+        return sent
+
+    def _execute(
+        self, message: CommandLong | CommandInt, target: Address,
+    ) -> list[tuple[Address, Message]]:
+        command, p1, p2, p3, p4 = (message.command, message.param1, message.param2,
+                                   message.param3, message.param4)
+        if command == MavCmd.REQUEST_MESSAGE:
+            made: dict[tuple[int, Address], Message | None] = {
+                (280, self.address): self.information() if self.announces else None,
+                (281, self.address): self.status() if self.reports else None,
+                (283, self.device): device_information()}
+            found = made.get((int(p1), target))
+            return [(target, found)] if found is not None else []
+        if self.applies and command == gm.GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+            old = (*self.primary, *self.secondary)
+            new = [was if value == -1 else 0 if value == -3 else int(value)
+                   for was, value in zip(old, (p1, p2, p3, p4), strict=True)]
+            self.primary, self.secondary = Address(*new[:2]), Address(*new[2:])
+        if self.applies and command == gm.GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
+            assert isinstance(message, CommandLong)
+            self.flags = int(message.param5)
+        return []
+
+
+def device_information(**fields: Any) -> gm.GimbalDeviceInformation:
+    """Return the information of a device."""
+    return gm.GimbalDeviceInformation(**{
+        'time_boot_ms': 0, 'vendor_name': b'Maker', 'model_name': b'Turn', 'custom_name': b'',
+        'firmware_version': 0x00030201, 'hardware_version': 0, 'uid': 77, 'cap_flags': 0,
+        'custom_cap_flags': 0, 'roll_min': NAN, 'roll_max': NAN, 'pitch_min': -1.5,
+        'pitch_max': 0.5, 'yaw_min': -3.0, 'yaw_max': 3.0, **fields})
+
+
+class Rig:
+    """
+    A client and managers on one link.
+
+    :ivar sent: what the client has sent, with the time.
+    :ivar results: of the requests that were made with :attr:`done`.
+    """
+
+    def __init__(self, *managers: FakeManager, **settings: Any) -> None:
+        self.managers = list(managers)
+        self.commands = CommandSender(OURS)
+        self.client = GimbalClient(self.commands, GimbalSettings(**settings))
+        self.component = Component(self.commands, [self.client])
+        self.events: list[GimbalEvent] = []
+        self.results: list[Result] = []
+        self.sent: list[tuple[float, Message]] = []
+        self.now = 100.0
+        self._tenth = 0
+        self.client.events.subscribe(self.events.append)
+        self.component.link_opened(self.now)
+
+    def done(self, result: Result, now: float) -> None:
+        self.results.append(result)
+
+    @property
+    def gimbal(self) -> Gimbal:
+        """Return the only gimbal."""
+        (gimbal,) = self.client.gimbals.values()
+        return gimbal
+
+    def all_of(self, kind: type[E]) -> list[E]:
+        """Return the events of a kind."""
+        return [event for event in self.events if isinstance(event, kind)]
+
+    def messages(self, kind: type[M]) -> list[M]:
+        """Return the messages of a kind that the client has sent."""
+        return [message for _, message in self.sent if isinstance(message, kind)]
+
+    def receive(self, source: Address, message: Message) -> None:
+        self.component.receive(source, message, self.now)
+
+    def run(self, seconds: float) -> Rig:
+        """Let time pass in steps of 20 ms."""
+        for step in range(round(seconds / 0.02)):
+            if step % 5 == 0:
+                for manager in self.managers:
+                    for one in manager.sent_each(self._tenth):
+                        self.receive(*one)
+                self._tenth += 1
+            self._exchange()
+            self.now += 0.02
+        return self
+
+    def _exchange(self) -> None:
+        self.component.poll(self.now)
+        outgoing = self.component.outgoing
+        while outgoing:
+            source, message = outgoing.popleft()
+            self.sent.append((self.now, message))
+            for manager in self.managers:
+                for one in manager.take(source, message):
+                    self.receive(*one)
+
+
+def keys(rig: Rig) -> Sequence[GimbalKey]:
+    """Return the keys of the gimbals that were found."""
+    return list(rig.client.gimbals)
+
+
+def in_control(**fields: Any) -> Rig:
+    """Return a client that controls a gimbal; ``fields`` are of its settings."""
+    rig = Rig(FakeManager(primary=OURS), **fields).run(4.0)
+    assert rig.gimbal.in_control
+    return rig
