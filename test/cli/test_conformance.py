@@ -24,7 +24,6 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 import pytest
 from support.ports import free_port
 from support.processes import environment, Program, ROOT, run
@@ -41,8 +40,6 @@ WITHOUT_ROS = (
     'sys.modules.update(dict.fromkeys(["yaml", "serial"]))\n'
     'from {0} import main\n'
     'sys.exit(main(sys.argv[1:]))\n')
-# s; a whole run takes about 30.
-WHOLE_RUN = 300.0
 # Would keep the light at 100 % for an hour.
 LONG = ('--yes', '--only', 'brightness', '--only', 'thermal-flags', '--heat', '3600')
 
@@ -84,40 +81,25 @@ def shell(command: str) -> subprocess.CompletedProcess[str]:
         timeout=PATIENCE)
 
 
-@pytest.mark.timeout(WHOLE_RUN)
-def test_a_whole_run_ends_and_its_reports_agree(
+def test_a_run_ends_with_its_verdict_and_its_reports_agree(
         url: str, start: Start, simulate: Start, tmp_path: Path) -> None:
-    # Without a virtual clock a busy machine may make the simulator slow, so FAIL is possible.
-    simulate()
-    program = start(
-        CONFORMANCE, f'udpout://{url}', '--yes', '--heat', '0', '--junit',
-        str(tmp_path / 'report.xml'), '--json', str(tmp_path / 'report.json'))
-    status = program.wait(WHOLE_RUN)
-
-    match = re.search(r'(\d+) passed, (\d+) failed, 1 skipped', program.log)
-    assert match, program.log
-    passed, failed = map(int, match.groups())
-    assert passed + failed + 1 == len(REQUIREMENTS)
-    assert passed > len(REQUIREMENTS) / 2
-    assert status == bool(failed)
-    assert 'the light is as it was' in program.log
-    assert json.loads((tmp_path / 'report.json').read_text())['passed'] is (not failed)
-    suite = ElementTree.parse(tmp_path / 'report.xml').getroot()
-    assert len(suite.findall('testcase')) == len(REQUIREMENTS)
-    assert len(suite.findall('testcase/failure')) == failed
-
-
-def test_a_failed_requirement_ends_with_status_1(url: str, start: Start, simulate: Start) -> None:
     simulate('--fault', 'refuse=failed')
-    program = start(CONFORMANCE, f'udpout://{url}', '--only', 'brightness', '--only', 'on')
-
+    program = start(
+        CONFORMANCE, f'udpout://{url}', '--only', 'brightness', '--only', 'on', '--only',
+        'address', '--junit', str(tmp_path / 'report.xml'), '--json',
+        str(tmp_path / 'report.json'))
     assert program.wait() == 1
     assert 'FAIL    brightness ' in program.log
     # No terminal, no --yes: no consent.
     assert 'switched on, it would shine at 100 %' in program.log
+    assert re.search(r'1 passed, 1 failed, 1 skipped .*', program.log), program.log
+    assert json.loads((tmp_path / 'report.json').read_text())['passed'] is False
+    suite = ElementTree.parse(tmp_path / 'report.xml').getroot()
+    assert len(suite.findall('testcase')) == 3
+    assert len(suite.findall('testcase/failure')) == 1
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_restores_the_light_and_ends_with_status_1(
         url: str, start: Start, simulate: Start, number: int) -> None:
     simulator = simulate()
@@ -167,16 +149,6 @@ def test_a_closed_terminal_leaves_the_light_as_it_was(url: str, simulate: Start)
         eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not restored')
 
 
-def test_under_nohup_a_run_ignores_sighup(url: str) -> None:
-    program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
-                      CONFORMANCE, f'udpout://{url}', '--yes')
-    program.wait_for('checking the light')
-    status = Path(f'/proc/{program.pid}/status').read_text()
-    program.kill()
-
-    assert int(re.findall(r'SigIgn:\s*(\w+)', status)[0], 16) & 1 << signal.SIGHUP - 1
-
-
 @pytest.mark.parametrize('arguments', ['--list', '--help', 'udpin://{url} --wait 0.1'])
 def test_a_full_disk_is_reported_in_one_line_with_status_1(url: str, arguments: str) -> None:
     ended = shell(f'{arguments.format(url=url)} > /dev/full')
@@ -185,23 +157,13 @@ def test_a_full_disk_is_reported_in_one_line_with_status_1(url: str, arguments: 
     assert ended.returncode == 1
 
 
-@pytest.mark.parametrize('redirection', ['<&-', '<&- >&-', '<&- >&- 2>&-', '2>&-'])
+@pytest.mark.parametrize('redirection', ['<&- >&-', '2>&-'])
 def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirection: str) -> None:
     simulate()
     ended = shell(f'udpout://{url} --only strobe --only address {redirection}')
 
     assert ended.returncode == 0
     assert 'Traceback' not in ended.stderr
-
-
-def test_a_name_that_the_encoding_lacks_is_escaped(
-        url: str, start: Start, simulate: Start) -> None:
-    simulate('--vendor', 'Müller')
-    program = start(CONFORMANCE, f'udpout://{url}', '--only', 'information-request',
-                    PYTHONIOENCODING='ascii')
-
-    assert program.wait() == 0
-    assert 'M\\xfcller' in program.log
 
 
 @pytest.mark.parametrize(('link', 'used', 'status', 'reason'), [
@@ -243,7 +205,7 @@ def test_a_wrong_argument_is_named_in_one_line_with_status_2(
 
 
 @pytest.mark.parametrize(('only', 'answers', 'reply'), [
-    ('strobe', ['n'], 'SKIPPED strobe'), ('strobe', ['y'], 'PASS    strobe'),
+    ('strobe', ['y'], 'PASS    strobe'),
     ('strobe', ['maybe'], "'maybe' is neither y nor n: taken as no"),
     ('heartbeat', [], 'PASS    heartbeat')])
 def test_a_check_that_needs_consent_asks_after_it_named_the_lights_on_the_link(

@@ -100,8 +100,6 @@ def test_invalid_command_line_ends_the_start_with_status_2_and_one_line(
     ({'external_changes': 'fight'}, "external_changes: 'fight' is not one of follow, reassert"),
     ({'max_brightness': 60, 'brightness': 80}, 'brightness 80 % is above max_brightness 60 %'),
 ])
-
-
 def test_invalid_parameter_is_refused_with_its_name_value_and_range(
     ros: Ros, given: dict[str, Any], reason: str,
 ) -> None:

@@ -77,8 +77,6 @@ def test_cone_is_closed_with_its_apex_at_the_origin_and_normals_pointing_outward
     ([strobe(2.0, 25.0), strobe(0.0, 25.0)], (MAX_ALPHA, False)),
     ([strobe(0.02, 30.0, brightness=50.0)], (pytest.approx(0.15 * MAX_ALPHA), False)),
 ])
-
-
 def test_beam_has_the_look_of_the_last_plausible_status(
     reports: list[dict[str, Any]], look: tuple[float, bool],
 ) -> None:

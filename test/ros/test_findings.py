@@ -91,8 +91,6 @@ def value(status: DiagnosticStatus, key: str) -> str:
     ({'error_status': 0x80000000}, WARN, 'unknown flags 0x80000000'),
     ({'brightness': math.nan}, WARN, 'implausible: brightness nan'),
 ])
-
-
 def test_status_of_a_light_makes_its_finding_and_the_next_one_ends_it(
     fields: dict[str, Any], level: bytes, text: str,
 ) -> None:
@@ -164,8 +162,6 @@ FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
      '1 frames refused as replayed: their time stamps are not newer than the last; compare the '
      'clocks'),
 ])
-
-
 def test_missing_light_is_a_warning_with_its_likeliest_reason_and_an_error_after_10_s(
     mode: SigningMode, received: list[bytes], reason: str,
 ) -> None:
@@ -178,6 +174,19 @@ def test_missing_light_is_a_warning_with_its_likeliest_reason_and_an_error_after
         assert re.fullmatch(
             rf'no light connected for {seconds}\.00 s: none heard yet on udp [\d.:]+: {reason}',
             link.message)
+
+
+def test_silent_light_that_signs_while_signing_is_off_is_a_warning_with_the_remedy() -> None:
+    reported = Reported()
+    reported.receive(signed_frame(1))
+    reported.link.ask(lambda now: reported.client.lights[LIGHT].enable(
+        True, now, lambda result, now: None))
+    for _ in range(3):
+        reported.link.run(1.0)
+        reported.receive(signed_frame(1))
+    level, text = found(reported.statuses()['link'])
+    assert (level, text) == (WARN, 'commands are not answered, and others sign their frames while '
+                             'signing_mode is off')
 
 
 def test_lights_that_are_not_the_target_or_too_many_are_named() -> None:

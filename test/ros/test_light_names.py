@@ -74,8 +74,6 @@ def light_of(ros: Ros, node: str, lights: list[ServedLight]) -> Address:
     ({'target_system': 7}, (FIRST, SECOND, OTHER), OTHER),
     ({'target_system': 1, 'target_component': 244}, (FIRST, SECOND, OTHER), SECOND),
 ], ids=['none', 'component', 'system', 'both'])
-
-
 def test_first_node_serves_the_target_or_else_the_first_light_heard(
     own_ros: Ros, start: Start, target: dict[str, int], sources: tuple[Address, ...],
     chosen: Address,

@@ -108,8 +108,6 @@ def test_light_that_leaves_is_marked_can_be_cleared_and_can_return(own_ros: Ros)
     (dict.fromkeys(SIGNATURE, 'std_msgs/msg/String'), {*SIGNATURE}, []),
     (SIGNATURE, {*SIGNATURE} - {'/bow/enabled'}, []),
 ])
-
-
 def test_light_is_a_node_that_publishes_all_its_signature_topics_with_their_types(
     topics: dict[str, str], publishers: set[str], found: list[str],
 ) -> None:

@@ -49,8 +49,6 @@ def write(path: Path, *sections: tuple[str, dict[str, Any]]) -> str:
       'strobe_duty_cycle': 50}, None, (1.0, 1.0, 3.5, 50.0)),
     *(({'brightness': 60}, section, (2.0, 60.0, 2.0, 10.0)) for section in (ALL, FULL, SHORT)),
 ])
-
-
 def test_overrides_are_sent_with_the_first_connection_in_one_command(
     own_ros: Ros, port: int, light: ServedLight, tmp_path: Path, given: dict[str, Any],
     section: str | None, sent: tuple[float, ...],

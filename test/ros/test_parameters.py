@@ -73,8 +73,6 @@ def test_parameters_of_the_light_have_its_values_and_the_described_types(
     ('get_parameter_types', GetParameterTypes, 'types'),
     ('describe_parameters', DescribeParameters, 'descriptors'),
 ])
-
-
 def test_unknown_name_gets_an_empty_answer(
     parameters: Parameters, service: str, type_: Any, field: str,
 ) -> None:

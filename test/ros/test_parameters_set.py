@@ -21,6 +21,7 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from support.light import CONFIGURE, MavResult, params, ServedLight
+from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until
 
@@ -59,24 +60,16 @@ def test_four_parameters_in_one_call_are_one_command_and_one_event(
 @pytest.mark.parametrize('atomically', [False, True])
 @pytest.mark.parametrize(('name', 'value', 'reason'), [
     ('brightness', 101, 'brightness 101 % is out of range: 0 to 100 %'),
-    ('brightness', -0.5, 'brightness -0.5 % is out of range: 0 to 100 %'),
     ('brightness', math.nan, 'brightness nan is not a finite number'),
-    ('brightness', math.inf, 'brightness inf is not a finite number'),
     ('brightness', 'bright', "brightness 'bright' is not a number"),
     ('brightness', True, 'brightness True is not a number'),
-    ('brightness', [1.0], 'brightness [1.0] is not a number'),
-    ('strobe_duty_cycle', 100.5, 'strobe_duty_cycle 100.5 % is out of range'),
     ('strobe_period', 0.01, 'strobe_period 0.01 s is outside what the light reports: 0 (no '
                             'strobe) or 0.05 to 10 s'),
-    ('strobe_period', 20.0, 'strobe_period 20 s is outside what the light reports'),
     ('mode', 'unknown', "mode 'unknown' is none of internal_control, external_sync"),
-    ('mode', 1, 'mode 1 is none of internal_control, external_sync'),
     ('brightness', None, 'brightness cannot be deleted'),
     ('frame_id', 'other', 'read-only'),
     ('banana', 1.0, 'banana'),
 ])
-
-
 def test_invalid_value_is_refused_with_its_reason_and_nothing_is_sent(
     light: ServedLight, parameters: Parameters, name: str, value: object, reason: str,
     atomically: bool,
@@ -114,13 +107,21 @@ def test_request_of_an_unknown_type_or_with_repeated_names_or_empty_is_answered(
     assert parameters.set_atomically().successful
 
 
-@pytest.mark.parametrize('result', [
-    MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, MavResult.CANCELLED])
+def test_strobe_of_a_light_whose_duty_cycle_is_zero_is_set_to_half_with_a_line(
+    parameters: Parameters, bridge: Program,
+) -> None:
+    assert parameters.set(strobe_period=1)[0].successful
+    assert parameters.get('strobe_period', 'strobe_duty_cycle') == [1.0, 50.0]
+    assert parameters.types('strobe_period') == parameters.types('brightness')
+    bridge.wait_for('light 1/243: strobe_duty_cycle was 0 %, at which nothing strobes, and was '
+                    'set to 50 %')
+
+
 def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
-    light: ServedLight, parameters: Parameters, result: MavResult,
+    light: ServedLight, parameters: Parameters,
 ) -> None:
     events = parameters.events()
-    light.fake.results[CONFIGURE] = result
+    light.fake.results[CONFIGURE] = MavResult.DENIED
 
     listed = parameters.set(brightness=30.0, strobe_duty_cycle=1.0)
     # A parameter that the node keeps itself is set first, and taken back.
@@ -133,7 +134,7 @@ def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
 
     for outcome in (*listed, atomic):
         assert not outcome.successful
-        assert outcome.reason.startswith(f'refused: MAV_RESULT_{result.name} (1 try, ')
+        assert outcome.reason.startswith('refused: MAV_RESULT_DENIED (1 try, ')
     assert parameters.get('use_sim_time', 'strobe_duty_cycle') == [False, 0.0]
     event = events.wait(lambda event: any(
         p.name == 'brightness' for p in event.changed_parameters))

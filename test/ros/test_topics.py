@@ -29,6 +29,8 @@ from support.slow import CLOCK, pass_time_until
 STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
     'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64}
+
+
 @pytest.fixture(scope='module')
 def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
     """Return the topics of the module's bridge by their names."""
@@ -60,8 +62,6 @@ def topics(light: ServedLight, recorders: dict[str, Recorder]) -> dict[str, Reco
     ('error_flags', 'error_status', 0x80000005, 0x80000005),
     ('uptime', 'temp_c', 20.0, None),
 ])
-
-
 def test_each_status_is_published_once_as_sent_and_kept_for_late_subscribers(
     ros: Ros, light: ServedLight, topics: dict[str, Recorder], topic: str, field: str, sent: float,
     published: object,
@@ -82,8 +82,6 @@ def test_each_status_is_published_once_as_sent_and_kept_for_late_subscribers(
     ('strobe_duty_cycle', 'strobe_duty_cycle', (math.nan, 101.0)),
     ('temperature', 'temp_c', (math.nan, math.inf, -300.0, 1e6)),
 ])
-
-
 def test_implausible_value_is_not_published_while_the_others_are(
     light: ServedLight, topics: dict[str, Recorder], topic: str, field: str,
     values: tuple[float, ...],
@@ -136,8 +134,6 @@ def test_connected_is_false_before_a_light_is_heard_and_published_on_change_only
     (('-r', '~/connected:=/lamp/alive', '-r', '/diagnostics:=/uav1/diagnostics'),
      '/illuminator'),
 ])
-
-
 def test_all_names_follow_namespace_node_name_and_remapping(
     own_ros: Ros, port: int, arguments: tuple[str, ...], node: str,
 ) -> None:

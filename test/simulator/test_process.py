@@ -17,7 +17,6 @@
 from collections.abc import Callable
 import contextlib
 import os
-from pathlib import Path
 import subprocess
 import sys
 
@@ -25,7 +24,7 @@ from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.live_link import Bridge
 from support.ports import free_port
-from support.processes import ended, environment, prepare_child, python, ROOT, run
+from support.processes import ended, environment, prepare_child, python, ROOT
 from support.waiting import PATIENCE
 
 SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
@@ -78,28 +77,12 @@ def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped() -> None:
         program.wait_for(r'1/243 Gr\xf6\xdfe')
 
 
-def test_an_error_with_such_a_name_is_one_line() -> None:
-    done = run('illuminator_ros.simulator', '--fault', 'ö', env={'PYTHONIOENCODING': 'ascii'})
-    assert (done.returncode, done.stderr.count('\n')) == (2, 1)
-
-
 def test_the_help_on_a_full_disk_ends_without_a_traceback() -> None:
     with open('/dev/full', 'wb') as full:
         done = subprocess.run([*SIMULATOR, '--help'], env=environment(), cwd=ROOT, stdout=full,
                               stderr=subprocess.PIPE, preexec_fn=prepare_child,
                               timeout=PATIENCE, check=False)
     assert (done.returncode, done.stderr) == (0, b'')
-
-
-def test_output_to_a_file_is_written(tmp_path: Path) -> None:
-    """A console that quits at once; both streams of the process are one file."""
-    output = tmp_path / 'output'
-    with output.open('wb') as file:
-        done = subprocess.run([*SIMULATOR, f'udpout://127.0.0.1:{free_port()}'], input=b'quit\n',
-                              env=environment(), cwd=ROOT, stdout=file, stderr=file,
-                              preexec_fn=prepare_child, timeout=PATIENCE, check=False)
-    assert done.returncode == 0
-    assert output.read_text().startswith('1 light: 1/243\n')
 
 
 def test_the_first_message_of_a_peer_is_one_line() -> None:

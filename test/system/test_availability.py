@@ -17,9 +17,7 @@
 from collections.abc import Iterator
 import contextlib
 import fcntl
-import json
 import os
-from pathlib import Path
 import signal
 import subprocess
 import sys
@@ -110,19 +108,3 @@ def test_best_effort_publisher_is_heard(own_ros: Ros, port: int) -> None:
             return bool(light.commands(ON_OFF))
 
         eventually(heard)
-
-
-def test_parameters_dumped_before_the_first_light_can_be_loaded(
-    own_ros: Ros, port: int, tmp_path: Path,
-) -> None:
-    """As ``ros2 param dump`` and ``--params-file`` do."""
-    with running_bridge(own_ros.domain, port):
-        parameters = Parameters(own_ros)
-        names = parameters.names()
-        dump = {name: list(value) if isinstance(value, list | tuple) else value
-                for name, value in zip(names, parameters.get(*names), strict=True)}
-    file = tmp_path / 'dump.yaml'
-    file.write_text(json.dumps({'/illuminator': {'ros__parameters': dump}}))
-
-    with running_bridge(own_ros.domain, port, '--params-file', str(file)) as bridge:
-        assert bridge.count('WARN') + bridge.count('ERROR') == 0

@@ -158,42 +158,9 @@ def test_thread_that_cannot_be_started_is_tried_again(own_ros: Ros, port: int) -
         assert own_ros.enable().success
 
 
-def test_debug_log_shows_peers_commands_acknowledgements_and_statuses(
-    own_ros: Ros, port: int,
-) -> None:
-    with (ended(start_bridge(own_ros.domain, port, '--log-level', 'debug')) as bridge,
-          ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
-        bridge.wait_for('light 1/243 connected')
-        assert own_ros.enable().success
-
-        for text in ("new peer ('127.0.0.1', ", 'sent from 1/194: CommandLong(',
-                     'received from 1/243: CommandAck(',
-                     'received from 1/243: IlluminatorStatus('):
-            bridge.wait_for(text)
-    with (ended(start_bridge(own_ros.domain, port)) as bridge,
-          ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
-        bridge.wait_for('light 1/243 connected')
-        assert bridge.count('[DEBUG]') == bridge.count('received from') == 0
-
-
-def test_strobe_of_a_light_whose_duty_cycle_is_zero_is_set_to_half_with_a_line(
-    own_ros: Ros, port: int,
-) -> None:
-    with (ended(start_bridge(own_ros.domain, port)) as bridge,
-          ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
-        parameters = Parameters(own_ros)
-        parameters.wait(strobe_duty_cycle=0.0)
-
-        assert parameters.set(strobe_period=1.0)[0].successful
-
-        parameters.wait(strobe_period=1.0, strobe_duty_cycle=50.0)
-        bridge.wait_for('light 1/243: strobe_duty_cycle was 0 %, at which nothing strobes, and '
-                        'was set to 50 %')
-
-
 def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: Ros, port: int) -> None:
-    with (running_bridge(own_ros.domain, port) as bridge, ServedLight(port),
-          ServedLight(port, source=Address(1, 244)) as further):
+    with (running_bridge(own_ros.domain, port, target_component=243) as bridge,
+          ServedLight(port), ServedLight(port, source=Address(1, 244)) as further):
         bridge.wait_for('light 1/244 is served by /illuminator_1_244')
         eventually(lambda: 'illuminator_1_244' in own_ros.node.get_node_names())
 

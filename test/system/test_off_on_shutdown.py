@@ -20,10 +20,9 @@ import signal
 
 import pytest
 from rcl_interfaces.srv import GetParameters
-from support.light import Address, CONFIGURE, MavResult, ON_OFF, ServedLight
+from support.light import Address, MavResult, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, start_bridge, start_slow_bridge
-from support.slow import CLOCK, pass_time_until
 from support.waiting import eventually
 
 
@@ -72,18 +71,6 @@ def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, por
         assert line.startswith('[WARN]')
 
 
-def test_lost_command_is_sent_again(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port) as (program, light):
-        light.fake.results[ON_OFF] = [None, MavResult.ACCEPTED]
-
-        program.send(signal.SIGTERM)
-        light.wait_for(ON_OFF)
-        CLOCK.forward(0.5)
-
-        assert_goes_off(light)
-        assert program.wait() == 0
-
-
 @pytest.mark.parametrize(('result', 'line'), [
     (MavResult.DENIED, 'light 1/243 may still be on: refused: MAV_RESULT_DENIED (1 try, '),
     (None, 'light 1/243 may still be on: no confirmation within '),
@@ -99,24 +86,6 @@ def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end
         assert [found[:7] for found in program.lines if line in found] == ['[ERROR]']
 
 
-def test_requests_in_progress_do_not_delay_it(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port) as (program, light):
-        light.fake.results[ON_OFF] = [MavResult.IN_PROGRESS, MavResult.ACCEPTED]
-        light.fake.results[CONFIGURE] = MavResult.IN_PROGRESS
-        own_ros.start_enable()
-        own_ros.start_enable()
-        Parameters(own_ros).start_set(brightness=20.0)
-        light.wait_for(ON_OFF)
-        light.wait_for(CONFIGURE)
-
-        assert_ends(program)
-
-        assert_goes_off(light)
-        # An OFF whose acknowledgement may be that of the ON is sent again.
-        on, *off = [command.param1 for command in light.commands(ON_OFF)]
-        assert (on, set(off)) == (1.0, {0.0})
-
-
 def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
     with lit(own_ros, port, start=start_bridge) as (program, light):
         own_ros.start(GetParameters, '/illuminator/get_parameters',
@@ -125,14 +94,3 @@ def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
         assert_ends(program)
 
         assert_goes_off(light)
-
-
-def test_lost_light_is_an_error_and_gets_no_command(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port) as (program, light):
-        light.fake.silent = True
-        pass_time_until(lambda: program.count('lost'))
-
-        assert_ends(program)
-
-        assert light.commands(ON_OFF) == []
-        assert program.count('light 1/243 may still be on: light 1/243 is lost: no heartbeat')

@@ -44,6 +44,8 @@ LEASE = 20.0
 HANGING = """
 import threading
 from illuminator_ros.cli.entry_point import run_program
+
+
 def hang(termination):
     termination.calls(threading.Event().wait, last=lambda: print('at last', flush=True))
     print('hanging', flush=True)
@@ -74,14 +76,6 @@ def bridge_starting(ros: Ros, port: int, node: str) -> Iterator[Program]:
 
 
 @contextlib.contextmanager
-def bridge_connecting(ros: Ros, port: int, node: str) -> Iterator[Program]:
-    program = start_bridge(ros.domain, port, '-r', f'__node:={node}')
-    program.wait_for('link open')
-    with ServedLight(port, link=Link):
-        yield program
-
-
-@contextlib.contextmanager
 def bridge_in_a_command(ros: Ros, port: int, node: str) -> Iterator[Program]:
     program = start_bridge(ros.domain, port, '-r', f'__node:={node}')
     program.wait_for('link open')
@@ -100,17 +94,9 @@ def simulator_starting(ros: Ros, port: int, node: str) -> Iterator[Program]:
     yield program
 
 
-@contextlib.contextmanager
-def simulator_running(ros: Ros, port: int, node: str) -> Iterator[Program]:
-    program = start_simulator(port)
-    program.wait_for('link open')
-    yield program
-
-
 @pytest.mark.parametrize('number', SIGNALS, ids=lambda number: number.name)
 @pytest.mark.parametrize(('moment', 'count', 'longest'), [
-    (bridge_starting, 8, 0.5), (bridge_connecting, 6, 0.5), (bridge_in_a_command, 4, 0.3),
-    (simulator_starting, 6, 0.3), (simulator_running, 4, 0.3),
+    (bridge_starting, 8, 0.5), (bridge_in_a_command, 4, 0.3), (simulator_starting, 6, 0.3),
 ], ids=lambda value: getattr(value, '__name__', None) or f'up to {value}')
 def test_program_ends_with_status_0_and_without_a_traceback(
     ros: Ros, moment: Moment, count: int, longest: float, number: signal.Signals,

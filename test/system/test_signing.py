@@ -18,16 +18,14 @@ from collections.abc import Callable
 from pathlib import Path
 import socket
 
-from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.mavlink.signing import ticks
 from illuminator_ros.mavlink.signing_files import TimestampStore
 import pytest
 from support.ports import free_port
-from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
-from support.slow import pass_time_until
+from support.ros import Parameters, Ros, running_bridge, running_simulator
 from support.waiting import PATIENCE
 
-SECRET, OTHER_SECRET = 'correct horse', 'battery staple'
+SECRET = 'correct horse'
 KeyFile = Callable[[str], str]
 
 
@@ -40,13 +38,6 @@ def key_file(tmp_path: Path) -> KeyFile:
         path.chmod(0o600)
         return str(path)
     return make
-
-
-def link_value(key: str) -> Callable[[DiagnosticArray], int]:
-    """Return a function that reads a value of the link from diagnostics."""
-    def read(array: DiagnosticArray) -> int:
-        return int({entry.key: entry.value for entry in array.status[0].values}[key])
-    return read
 
 
 def test_programs_with_the_same_key_find_each_other_and_show_it_nowhere(
@@ -66,24 +57,6 @@ def test_programs_with_the_same_key_find_each_other_and_show_it_nowhere(
         assert SECRET not in bridge.log + simulator.log
 
 
-@pytest.mark.parametrize(('mode', 'simulator_mode', 'counter'), [
-    ('require', 'off', 'unsigned_frames'), ('require', 'sign', 'signatures_bad')])
-def test_sender_without_the_key_is_not_heard_and_its_frames_are_counted(
-    own_ros: Ros, key_file: KeyFile, mode: str, simulator_mode: str, counter: str,
-) -> None:
-    port = free_port()
-    options = () if simulator_mode == 'off' else (
-        '--signing-mode', simulator_mode, '--signing-key-file', key_file(OTHER_SECRET))
-    with (running_bridge(own_ros.domain, port, signing_mode=mode,
-                         signing_key_file=key_file(SECRET)) as bridge,
-          running_simulator(f'udpout://127.0.0.1:{port}', *options)):
-        diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-
-        pass_time_until(lambda: any(map(link_value(counter), list(diagnostics.messages))))
-
-        assert bridge.count('light 1/243 connected') == 0
-
-
 def test_bridge_signs_on_from_the_time_stamp_that_the_run_before_has_stored(
     own_ros: Ros, key_file: KeyFile,
 ) -> None:
@@ -98,20 +71,3 @@ def test_bridge_signs_on_from_the_time_stamp_that_the_run_before_has_stored(
             signature = light.recv(280)[-13:]
 
     assert later < int.from_bytes(signature[1:7], 'little') < later + 1000
-
-
-def test_light_that_requires_signing_is_recognised_while_signing_is_off(
-    own_ros: Ros, key_file: KeyFile,
-) -> None:
-    port = free_port()
-    with (running_bridge(own_ros.domain, port) as bridge,
-          running_simulator(f'udpout://127.0.0.1:{port}', '--signing-mode', 'require',
-                            '--signing-key-file', key_file(SECRET))):
-        pass_time_until(lambda: bridge.count('light 1/243 connected'), step=0.1)
-        diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-
-        pass_time_until(lambda: any(
-            'commands are not answered' in array.status[0].message
-            and 'signing_mode is off' in array.status[0].message
-            for array in list(diagnostics.messages)))
-        bridge.wait_for('signing_mode is off: set signing_mode and signing_key_file')

@@ -46,6 +46,9 @@ from ...ros.throttled_log import NodeLog
 INTERVAL = 0.25
 # s without a new light until the table is taken for complete.
 SETTLING = 1.0
+# s; an interpreter that ends while the thread is inside rclpy aborts. A signal does not wait so
+# long.
+END_LIMIT = 5.0
 # Characters; enough for each column of a table for a file or a pipe.
 PLAIN_WIDTH = 400
 DESCRIPTION = """\
@@ -85,7 +88,7 @@ class Monitor:
     def end(self) -> None:
         """End the thread."""
         self._executor.end()
-        self._thread.join(0.3)
+        self._thread.join(END_LIMIT)
 
 
 def parser() -> argparse.ArgumentParser:
