@@ -16,16 +16,19 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 from pathlib import Path
 import select
+import struct
+import termios
 
 from illuminator_ros.mavlink.transport import open_channel
 from illuminator_ros.mavlink.transport.serial import MAX_UNREAD
 from illuminator_ros.mavlink.url import PtyUrl
 import pytest
 from support.open_channel import Open, OpenChannel
-from support.waiting import PATIENCE
+from support.waiting import eventually, PATIENCE
 
 
 def device_of(channel: OpenChannel) -> int:
@@ -72,11 +75,18 @@ def test_a_path_that_cannot_be_the_link_is_named(tmp_path: Path, path: str, reas
     assert (tmp_path / 'file').read_text() == 'precious'
 
 
+def unread(device: int) -> int:
+    return int(struct.unpack('i', fcntl.ioctl(device, termios.FIONREAD, bytes(4)))[0])
+
+
 def test_bytes_that_no_program_reads_are_discarded_and_the_newest_are_kept(channel: Open) -> None:
     one = channel(PtyUrl())
-    for number in range(100):
-        one.broadcast(bytes((number,)) * 100)
     device = device_of(one)
+    for number in range(100):
+        before = unread(device)
+        one.broadcast(bytes((number,)) * 100)
+        # The kernel delivers them a little later.
+        eventually(lambda: unread(device) != before)  # noqa: B023 - called at once
     data = read(device)
 
     assert len(data) <= MAX_UNREAD + 100

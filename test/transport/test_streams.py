@@ -350,5 +350,6 @@ def test_bytes_that_a_line_does_not_take_do_not_delay_closing(
 
     monkeypatch.setattr(Serial, 'close', close)
     ours = channel(f'serial://{device.path}:57600')
+    steps.clear()
     ours.channel.close()
     assert steps[:2] == [termios.TCOFLUSH, 'closed']
