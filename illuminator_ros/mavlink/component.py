@@ -120,9 +120,11 @@ class Payload(Protocol):
 
     def poll(self, now: float) -> None:
         """Do everything that is due."""
+        return
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
+        return math.inf
 
 
 class HeartbeatTimer:
