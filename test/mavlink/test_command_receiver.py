@@ -49,6 +49,9 @@ class Turner(Payload):
         self.results = list(results)
         self.executed: list[AnyCommand] = []
 
+    def poll(self, now: float) -> None:
+        return
+
     def next_deadline(self) -> float:
         return math.inf
 
