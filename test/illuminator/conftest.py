@@ -17,7 +17,6 @@
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
-from support.loss_table import LOSS_TABLE, LossTable
 
 
 @pytest.fixture
@@ -36,17 +35,3 @@ def fake() -> FakeLight:
 def faked(fake: FakeLight) -> Pair:
     """Return a controller and the light ``fake`` that know each other."""
     return Pair(fake).settle()
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.stash[LOSS_TABLE] = LossTable()
-
-
-def pytest_terminal_summary(
-    terminalreporter: pytest.TerminalReporter, config: pytest.Config,
-) -> None:
-    table = config.stash[LOSS_TABLE]
-    if table.cells:
-        terminalreporter.section('commands over lossy lines')
-        for line in table.lines():
-            terminalreporter.write_line(line)

@@ -16,7 +16,6 @@
 
 from typing import Any
 
-from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
 from illuminator_ros.payload.faults import FaultError
@@ -45,18 +44,6 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over() -> N
     assert active(bench) == []
 
 
-def test_a_silence_without_an_end_lasts() -> None:
-    bench = LightBench('silence')
-    assert (bench.run(5000.0), active(bench)) == ([], ['silence'])
-
-
-def test_a_light_with_the_fault_reboot_restarts_at_its_interval() -> None:
-    bench = LightBench('reboot=4')
-    bench.run(9.9)
-    assert [status.uptime_ms for _, status in bench.of(IlluminatorStatus)] == [
-        0, 1000, 2000, 3000, 0, 1000, 2000, 3000, 0, 1000]
-
-
 @pytest.mark.parametrize('fault', ['slow=2', 'progress=2', 'delay=3'])
 def test_a_restart_drops_unfinished_commands_and_delayed_messages(fault: str) -> None:
     bench = LightBench(fault, status_interval=0.0)
@@ -67,27 +54,6 @@ def test_a_restart_drops_unfinished_commands_and_delayed_messages(fault: str) ->
     bench.sent.clear()
     bench.run(5.0)
     assert (acks(bench), bench.lamp.enabled) == ([], False)
-
-
-def test_a_failed_thermistor_measures_nothing_and_sees_no_heat_until_it_is_cleared() -> None:
-    bench = LightBench('thermistor')
-    bench.lamp.heat_to(120.0, 0.0)
-    assert (bench.status().error_status, bench.status().temp_c) == (4, 0.0)
-    bench.lamp.heat_to(25.0, 0.0)
-    bench.component.behave(NORMAL, 0.0)
-    assert (bench.status().error_status, bench.status().temp_c) == (0, 25.0)
-
-
-@pytest.mark.parametrize(('fault', 'result'), [
-    ('refuse', MavResult.DENIED), ('refuse=failed', MavResult.FAILED),
-    ('refuse=MAV_RESULT_NOT_IN_CONTROL', MavResult.NOT_IN_CONTROL)])
-def test_changes_are_refused_with_the_given_result_and_requests_are_not(
-    fault: str, result: MavResult,
-) -> None:
-    bench = LightBench(fault)
-    assert bench.result(*ON) == result
-    assert bench.result(MavCmd.REQUEST_MESSAGE, STATUS_ID) == MavResult.ACCEPTED
-    assert not bench.lamp.enabled
 
 
 def test_progress_is_reported_until_the_change_and_rejects_a_second_command() -> None:
@@ -110,37 +76,10 @@ def test_a_busy_light_rejects_some_changes_temporarily_and_is_then_normal() -> N
     assert bench.lamp.enabled
 
 
-def test_a_slow_light_answers_and_acts_late() -> None:
-    bench = LightBench('slow=1.5')
-    bench.command(*ON)
-    bench.run(1.4)
-    assert not bench.lamp.enabled
-    bench.run(0.2)
-    assert (acks(bench), bench.lamp.enabled) == ([(1.5, MavResult.ACCEPTED)], True)
-
-
-def test_a_light_with_the_fault_lie_accepts_changes_and_ignores_them() -> None:
-    bench = LightBench('lie')
-    assert (bench.result(*ON), bench.status().enable) == (MavResult.ACCEPTED, 0)
-
-
 @pytest.mark.parametrize(('fault', 'low', 'high'), [
     ('drop=0.2', 140, 180), ('drop=1', 0, 0), ('duplicate=0.25', 230, 270)])
 def test_a_share_of_the_messages_is_lost_or_doubled(fault: str, low: float, high: float) -> None:
     assert low <= len(LightBench(fault, status_interval=0.0).run(199.5)) <= high
-
-
-def test_a_share_of_the_messages_has_a_wrong_checksum() -> None:
-    sent = LightBench('corrupt=0.5', status_interval=0.0).run(199.5)
-    assert 80 <= sum(one.crc_extra != Heartbeat.crc_extra for one in sent) <= 120
-    assert Heartbeat.crc_extra == 50
-
-
-def test_messages_are_delayed_by_up_to_the_given_time() -> None:
-    bench = LightBench('delay=0.5', status_interval=0.0)
-    bench.run(50.0)
-    late = [at % 1.0 for at, _ in bench.sent]
-    assert min(late) > 0.0 and 0.3 < max(late) < 0.5
 
 
 @pytest.mark.parametrize('fault', ['drop', 'duplicate', 'delay', 'corrupt'])
@@ -151,15 +90,6 @@ def test_the_same_seed_gives_the_same_faults(fault: str) -> None:
         return [(at, message.crc_extra) for at, message in bench.sent]
 
     assert run(1) == run(1) != run(2)
-
-
-def test_a_fault_can_start_and_end_while_the_light_runs() -> None:
-    bench = LightBench()
-    beats = []
-    for behaviour in (NORMAL, FAULTS.add(NORMAL, 'drop=1'), NORMAL):
-        bench.component.behave(behaviour, bench.now)
-        beats.append(sum(isinstance(one, Heartbeat) for one in bench.run(2.0)))
-    assert beats == [3, 0, 2]
 
 
 @pytest.mark.parametrize('name', FAULTS)

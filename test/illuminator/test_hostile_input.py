@@ -19,20 +19,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 import itertools
 import math
-import struct
 from typing import Any
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import checked
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import (
     Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    ComponentInformationBasic,
     Heartbeat,
     LAYOUTS,
 )
@@ -45,54 +37,7 @@ from illuminator_ros.payload.request import MAX_WAITING, Result
 import pytest
 from support.fake_light import status_message
 from support.frames import frame_of, heartbeat_frame, raw_v2
-from support.siege import BRIDGE, BridgeSiege, GENUINE, LightSiege, Siege, SIEGES
-
-PEER = ('127.0.0.1', 40_000)
-
-# Every value of every field
-
-FLOAT = st.floats(width=32) | st.sampled_from([math.nan, math.inf, -math.inf, 1e-45, 3.4e38, -0.0])
-BYTE = st.integers(0, 0xFF)
-LONG = st.integers(0, 0xFFFFFFFF)
-COMMAND = st.sampled_from([405, 406, 511, 512]) | st.integers(0, 0xFFFF)
-SOURCE = st.sampled_from([GENUINE, BRIDGE, Address(1, 1)]) | st.builds(Address, BYTE, BYTE)
-TARGET = [BYTE | st.just(1), BYTE | st.sampled_from([0, 194, 243])]
-INT32 = st.integers(-0x80000000, 0x7FFFFFFF)
-
-
-def char(size: int) -> st.SearchStrategy[bytes]:
-    """Return whatever may stand in a char field, terminated or not."""
-    return st.binary(max_size=size) | st.text(max_size=size).map(
-        lambda text: text.encode('utf-8', 'replace')[:size])
-
-
-MESSAGE = st.one_of(
-    st.builds(Heartbeat, st.just(44) | BYTE, BYTE, BYTE, LONG, BYTE, BYTE),
-    st.builds(IlluminatorStatus, LONG, BYTE, BYTE, LONG, BYTE, *[FLOAT] * 6),
-    st.builds(ComponentInformationBasic, LONG, st.integers(0, (1 << 64) - 1), LONG, char(32),
-              char(32), char(24), char(24), char(32)),
-    st.builds(CommandAck, COMMAND, st.integers(0, 10) | BYTE, BYTE, INT32, *TARGET),
-    st.builds(CommandLong, *TARGET, COMMAND, BYTE, *[FLOAT] * 7),
-    st.builds(CommandInt, *TARGET, BYTE, COMMAND, BYTE, BYTE, *[FLOAT] * 4, INT32, INT32, FLOAT))
-FRAME = st.builds(frame_of, MESSAGE, BYTE, SOURCE)
-PIECE = FRAME | st.builds(
-    lambda message_id, payload, source, flags: raw_v2(
-        message_id, payload, source=source, incompat=flags),
-    st.sampled_from(sorted(LAYOUTS)), st.binary(max_size=255), SOURCE,
-    st.sampled_from([0, 1, 2, 255])) | st.binary(max_size=300)
-
-
-@pytest.mark.parametrize('kind', sorted(SIEGES))
-@given(pieces=st.lists(PIECE, min_size=1, max_size=20))
-@settings(max_examples=60, deadline=None, derandomize=True)
-def test_arbitrary_bytes_break_nothing(kind: str, pieces: list[bytes]) -> None:
-    siege = SIEGES[kind]('hypothesis', SigningMode.OFF)
-    for piece in pieces:
-        siege.link.receive((piece, PEER))
-        siege.link.run(0.05)
-    siege.check_bounds()
-    siege.check_service()
-    siege.close()
+from support.siege import BridgeSiege, GENUINE, Siege, SIEGES
 
 
 @pytest.mark.parametrize(('kind', 'mode'), list(itertools.product(sorted(SIEGES), SigningMode)))
@@ -216,20 +161,3 @@ def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied
         send_status(bridge, mode=mode, strobe_period=440.0)
     assert light.snapshot(0.0).configuration.strobe_period == 440.0
     bridge.check_service()
-
-
-@pytest.mark.parametrize('param', [math.nan, math.inf, -math.inf, -1.0, 0.5, 3.4e38])
-@pytest.mark.parametrize('command', [405, 406, 511, 512])
-def test_a_light_refuses_params_that_mean_nothing(command: int, param: float) -> None:
-    siege = LightSiege('params', SigningMode.OFF)
-    siege._acks.clear()
-    siege._command(command, *[param] * 7)
-    assert [ack.result for ack in siege._acks] == [2]
-    siege.check_service()
-    siege.close()
-
-
-def test_floats_survive_the_wire_as_they_are() -> None:
-    # Or the tests above would be none.
-    frame = frame_of(status_message(brightness=math.nan))
-    assert math.isnan(struct.unpack('<f', frame[18:22])[0])

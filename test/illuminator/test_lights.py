@@ -20,11 +20,9 @@ from typing import Any
 
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import STATUS_ID
-from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import (
     Address,
-    CommandInt,
     ComponentInformationBasic,
     decode_payload,
     encode_payload,
@@ -44,11 +42,6 @@ CONFIGURE, REQUEST = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.REQUEST_MESSAGE
 def requests_of(pair: Pair, message_id: int, since: float = 0.0) -> int:
     """Return how often a message was requested."""
     return [command.param1 for command in pair.commands(REQUEST, since=since)].count(message_id)
-
-
-def shown(pair: Pair) -> Status:
-    assert pair.light.status is not None
-    return pair.light.status
 
 
 def without_clock(stream: float = 1.0) -> FakeLight:
@@ -100,17 +93,6 @@ def test_a_lost_link_loses_the_light_at_once_and_a_new_one_finds_it(pair: Pair) 
     assert pair.recorder.events[-1] == 'connected'
 
 
-def test_a_light_is_found_before_its_next_heartbeat_when_the_link_is_open_again() -> None:
-    light = FakeLight(stream=0.0)
-    light.link_opened = lambda now: None  # type: ignore[method-assign]
-    pair = Pair(light).settle()
-    pair.close()
-    light.heartbeat.due = pair.now + 60
-    pair.open()
-    pair.run(0.1)
-    assert pair.light.connected
-
-
 def test_a_link_that_is_open_again_is_not_filled_with_requests() -> None:
     pair = Pair([IlluminatorProperties(address=Address(1, 1 + i))
                  for i in range(24)]).settle()
@@ -157,22 +139,6 @@ def test_a_light_without_a_clock_may_have_restarted_whichever_message_comes_firs
     light.delay_status(status)
     pair.run(3.0)
     assert pair.recorder.events[2:] == ['connected', 'restarted']
-
-
-def test_an_uptime_that_wraps_is_not_a_restart(fake: FakeLight) -> None:
-    fake.boot = START - 2 ** 32 / 1000 + 5.0
-    pair = Pair(fake).settle(20.0)
-    assert shown(pair).uptime_ms < 20_000
-    assert pair.recorder.events == ['connected']
-
-
-def test_a_late_status_is_not_published(fake: FakeLight, faked: Pair) -> None:
-    newest = faked.light.status
-    fake.send(fake.status(faked.now - 2.0))
-    faked.turn()
-    faked.run(0.01)
-    assert faked.light.status is newest
-    assert faked.recorder.statuses[-1] is newest
 
 
 @pytest.mark.parametrize(('dark', 'events'), [
@@ -333,74 +299,6 @@ def test_a_light_that_ignores_the_request_for_its_identity_confirms_changes_as_f
 
 
 # Lights in the field
-
-class GuideEmulator(FakeLight):
-    """Address 255/0, acknowledges first and without a target, has no clock and no COMMAND_INT."""
-
-    def __init__(self) -> None:
-        super().__init__(Address(255, 0), min_strobe_period=0.0)
-        self.targeted = False
-        self.apply_after = 0.001
-        self.boot = None
-
-    def receive(self, source: Address, message: Any, now: float) -> None:
-        if not isinstance(message, CommandInt):
-            super().receive(source, message, now)
-
-
-class ArduSub(FakeLight):
-    """The lights of an autopilot: no heartbeat as a light, and on is what has a brightness."""
-
-    def __init__(self) -> None:
-        super().__init__(Address(1, 1), heartbeat_type=12, mode_bitmask=2, brightness=0.0,
-                         temp_c=0.0, min_strobe_period=0.0, max_strobe_period=0.0)
-        self.last = 50.0
-
-    def _apply(self, message: Any, now: float) -> None:
-        if message.command == CONFIGURE:
-            self.fields['brightness'] = message.param2
-        else:
-            self.fields['brightness'] = self.last if message.param1 else 0.0
-        self.last = self.fields['brightness'] or self.last
-        self.fields['enable'] = int(self.fields['brightness'] > 0)
-
-
-def test_the_emulator_of_the_developer_guide_is_served_and_restored() -> None:
-    light = GuideEmulator()
-    pair = Pair(light).settle()
-    assert pair.light.address == Address(255, 0)
-    assert pair.enable(True).success
-    assert pair.configure(brightness=30, strobe_period=1, strobe_duty_cycle=50).success
-    pair.run(120.0)
-    assert pair.recorder.events == ['connected']
-    light.fields['brightness'] = float('nan')
-    pair.run(2.0)
-    assert shown(pair).invalid == ('brightness nan',)
-    light.silent = True
-    pair.run(10.0)
-    light.silent = False
-    light.restart(pair.now)
-    pair.run(5.0)
-    assert light.fields['brightness'] == 30.0
-    assert not any(isinstance(message, CommandInt) for message in pair.commands())
-
-
-def test_the_lights_of_ardusub_are_served_without_a_strobe_and_a_temperature() -> None:
-    pair = Pair(ArduSub()).settle()
-    assert pair.light.address == Address(1, 1)
-    assert pair.recorder.events == ['connected']
-    assert pair.light.temperature is None
-    assert not pair.light.limits.known
-    for on, brightness in ((True, 50.0), (False, 0.0)):
-        assert pair.enable(on).success
-        assert shown(pair).brightness == brightness
-    for brightness in (70.0, 0.0):
-        assert pair.configure(brightness=brightness).success
-        assert shown(pair).enabled is bool(brightness)
-    result = pair.configure(brightness=70, strobe_period=1)
-    assert not result.success
-    assert 'shows strobe_period 0 s' in result.message
-
 
 def test_a_light_that_supports_its_own_two_commands_only_is_served() -> None:
     pair = Pair(FakeLight(stream=0.5, results={

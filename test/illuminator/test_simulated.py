@@ -23,16 +23,13 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import (
     Address,
-    CommandAck,
     CommandInt,
     CommandLong,
-    ComponentInformationBasic,
     encode_payload,
     Heartbeat,
     INFORMATION_ID,
     MavCmd,
     MavResult,
-    MavType,
 )
 from illuminator_ros.payload.identity import Identity
 import pytest
@@ -57,19 +54,6 @@ def statuses(messages: Iterable[Any]) -> list[IlluminatorStatus]:
     return [message for message in messages if isinstance(message, IlluminatorStatus)]
 
 
-def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start() -> None:
-    beats = [m for m in LightBench().run(4.5) if isinstance(m, Heartbeat)]
-    assert {(m.type, m.autopilot) for m in beats} == {(MavType.ILLUMINATOR, 8)}
-    assert len(beats) == 5
-
-
-@pytest.mark.parametrize(('interval', 'expected'), [(1.0, 5), (0.5, 9), (0.1, 45), (0.0, 0)])
-def test_statuses_are_sent_at_the_interval_of_the_properties(
-    interval: float, expected: float,
-) -> None:
-    assert len(statuses(LightBench(status_interval=interval).run(4.45))) == expected
-
-
 def test_a_stream_keeps_its_rate_when_polled_late_and_leaves_out_what_it_missed() -> None:
     bench = LightBench(status_interval=0.1)
     for turn in range(101):
@@ -84,37 +68,12 @@ def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench: LightBench
     assert bench.lamp.uptime_ms(2 ** 32 / 1000 + 1.5) == 1500
 
 
-def test_a_requested_message_follows_its_acknowledgement(bench: LightBench) -> None:
-    ack, status = bench.command(REQUEST, STATUS_ID)
-    assert (type(ack), ack.result, ack.command) == (CommandAck, ACCEPTED, REQUEST)
-    assert (ack.target_system, ack.target_component) == GROUND
-    assert (status.uptime_ms, status.enable, status.mode, status.brightness) == (500, 0, 1, 100.0)
-    ack, information = bench.command(REQUEST, INFORMATION_ID)
-    assert (ack.result, type(information)) == (ACCEPTED, ComponentInformationBasic)
-    assert Identity.from_message(information).serial_number == 'SIM-1-243'
-
-
 def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
     bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
     _, information = bench.command(REQUEST, INFORMATION_ID)
     assert encode_payload(information)[16:] == (
         b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
         + b'n' * 31 + b'\0')
-
-
-@pytest.mark.parametrize(('command', 'params', 'result'), [
-    *((REQUEST, (message_id,), DENIED) for message_id in (0, 1, 33, NAN, INF, -1, 440.5)),
-    *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, INFORMATION_ID, NAN)),
-    *((SET_INTERVAL, (STATUS_ID, interval), DENIED) for interval in (NAN, INF, -INF, -2, -0.5)),
-    *((command, (), MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
-    *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
-def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
-    bench: LightBench, command: MavCmd, params: tuple[float, ...], result: MavResult,
-) -> None:
-    (ack,) = bench.command(command, *params)
-    assert ack.result == result
-    assert bench.status().enable == 0
-    assert len(statuses(bench.run(3.0))) == 3
 
 
 @pytest.mark.parametrize(('microseconds', 'expected'), [
@@ -126,22 +85,6 @@ def test_the_interval_of_the_status_can_be_set_within_what_the_light_offers(
     assert len(statuses(bench.run(2.001))) == expected
 
 
-def test_the_default_interval_starts_a_stopped_stream_again(bench: LightBench) -> None:
-    bench.command(SET_INTERVAL, STATUS_ID, -1)
-    bench.command(SET_INTERVAL, STATUS_ID, 0)
-    assert len(statuses(bench.run(3.0))) == 3
-
-
-@pytest.mark.parametrize(('target', 'enabled'), [
-    ((0, 0), True), ((1, 0), True), ((1, 243), True), ((0, 243), True),
-    ((1, 244), False), ((2, 243), False), ((2, 0), False), ((255, 190), False)])
-def test_a_command_is_obeyed_only_by_its_target(
-    bench: LightBench, target: tuple[int, int], enabled: bool,
-) -> None:
-    assert bool(bench.command(ON_OFF, 1, target=target)) is enabled
-    assert bench.lamp.enabled is enabled
-
-
 @pytest.mark.parametrize(('target', 'enabled'), [((1, 244), [False, True]), ((0, 0), [True] * 2)])
 def test_lights_on_one_link_obey_only_their_own_commands(
     target: tuple[int, int], enabled: list[bool],
@@ -151,12 +94,6 @@ def test_lights_on_one_link_obey_only_their_own_commands(
     lights.receive(GROUND, CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
     assert [light.device.enabled for light in lights.components] == enabled
     assert len({source for source, _ in lights.outgoing}) == sum(enabled)
-
-
-def test_messages_that_are_not_commands_are_not_answered(bench: LightBench) -> None:
-    for message in (Heartbeat(18, 8, 0, 0, 4, 3), CommandAck(405, 0, 0, 0, 1, 243)):
-        bench.component.receive(GROUND, message, bench.now)
-    assert not bench.component.outgoing
 
 
 @pytest.mark.parametrize('form', [CommandLong, CommandInt])
@@ -184,18 +121,6 @@ def test_one_wrong_value_denies_the_whole_configuration(
     params[position] = value
     (ack,) = bench.command(CONFIGURE, *params)
     assert (ack.result, bench.shown()) == (DENIED, before)
-
-
-def test_a_change_sends_no_status_while_the_stream_is_off() -> None:
-    assert len(LightBench(status_interval=0.0).command(ON_OFF, 1)) == 1
-
-
-def test_switching_and_configuring_do_not_affect_each_other(bench: LightBench) -> None:
-    bench.command(CONFIGURE, 2, 50, 1, 25)
-    bench.command(ON_OFF, 1)
-    assert bench.shown() == (2, 50, 1, 25)
-    bench.command(CONFIGURE, 1, 60, 0, 0)
-    assert bench.lamp.enabled
 
 
 def test_a_restart_resets_the_settings_and_keeps_the_temperature() -> None:
@@ -236,10 +161,3 @@ def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
     bench.command(CONFIGURE, 1, brightness, period, duty_cycle)
     bench.now = 100.0
     assert bench.status().temp_c == pytest.approx(40.0 + rise, abs=0.1)
-
-
-def test_heating_can_be_faster_than_real_time() -> None:
-    bench = LightBench(thermal=HOT, time_scale=8.0)
-    bench.command(ON_OFF, 1)
-    bench.now = 1.0
-    assert bench.status().error_status == 1

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 import re
 from typing import Any
 
-from illuminator_ros.illuminator.configuration_manager import CONFIGURE_LIMIT
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import Mode
@@ -146,8 +145,7 @@ class Judge:
                 groups[-1].append((at, sent))
         match = TRIES.search(request.message)
         assert match is not None, request
-        # The failure of a setpoint may be that of one before it; and a command sent at the very
-        # end may be the next one, or the last repeat of this one.
+        # A command sent at the very end may be the next one, or the last repeat of this one.
         return max((group for group in groups if len(group) == int(match[1])), key=lambda group: (
             group[0][0] >= request.answer.asked_at
             and request.wish.items() <= asked_for(group[0][1]).items(),
@@ -176,14 +174,8 @@ class Judge:
                        request, CommandAck, self._tries(request)[0][0] - 1e-6))
 
     def _doubtful(self, request: Request) -> str:
-        # A setpoint may have been under way when it was published again.
-        since = request.answer.asked_at - CONFIGURE_LIMIT
-        return '' if self._received(request, CommandAck, since) else 'not acknowledged'
-
-    def _taken(self, request: Request) -> str:
-        states = self._witnesses[request.light.address].states(
-            request.answer.asked_at, request.answer.ended_at)
-        return '' if any(state.matches(request.wish) for state in states) else 'never done'
+        return '' if self._received(
+            request, CommandAck, request.answer.asked_at) else 'not acknowledged'
 
     def _confirmed(self, request: Request) -> str:
         if not self._accepted(request):
@@ -230,10 +222,8 @@ class Judge:
 
 
 # An answer: the kind of outcome, whether it is a success, whether it is true.
-TAKEN = 'taken as agreed'
 _CHECKS: dict[str, tuple[str, bool, Callable[[Judge, Request], str]]] = {
     'confirmed by ILLUMINATOR_STATUS': ('confirmed', True, Judge._confirmed),
-    TAKEN: ('confirmed', True, Judge._taken),
     'may be that of an earlier command': ('doubtful', False, Judge._doubtful),
     'no acknowledgement': ('no acknowledgement', False, Judge._not_acknowledged),
     'but ILLUMINATOR_STATUS shows': ('not shown', False, Judge._not_shown),
