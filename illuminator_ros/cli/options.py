@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import sys
 import time
 from typing import NoReturn
@@ -83,8 +83,26 @@ def address(text: str) -> Address:
 
 def add_mavlink_version(parser: argparse.ArgumentParser) -> None:
     """Add the option that selects the version of the frames that are sent."""
-    parser.add_argument('--mavlink-version', type=int, choices=(1, 2), default=2,
-                        help='MAVLink version of sent frames; both are received (default: 2)')
+    parser.add_argument('--mavlink-version', type=int, choices=(1, 2),
+                        help='MAVLink version of sent frames; both are received (default: what '
+                             'the devices need)')
+
+
+def mavlink_version(chosen: int | None, needed: Mapping[str, int | None]) -> int:
+    """
+    Return the version of the frames that are sent.
+
+    :param chosen: the value of the option, None without it.
+    :param needed: the version that each kind of device needs, None where both will do.
+    :raises ValueError: if they differ.
+    """
+    needs = {kind: version for kind, version in needed.items() if version}
+    versions = {*needs.values(), *([chosen] if chosen else [])}
+    if len(versions) < 2:
+        return max(versions, default=2)
+    text = ', '.join(f'a {kind} needs MAVLink {version}' for kind, version in needs.items())
+    raise ValueError(f'--mavlink-version {chosen}: {text}' if chosen else
+                     f'{text}: a link sends one version, so start a program for each')
 
 
 def add_signing(parser: argparse.ArgumentParser) -> None:

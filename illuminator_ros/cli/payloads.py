@@ -25,5 +25,5 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
         simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
         checks='illuminator_ros.illuminator.checks.catalogue:CHECKS'),
-    PayloadType('gimbal', simulated='illuminator_ros.gimbal.simulated_device:SIMULATED'),
+    PayloadType('rededge', simulated='illuminator_ros.rededge.simulated:SIMULATED'),
 )}

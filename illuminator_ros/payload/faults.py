@@ -44,6 +44,8 @@ class Behaviour:
 
     :param heartbeat_type: MAV_TYPE.
     :param heartbeat_autopilot: MAV_AUTOPILOT.
+    :param heartbeat_base_mode: base_mode.
+    :param heartbeat_custom_mode: custom_mode.
     :param heartbeat_state: MAV_STATE.
     :param heartbeat_interval: s, 0 for no heartbeat.
     :param fixed_rate: whether MAV_CMD_SET_MESSAGE_INTERVAL only starts and stops a stream.
@@ -52,6 +54,9 @@ class Behaviour:
     :param on_request: whether a streamed message can be requested.
     :param status_on_change: whether each change is followed by the streamed messages.
     :param filters_target: whether messages to other addresses are ignored.
+    :param adopts_system_id: whether it takes over the system id of every message that it
+        receives, and ignores target_system.
+    :param answers_commands: whether it answers COMMAND_LONG and COMMAND_INT.
     :param answers_command_int: whether it answers COMMAND_INT.
     :param answers_broadcast: whether it answers messages to all components.
     :param acks_target: whether COMMAND_ACK has a target.
@@ -75,6 +80,8 @@ class Behaviour:
 
     heartbeat_type: int = 0
     heartbeat_autopilot: int = MAV_AUTOPILOT_INVALID
+    heartbeat_base_mode: int = 0
+    heartbeat_custom_mode: int = 0
     heartbeat_state: int = MAV_STATE_ACTIVE
     heartbeat_interval: float = 1.0
     fixed_rate: bool = False
@@ -83,6 +90,8 @@ class Behaviour:
     on_request: bool = True
     status_on_change: bool = True
     filters_target: bool = True
+    adopts_system_id: bool = False
+    answers_commands: bool = True
     answers_command_int: bool = True
     answers_broadcast: bool = True
     acks_target: bool = True
@@ -144,8 +153,6 @@ class Fault:
         """Return a value as it is typed, '' if there is none to type."""
         if self.read is None or value == math.inf:
             return ''
-        if isinstance(value, str):
-            return value
         return value.name.lower() if isinstance(value, MavResult) else f'{value:.10g}'
 
 

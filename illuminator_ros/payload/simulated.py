@@ -111,6 +111,7 @@ class SimulatedDevice(ABC):
     No I/O; ``now`` is s on the link's clock.
 
     :param behaviour: how it behaves at first, and without faults.
+    :ivar records: rows of the payload's :class:`RecordType`.
     :cvar messages: the classes of the messages that it takes, besides commands.
     :cvar sends: the classes of its messages.
     :cvar changes: the MAV_CMDs that change its state.
@@ -126,6 +127,7 @@ class SimulatedDevice(ABC):
 
     def __init__(self, behaviour: Behaviour) -> None:
         self.behaviour = self.normal = behaviour
+        self.records: Listeners[Sequence[str]] = Listeners()
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
@@ -133,6 +135,9 @@ class SimulatedDevice(ABC):
 
     def restart(self, now: float) -> None:  # noqa: B027 - optional
         """Return to the state after a power cycle, if it differs."""
+
+    def set_clock(self, unix_time: float, now: float) -> None:  # noqa: B027 - optional
+        """Take the time of day (s, UTC), as from a GPS receiver of its own."""
 
     @abstractmethod
     def streams(self) -> Mapping[int, float]:
@@ -145,6 +150,18 @@ class SimulatedDevice(ABC):
     def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
         """Take a message of one of the classes of ``messages``; return the messages to send."""
         return ()
+
+    def sender(self, message: Message, own: Address) -> Address:
+        """Return the address from which it sends a message, if that is not its own."""
+        return own
+
+    def poll(self, now: float) -> Iterable[Message]:
+        """Do what is due, besides streams; return the messages to send."""
+        return ()
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, s."""
+        return math.inf
 
     @abstractmethod
     def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
@@ -159,6 +176,20 @@ D = TypeVar('D', bound=SimulatedDevice)
 
 
 @dataclass(frozen=True)
+class RecordType:
+    """
+    Records that devices make, and that the simulator writes to a file as CSV.
+
+    :param option: names the file, as in ``--images FILE``.
+    :param columns: the names in its first line.
+    """
+
+    option: str
+    help: str  # noqa: A003
+    columns: Sequence[str]
+
+
+@dataclass(frozen=True)
 class SimulatedType(Generic[D]):
     """
     The simulated side of a payload, as the simulator offers it.
@@ -170,7 +201,11 @@ class SimulatedType(Generic[D]):
         ValueError if the settings contradict each other.
     :param address: the address by default, from settings.
     :param profiles: descriptions of the values of the setting ``profile``.
-    :param notes: further paragraphs of ``--help``.
+    :param examples: command lines for ``--help``.
+    :param notes: further paragraphs of it.
+    :param records: records that it makes, None for none.
+    :param mavlink_version: the only version of MAVLink that it has, None for any.
+    :param url: the link by default.
     """
 
     noun: str
@@ -180,7 +215,11 @@ class SimulatedType(Generic[D]):
     address: Callable[[Mapping[str, Any]], Address]
     settings: Mapping[str, Setting] = field(default_factory=dict)
     profiles: Mapping[str, str] = field(default_factory=dict)
+    examples: Sequence[str] = ()
     notes: str = ''
+    records: RecordType | None = None
+    mavlink_version: int | None = None
+    url: str = 'udpout://127.0.0.1:14590'
 
     @cached_property
     def all_settings(self) -> Mapping[str, Setting]:
@@ -263,7 +302,7 @@ class SimulatedComponent(Generic[D]):
         outgoing: deque[tuple[Address, Any]] | None = None,
         changed: Callable[[], None] = lambda: None,
     ) -> None:
-        self.address = described.address
+        self.address = self._first_address = described.address
         self.name = described.name
         self.device = described.device
         self.outgoing = deque() if outgoing is None else outgoing
@@ -283,6 +322,7 @@ class SimulatedComponent(Generic[D]):
 
     def restart(self, now: float) -> None:
         """Restart, as after a power cycle."""
+        self.address = self._first_address
         self.device.restart(now)
         self._streams = {message_id: _Stream(interval, now)
                          for message_id, interval in self.device.streams().items()}
@@ -326,6 +366,8 @@ class SimulatedComponent(Generic[D]):
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
         behaviour = self.behaviour
         system, component = message.target_system, message.target_component
+        if behaviour.adopts_system_id:
+            system = self.address.system
         if (system, component) == self.address or not behaviour.filters_target:
             return True
         return bool(behaviour.answers_broadcast and (
@@ -333,14 +375,21 @@ class SimulatedComponent(Generic[D]):
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         """Take a command or a message for this component, or for no one in particular."""
-        if self.silent(now) or hasattr(message, 'target_system') and not self.addressed(message):
-            return
         behaviour = self.behaviour
+        if self.silent(now):
+            return
+        if behaviour.adopts_system_id and source.system:
+            self.address = Address(source.system, self.address.component)
+        if hasattr(message, 'target_system') and not self.addressed(message):
+            return
         if isinstance(message, self.device.messages):
             for sent in self.device.receive(source, message, now):
-                self._send(sent, now)
+                if behaviour.slow:
+                    self._schedule.add(now + behaviour.slow, functools.partial(self._send, sent))
+                else:
+                    self._send(sent, now)
             self._changed()
-        if (not isinstance(message, CommandLong | CommandInt)
+        if (not isinstance(message, CommandLong | CommandInt) or not behaviour.answers_commands
                 or isinstance(message, CommandInt) and not behaviour.answers_command_int):
             return
         if behaviour.slow:
@@ -450,7 +499,7 @@ class SimulatedComponent(Generic[D]):
                 self._transmit(sent, now)
 
     def _transmit(self, message: Message, now: float) -> None:
-        self.outgoing.append((self.address, message))
+        self.outgoing.append((self.device.sender(message, self.address), message))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""
@@ -462,7 +511,8 @@ class SimulatedComponent(Generic[D]):
         behaviour = self.behaviour
         self._heartbeat_due = now + (behaviour.heartbeat_interval or math.inf)
         self._send(Heartbeat(
-            behaviour.heartbeat_type, behaviour.heartbeat_autopilot, 0, 0,
+            behaviour.heartbeat_type, behaviour.heartbeat_autopilot,
+            behaviour.heartbeat_base_mode, behaviour.heartbeat_custom_mode,
             behaviour.heartbeat_state, MAVLINK_VERSION), now)
 
     def poll(self, now: float) -> None:
@@ -479,13 +529,15 @@ class SimulatedComponent(Generic[D]):
             if now >= stream.due:
                 stream.advance(now)
                 self._send(self.device.message(message_id, now), now)
+        for message in self.device.poll(now):
+            self._send(message, now)
         self._changed()
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
         end_of_silence = math.inf if self._silent_until == -math.inf else self._silent_until
         return min(self._heartbeat_due, self._reboot_due, end_of_silence,
-                   self._schedule.next_deadline(),
+                   self._schedule.next_deadline(), self.device.next_deadline(),
                    *(stream.due for stream in self._streams.values()))
 
 

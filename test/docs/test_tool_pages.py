@@ -15,6 +15,7 @@
 """The pages of simulator and conformance, and what these programs have; no ROS is needed."""
 
 from pathlib import Path
+from typing import Any
 
 from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
@@ -22,6 +23,10 @@ from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
 from illuminator_ros.illuminator.simulated_settings import SIMULATED
+from illuminator_ros.payload.faults import FaultTable
+from illuminator_ros.payload.simulated import SimulatedType
+from illuminator_ros.rededge.simulated import COLUMNS
+from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
 import pytest
 from support.tables import table
 
@@ -43,12 +48,24 @@ def test_the_requirements_are_counted() -> None:
     assert f'{len(REQUIREMENTS)} requirements' in CONFORMANCE
 
 
+def faults(of: FaultTable) -> list[list[str]]:
+    return [[f'`{name}={fault.metavar}`' if fault.metavar else f'`{name}`',
+             fault.description, fault.default_text] for name, fault in of.items()]
+
+
+def settings(of: SimulatedType[Any]) -> list[list[str]]:
+    return [[f'`{name}`', setting.metavar, setting.help]
+            for name, setting in of.all_settings.items()]
+
+
 @pytest.mark.parametrize(('heading', 'rows'), [
-    ('fault', [[f'`{name}={fault.metavar}`' if fault.metavar else f'`{name}`',
-                fault.description, fault.default_text] for name, fault in FAULTS.items()]),
+    ('fault', faults(FAULTS)),
+    ('fault of a camera', faults(CAMERA.device.faults)),
     ('profile', [[f'`{name}`', profile.description] for name, profile in PROFILES.items()]),
-    ('setting', [[f'`{name}`', setting.metavar, setting.help]
-                 for name, setting in SIMULATED.all_settings.items()]),
+    ('setting', settings(SIMULATED)),
+    ('setting of a camera', settings(CAMERA)),
+    ('column', [[f'`{name}`', meaning] for name, meaning in COLUMNS.items()]),
+    ('command of a camera', [[f'`{one.usage}`', one.help] for one in CAMERA.device.commands]),
     ('command', [*([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),
                  *([f'`{one.usage}`', one.help] for one in COMMANDS),
                  *([f'`{name}`', text] for name, text in OTHERS)]),

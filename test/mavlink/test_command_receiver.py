@@ -49,9 +49,6 @@ class Turner(Payload):
         self.results = list(results)
         self.executed: list[AnyCommand] = []
 
-    def poll(self, now: float) -> None:
-        return
-
     def next_deadline(self) -> float:
         return math.inf
 

@@ -89,9 +89,6 @@ def test_link_of_version_1_refuses_messages_that_only_a_payload_of_its_component
         messages = (Heartbeat,)
         sends = (IlluminatorStatus,)
 
-        def receive(self, source: Address, message: Message, now: float) -> None:
-            raise AssertionError('the link is not made')
-
     with pytest.raises(ValueError, match='cannot carry ILLUMINATOR_STATUS:'):
         Link(parse_url('memory://one'), Component(CommandSender(BRIDGE), [Sender()]),
              label='one', mavlink_version=1)

@@ -37,11 +37,12 @@ FILLER = bytes(300)
 
 
 def frame_of(message: Message = STATUS, sequence: int = 0, source: Address = LIGHT, *,
-             signed: bool = False) -> bytes:
+             signed: bool = False, version: int = 2) -> bytes:
     """Return a frame of ours, without the signature that a signed one still needs."""
+    payload = encode_payload(message)
     return encode_frame(
-        message.id, encode_payload(message), sequence=sequence, source=source,
-        crc_extra=message.crc_extra, signed=signed)
+        message.id, payload if version == 2 else payload[:message.base_size], sequence=sequence,
+        source=source, crc_extra=message.crc_extra, signed=signed, version=version)
 
 
 def heartbeat_frame(source: Address = LIGHT, sequence: int = 0,
@@ -55,16 +56,19 @@ class Codec:
     Messages to numbered frames and back, as a component at the far end of a line has them.
 
     :param signing: signs the frames, as its mode says.
+    :param version: of MAVLink.
     """
 
-    def __init__(self, signing: Signing | None = None) -> None:
+    def __init__(self, signing: Signing | None = None, version: int = 2) -> None:
         self.decoder = Decoder()
+        self._version = version
         self._signing = signing or Signing()
         self._sent: Counter[Address] = Counter()
 
     def frame(self, source: Address, message: Message, now: float = 0.0) -> bytes:
         """Return a message as a frame with the next sequence number of its sender."""
-        data = frame_of(message, self._sent[source] & 0xFF, source, signed=self._signing.signs)
+        data = frame_of(message, self._sent[source] & 0xFF, source, signed=self._signing.signs,
+                        version=self._version)
         self._sent[source] += 1
         return self._signing.sign(data, 1.7e9 + now) if self._signing.signs else data
 

@@ -34,15 +34,16 @@ class VirtualLink:
     """
     Joins two endpoints as two links would.
 
+    :param version: of MAVLink.
     :ivar now: s.
     :ivar decoders: what each of them has received, first and second.
     """
 
-    def __init__(self, first: Endpoint, second: Endpoint) -> None:
+    def __init__(self, first: Endpoint, second: Endpoint, version: int = 2) -> None:
         self.now = START
         self.ends = (first, second)
         self.decoders = (Decoder(), Decoder())
-        self._codec = Codec()
+        self._codec = Codec(version=version)
         self._turns = 0
         for end in self.ends:
             end.link_opened(self.now)

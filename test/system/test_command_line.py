@@ -67,8 +67,9 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', 'udpin://127.0.0.1:0', 'port 0 is outside 1..65535'),
     ('simulator', '--count 0', 'argument --count: 0 is outside 1 to 200'),
     ('simulator', '--status-interval nan', '--status-interval: nan is outside 0 to 3600'),
-    ('simulator', '--mavlink-version 1',
-     'MAVLink 1 cannot carry ILLUMINATOR_STATUS, COMPONENT_INFORMATION_BASIC:'),
+    ('simulator', '--mavlink-version 1', '--mavlink-version 1: a light needs MAVLink 2'),
+    ('simulator', '--payload rededge,illuminator', 'so start a program for each'),
+    ('simulator', '--payload rededge --images /nowhere/x', '/nowhere/x: No such file'),
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',
      "key file '/nonexistent': No such file or directory"),
 ])
@@ -91,8 +92,8 @@ def test_bridge_takes_the_url_as_its_argument(domain: int) -> None:
 @pytest.mark.parametrize(('name', 'package', 'remedy'), [
     ('bridge', 'rclpy', ROS_REMEDY), ('monitor', 'rclpy', ROS_REMEDY),
     ('monitor', 'rich', "sudo apt install python3-rich, or pip install 'rich>=13.3'"),
-    ('bridge', 'fastcrc', 'pip install fastcrc'),
-    ('simulator', 'fastcrc', 'pip install fastcrc'),
+    ('bridge', 'pymavlink', 'pip install pymavlink'),
+    ('simulator', 'pymavlink', 'pip install pymavlink'),
 ])
 def test_missing_package_is_one_line_with_its_remedy_and_status_1(
     name: str, package: str, remedy: str, tmp_path: Path,

@@ -33,7 +33,7 @@ from typing import Any
 
 from .options import parse
 from ..entry_point import discard_output
-from ..options import signing
+from ..options import mavlink_version, signing
 from ..termination import SIGNALS
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent
@@ -98,7 +98,8 @@ class Conformance:
         self._session = checks.session(address, options.target)
         self._link = Link(url, self._session, label=options.url, on_event=self._link_event,
                           signing=signs, store=store,
-                          mavlink_version=options.mavlink_version)
+                          mavlink_version=mavlink_version(
+                              options.mavlink_version, {checks.device: checks.mavlink_version}))
         self._suite: CheckRunner[Any] | None = None
         self._signals = 0
         self._written = True

@@ -26,7 +26,6 @@ from ..payloads import PAYLOADS
 from ... import __version__
 from ...payload.registry import PayloadType
 
-DEFAULT_URL = 'udpout://127.0.0.1:14590'
 DEFAULT_PAYLOAD = 'illuminator'
 
 
@@ -49,14 +48,11 @@ def _epilog(types: Types) -> str:
         *(one.notes for one in types if one.notes),
         *(f'faults of a {one.noun}, for --fault, the file and the console; several are separated '
           f'by commas:\n{one.device.faults.describe()}' for one in types)]
+    examples = '\n'.join(f'  {line}' for one in types for line in one.examples)
     details = '\n\n'.join(paragraphs)
     return f"""\
 examples:
-  simulator
-  simulator udpin://127.0.0.1:14550 --count 3
-  simulator --light 1/243=bow --light 1/250=stern --fault stern:drop=0.2
-  simulator --ambient 60 --time-scale 60      gets hot in seconds
-  simulator --file lights.yaml                the same settings, for each light
+{examples}
 
 {details}
 
@@ -73,14 +69,16 @@ def parser(
     """Return the parser of the command line for some payloads, by default the default one."""
     types = types or payload_types([], payloads)
     plurals, nouns = ([getattr(one, name) for one in types] for name in ('plural', 'noun'))
+    default = types[0].address({})
+    profile = "the profile's, mostly " if types[0].profiles else ''
     result = Parser(
         prog='simulator', formatter_class=argparse.RawDescriptionHelpFormatter,
         description=f'MAVLink {" and ".join(plurals)} without hardware.\n'
-                    'Without arguments it finds a bridge that was started without arguments.',
+                    'Without a URL it finds the node that was started without one.',
         epilog=_epilog(types))
     result.add_argument('url', nargs='?',
                         help='the link to a bridge, router or autopilot: UDP, TCP or serial '
-                             f'(default: {DEFAULT_URL})')
+                             f'(default: {types[0].url})')
     result.add_argument('--version', action='version', version=__version__)
     result.add_argument('--payload', metavar='NAME,...',
                         help=f'what is simulated: {", ".join(payloads)} '
@@ -91,10 +89,10 @@ def parser(
                         help=f'number of {", ".join(plurals)}, with component ids counted up '
                              '(default: 1)')
     result.add_argument('--system-id', type=integer(1, 255), metavar='ID',
-                        help="MAVLink system id (default: the profile's, mostly 1)")
+                        help=f'MAVLink system id (default: {profile}{default.system})')
     result.add_argument('--component-id', type=integer(0, 255), metavar='ID',
-                        help=f"component id of the first {' or '.join(nouns)} (default: the "
-                             "profile's, mostly 243)")
+                        help=f'component id of the first {" or ".join(nouns)} (default: '
+                             f'{profile}{default.component})')
     for noun in nouns:
         result.add_argument(f'--{noun}', action='append', metavar='SYS/COMP[=NAME]',
                             help=f'a {noun}, instead of --count; may be repeated')
@@ -102,6 +100,8 @@ def parser(
                           for name, setting in one.all_settings.items()}.items():
         result.add_argument(f'--{name.replace("_", "-")}', metavar=setting.metavar,
                             action='append' if name == 'fault' else 'store', help=setting.help)
+    for records in filter(None, (one.records for one in types)):
+        result.add_argument(f'--{records.option}', metavar='FILE', help=records.help)
     result.add_argument('--plain', action='store_true',
                         help='plain lines on a terminal, too, instead of the live view')
     add_mavlink_version(result)

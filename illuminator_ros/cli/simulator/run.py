@@ -26,13 +26,15 @@ import queue
 import signal
 import sys
 import threading
+import time
 from typing import Any
 
 from .components import components, load, Scenario, SettingError, Types
 from .console import execute
-from .options import DEFAULT_URL, parser, payload_types
+from .options import parser, payload_types
+from .record_file import write_records
 from .view import LiveView, Look, look, PlainView
-from ..options import signing
+from ..options import mavlink_version, signing
 from ..termination import Termination
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.messages import Address
@@ -70,9 +72,13 @@ class _Simulation:
         self._endpoint.new_peers.subscribe(self._found)
         self._link = Link(url, self._endpoint, label=label, on_event=self._say,
                           signing=signs, store=store,
-                          mavlink_version=options.mavlink_version)
+                          mavlink_version=mavlink_version(
+                              options.mavlink_version,
+                              {one.noun: one.mavlink_version for one in types}))
+        now = self._link.clock()
         for component in self._endpoint.components:
-            component.power_on(self._link.clock())
+            component.device.set_clock(time.time(), now)
+            component.power_on(now)
 
     def run(self, termination: Termination) -> None:
         """Run until a signal or ``quit``."""
@@ -144,9 +150,10 @@ def run(
         types = payload_types(args, payloads)
         options = parser(types, payloads).parse_args(None if args is None else list(args))
         file = load(options.file, types) if options.file else Scenario()
-        label = options.url or file.url or DEFAULT_URL
-        simulation = _Simulation(
-            options, parse_url(label), label, components(options, file, types), types)
+        label = options.url or file.url or types[0].url
+        described = components(options, file, types)
+        simulation = _Simulation(options, parse_url(label), label, described, types)
+        write_records(options, types, described)
     except (UrlError, SettingError, KeyFileError, ValueError) as error:
         print(f'simulator: {error}', file=sys.stderr)
         return 2

@@ -21,7 +21,6 @@ import contextlib
 import errno
 import fcntl
 import functools
-import math
 import os
 from pathlib import Path
 import struct
@@ -31,8 +30,6 @@ import tty
 from .base import Channel, Peer, Stream, StreamChannel
 from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
-# 8N1: a start bit, 8 data bits, a stop bit.
-BITS_PER_BYTE = 10
 # Bytes in a pseudo-terminal that no program has read; a serial line would have lost them.
 MAX_UNREAD = 2048
 
@@ -63,8 +60,7 @@ def open_serial(url: SerialUrl) -> Channel:
     with contextlib.suppress(OSError, ValueError, AttributeError):
         port.set_low_latency_mode(True)
     return _LineChannel(
-        port.fileno(), f'serial {url.device} at {url.baud} baud', port.close,
-        rate=url.baud / BITS_PER_BYTE)
+        port.fileno(), f'serial {url.device} at {url.baud} baud', port.close)
 
 
 def open_pty(url: PtyUrl) -> Channel:
@@ -118,10 +114,9 @@ class _LineChannel(StreamChannel):
 
     def __init__(
         self, fd: int, name: str, close: Callable[[], None],
-        before_sending: Callable[[], None] = lambda: None, *, rate: float = math.inf,
+        before_sending: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__(name, Stream(fd), 'the device has gone')
-        self.rate = rate
         self._fd = fd
         self._close = close
         self._before_sending = before_sending

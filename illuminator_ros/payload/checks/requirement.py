@@ -164,6 +164,7 @@ class PayloadChecks(Generic[T]):
     :param risk: what the device does in the checks that need consent, as a clause.
     :param question: asked before them; ``{device}`` and the options are filled in.
     :param options: options of the command line, for :attr:`Conditions.options`.
+    :param mavlink_version: 1 or 2, which the device needs; None if both will do.
     """
 
     payload: str
@@ -177,6 +178,7 @@ class PayloadChecks(Generic[T]):
     risk: str = ''
     question: str = ''
     options: tuple[Option, ...] = ()
+    mavlink_version: int | None = None
 
     def session(self, address: Address, target: Address | None = None) -> Session:
         """Return a session with a device, from our address."""

@@ -1,0 +1,548 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The simulated camera: the device's side of the RedEdge serial API.
+
+https://micasense.github.io/rededge-api/api/serial.html
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from enum import Enum
+from functools import partial
+import math
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from .messages import (
+    CameraFeedback,
+    CameraFeedbackFlags,
+    CameraStatus,
+    CameraStatusType,
+    DigicamControl,
+    GpsRawInt,
+    GpsStatus,
+    MAV_COMP_ID_CAMERA,
+    MountStatus,
+    Ping,
+    Shot,
+)
+from ..mavlink.messages import Address, define, Heartbeat, Message, UInt16
+from ..payload import simulated
+from ..payload.faults import Behaviour, Fault, FaultTable
+from ..payload.faults import FAULTS as COMPONENT_FAULTS
+from ..payload.rotation import Quaternion
+from ..payload.simulated_settings import number, Setting
+from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+
+# Until the camera hears a host.
+DEFAULT_SYSTEM_ID = 255
+# s from an image to its CAMERA_FEEDBACK.
+FEEDBACK_DELAY = 0.2
+# mm
+FOCAL_LENGTH = 5.4
+# fix_type of GPS_RAW_INT from which the camera takes a position.
+FIX_3D = 3
+UNKNOWN = 0xFFFF
+UNKNOWN_SATELLITES = 0xFF
+# The camera's axes in those of the vehicle, FRD, at a mount of 0/0/0: x down, y right, z back.
+_DOWN = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
+
+M = TypeVar('M')
+
+
+class Source(Enum):
+    """Where a value of an image comes from."""
+
+    INJECTED = 'injected'
+    OWN = 'own'
+    NONE = 'none'
+
+
+class Place(NamedTuple):
+    """A position: degrees, and m above mean sea level."""
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+
+@dataclass(frozen=True)
+class RedEdgeBehaviour(Behaviour):
+    """
+    How a simulated camera behaves; the defaults are those of the serial API.
+
+    :param validity: s for which it uses injected state.
+    :param injectable: whether it uses injected state at all.
+    :param feedback: whether it sends CAMERA_FEEDBACK.
+    :param feedback_delay: s from an image to its CAMERA_FEEDBACK.
+    :param triggers: whether it sends CAMERA_STATUS.
+    :param counts: whether it counts its images.
+    :param shots: the values of ``shot`` for which it takes an image.
+    :param ping_component: what is added to the component id that answers PING.
+    :param ping_sequence: what is added to the sequence number in the answer.
+    :param ping_target: whether the answer is addressed to the sender.
+    :param extension: whether CAMERA_FEEDBACK has its extension field.
+    """
+
+    heartbeat_autopilot: int = 1
+    heartbeat_base_mode: int = 2
+    heartbeat_custom_mode: int = 3
+    adopts_system_id: bool = True
+    answers_commands: bool = False
+    validity: float = 5.0
+    injectable: bool = True
+    feedback: bool = True
+    feedback_delay: float = FEEDBACK_DELAY
+    triggers: bool = True
+    counts: bool = True
+    shots: tuple[int, ...] = tuple(Shot)
+    ping_component: int = 0
+    ping_sequence: int = 0
+    ping_target: bool = True
+    extension: bool = False
+
+
+_FAULTS_OF_EVERY_COMPONENT = ('silence', 'reboot', 'slow', 'drop', 'duplicate', 'delay', 'corrupt',
+                              'heartbeat', 'type', 'autopilot', 'any-target')
+FAULTS = FaultTable({
+    **{name: COMPONENT_FAULTS[name] for name in _FAULTS_OF_EVERY_COMPONENT},
+    'fixed-system': Fault('adopts_system_id', 'keeps its system ID, and takes messages for that '
+                          'only', default=False),
+    'other-ping': Fault('ping_component', 'lets another component answer PING', default=1),
+    'ping-sequence': Fault('ping_sequence', 'answers PING with another sequence number',
+                           default=1),
+    'ping-target': Fault('ping_target', 'answers PING without a target', default=False),
+    'no-status': Fault('triggers', 'sends no CAMERA_STATUS', default=False),
+    'no-feedback': Fault('feedback', 'sends no CAMERA_FEEDBACK', default=False),
+    'late': Fault('feedback_delay', 'sends CAMERA_FEEDBACK S seconds after the image', 'S',
+                  number(0.001, 3600), 15.0),
+    'same-index': Fault('counts', 'does not count its images', default=False),
+    'no-panel': Fault('shots', 'takes no image of the panel', default=(Shot.SURVEY,)),
+    'any-shot': Fault('shots', 'takes an image for each value of shot',
+                      default=tuple(range(256))),
+    'no-injection': Fault('injectable', 'ignores injected position, time and attitude',
+                          default=False),
+    'stale': Fault('validity', 'uses injected state for ever', default=math.inf),
+    'extension': Fault('extension', 'sends CAMERA_FEEDBACK with its extension field, which '
+                       'MAVLink 1 does not have'),
+})
+
+
+@define(CameraFeedback.id, 'CAMERA_FEEDBACK', extensions=1)
+@dataclass(slots=True)
+class ExtendedCameraFeedback(CameraFeedback):
+    """CAMERA_FEEDBACK as some libraries send it with MAVLink 1: 47 bytes instead of 45."""
+
+    completed_captures: UInt16 = 0
+
+
+# The faulty sender takes the extension field for a part of the message.
+ExtendedCameraFeedback.base_size = ExtendedCameraFeedback.codec.size
+
+
+class Injected(NamedTuple, Generic[M]):
+    """A message of the host, and when it was received, s."""
+
+    message: M
+    at: float
+
+
+# The type of dataclasses.field() cannot be named.
+def _column(meaning: str, text: str = '') -> Any:
+    return field(metadata={'meaning': meaning, 'format': text})
+
+
+@dataclass(frozen=True)
+class Image:
+    """The metadata of an image, in the order of the columns; None is an empty field."""
+
+    camera: int = _column('component id of the camera')
+    image: int = _column('number of the image since power on')
+    shot: str = _column('`survey` or `panel`')
+    trigger: str = _column('`mavlink`, `interval` or `console`')
+    img_idx: int | None = _column('number in CAMERA_FEEDBACK; counts images by MAVLink only')
+    time_utc_s: float = _column("time of the image by the camera's clock, since 1970", '.6f')
+    time_source: Source = _column('`injected`, `own` GPS or `none`: a clock that was never set')
+    position_source: Source = _column('`injected`, `own` GPS or `none`')
+    position_age_s: float | None = _column('time since the position was received', '.3f')
+    fix_type: int | None = _column('as injected; 3 for GLOBAL_POSITION_INT and its own GPS')
+    latitude_deg: float | None = _column('empty without a 3D fix', '.7f')
+    longitude_deg: float | None = _column('likewise', '.7f')
+    altitude_m: float | None = _column('above mean sea level; likewise', '.3f')
+    eph_m: float | None = _column('horizontal accuracy as injected', '.2f')
+    epv_m: float | None = _column('vertical accuracy as injected', '.2f')
+    speed_m_s: float | None = _column('ground speed as injected', '.2f')
+    course_deg: float | None = _column('course over ground as injected', '.2f')
+    satellites: int | None = _column('as injected')
+    attitude_source: Source = _column('`injected` or `none`')
+    attitude_age_s: float | None = _column('time since the attitude was received', '.3f')
+    roll_deg: float | None = _column("the vehicle's roll, FRD in NED", '.3f')
+    pitch_deg: float | None = _column('its pitch', '.3f')
+    yaw_deg: float | None = _column('its yaw, 0..360', '.3f')
+    mount_source: Source = _column('`injected`, or `none`: 0/0/0')
+    mount_age_s: float | None = _column('time since the mount angles were received', '.3f')
+    mount_roll_deg: float = _column('roll of the camera in the vehicle, about its line of sight',
+                                    '.2f')
+    mount_pitch_deg: float = _column('its pitch', '.2f')
+    mount_yaw_deg: float = _column('its yaw', '.2f')
+    camera_roll_deg: float | None = _column(
+        'roll of the camera in the earth frame, as CAMERA_FEEDBACK has it', '.3f')
+    camera_pitch_deg: float | None = _column('its pitch', '.3f')
+    camera_yaw_deg: float | None = _column('its yaw, 0..360', '.3f')
+
+    def row(self) -> list[str]:
+        """Return the fields as text."""
+        return [_text(getattr(self, one.name), one.metadata['format']) for one in fields(self)]
+
+
+COLUMNS: Mapping[str, str] = {one.name: one.metadata['meaning'] for one in fields(Image)}
+
+
+def _text(value: object, spec: str) -> str:
+    if value is None:
+        return ''
+    if isinstance(value, Source):
+        return value.value
+    return format(value, spec)
+
+
+def _known(value: int, scale: float) -> float | None:
+    return None if value == UNKNOWN else value / scale
+
+
+def _position(message: GpsRawInt | GlobalPositionInt) -> dict[str, Any]:
+    """Return the columns of an injected position."""
+    place = {'latitude_deg': message.lat / 1e7, 'longitude_deg': message.lon / 1e7,
+             'altitude_m': message.alt / 1e3}
+    if isinstance(message, GlobalPositionInt):
+        north, east = message.vx / 100, message.vy / 100
+        return {**place, 'fix_type': FIX_3D, 'speed_m_s': math.hypot(north, east),
+                'course_deg': math.degrees(math.atan2(east, north)) % 360}
+    satellites = message.satellites_visible
+    return {**(place if message.fix_type >= FIX_3D else {}), 'fix_type': message.fix_type,
+            'eph_m': _known(message.eph, 100), 'epv_m': _known(message.epv, 100),
+            'speed_m_s': _known(message.vel, 100), 'course_deg': _known(message.cog, 100),
+            'satellites': None if satellites == UNKNOWN_SATELLITES else satellites}
+
+
+def _angles(rotation: Quaternion) -> tuple[float, float, float]:
+    roll, pitch, yaw = map(math.degrees, rotation.euler())
+    return roll, pitch, yaw % 360
+
+
+def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulated.Change:
+    if words not in ([], ['panel']):
+        raise ValueError(f'{words[0]!r} is not panel')
+
+    def capture() -> None:
+        camera.capture(Shot.PANEL if words else Shot.SURVEY, 'console', now)
+    return capture
+
+
+COMMANDS: tuple[simulated.ConsoleCommand[SimulatedRedEdge, simulated.Change], ...] = (
+    simulated.ConsoleCommand('capture [panel]', 'take an image, as by a button on the camera',
+                             _capture, (0, 1)),
+    simulated.ConsoleCommand(
+        'interval S', 'take an image every S seconds; 0 ends it', lambda camera, words, now:
+        partial(camera.set_interval, number(0, 3600)(words[0]), now), (1,)),
+    simulated.ConsoleCommand(
+        'own-gps PLACE', 'LAT,LON,ALT of its own GPS, or none', lambda camera, words, now:
+        partial(camera.set_own_gps, read_place(words[0])), (1,)),
+)
+
+
+class SimulatedRedEdge(simulated.SimulatedDevice):
+    """
+    A simulated camera, without the link: see :class:`SimulatedDevice`.
+
+    It takes images when DIGICAM_CONTROL asks for them, at an interval, and by hand. Position,
+    time, attitude and mount angles of the host are used for some time after they were received;
+    then it uses its own GPS.
+
+    :param address: the address until it hears a host.
+    :param validity: s for which injected state is used.
+    :param interval: s between images, 0 for none.
+    :param own_gps: the position of its own GPS receiver, None without a fix.
+    :ivar images: the latest images.
+    """
+
+    messages = (Heartbeat, Ping, GpsRawInt, GpsStatus, SystemTime, GlobalPositionInt, Attitude,
+                MountStatus, DigicamControl)
+    sends = (Heartbeat, Ping, CameraStatus, CameraFeedback)
+    faults = FAULTS
+    commands = COMMANDS
+    behaviour: RedEdgeBehaviour
+
+    def __init__(
+        self, address: Address, *, validity: float = 5.0, interval: float = 0.0,
+        own_gps: Place | None = None,
+    ) -> None:
+        super().__init__(RedEdgeBehaviour(validity=validity))
+        self.own_gps = own_gps
+        self.images: deque[Image] = deque(maxlen=1000)
+        self._component = address.component
+        self._first_interval = interval
+        # Unix time at 0 on the link's clock.
+        self._epoch = 0.0
+        self.restart(0.0)
+
+    def restart(self, now: float) -> None:
+        """See :meth:`SimulatedDevice.restart`; its own GPS has a fix at once."""
+        self._count = self._index = 0
+        self._position: Injected[GpsRawInt | GlobalPositionInt] | None = None
+        self._time: Injected[float] | None = None
+        self._attitude: Injected[Attitude] | None = None
+        self._mount: Injected[MountStatus] | None = None
+        self._ground: float | None = None
+        # The feedback of images, with its time.
+        self._pending: deque[tuple[float, CameraFeedback]] = deque()
+        self.set_interval(self._first_interval, now)
+
+    def set_clock(self, unix_time: float, now: float) -> None:
+        """See :meth:`SimulatedDevice.set_clock`: the time of its own GPS."""
+        self._epoch = unix_time - now
+
+    def set_interval(self, interval: float, now: float) -> None:
+        """Take an image at each interval from now on, s, 0 for none."""
+        self._interval = interval
+        self._image_due = now + (interval or math.inf)
+
+    def set_own_gps(self, place: Place | None) -> None:
+        """Set the position of its own GPS receiver, None without a fix."""
+        self.own_gps = place
+
+    def streams(self) -> Mapping[int, float]:
+        """See :meth:`SimulatedDevice.streams`."""
+        return {}
+
+    def message(self, message_id: int, now: float) -> Message | None:
+        """See :meth:`SimulatedDevice.message`."""
+        return None
+
+    def execute(
+        self, source: Address, command: simulated.AnyCommand, now: float,
+    ) -> simulated.Reply:
+        """See :meth:`SimulatedDevice.execute`; it has no commands."""
+        return None
+
+    def sender(self, message: Message, own: Address) -> Address:
+        """See :meth:`SimulatedDevice.sender`."""
+        if isinstance(message, Ping):
+            return Address(own.system, (own.component + self.behaviour.ping_component) & 0xFF)
+        return own
+
+    # Messages of the host
+
+    def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
+        """See :meth:`SimulatedDevice.receive`."""
+        # Those that are due were taken before the message came.
+        self._take_due_images(now)
+        if isinstance(message, Ping):
+            return self._answer(source, message)
+        if isinstance(message, DigicamControl):
+            return self._control(source, message, now)
+        if self.behaviour.injectable:
+            self._inject(message, now)
+        return ()
+
+    def _answer(self, source: Address, ping: Ping) -> Iterable[Message]:
+        if ping.target_system or ping.target_component:
+            return
+        target = source if self.behaviour.ping_target else Address(0, 0)
+        yield replace(ping, seq=(ping.seq + self.behaviour.ping_sequence) & 0xFFFFFFFF,
+                      target_system=target.system, target_component=target.component)
+
+    def _inject(self, message: Message, now: float) -> None:
+        if isinstance(message, GpsRawInt | GlobalPositionInt):
+            self._position = Injected(message, now)
+        if isinstance(message, GpsRawInt):
+            self._time = Injected(message.time_usec / 1e6, now)
+        elif isinstance(message, SystemTime):
+            self._time = Injected(message.time_unix_usec / 1e6, now)
+        elif isinstance(message, Attitude):
+            self._attitude = Injected(message, now)
+        elif isinstance(message, MountStatus):
+            self._mount = Injected(message, now)
+
+    def _control(
+        self, source: Address, control: DigicamControl, now: float,
+    ) -> Iterable[Message]:
+        behaviour = self.behaviour
+        if control.shot not in behaviour.shots:
+            return
+        self._index = (self._index + behaviour.counts) & 0xFFFF
+        image = self.capture(
+            Shot.PANEL if control.shot == Shot.PANEL else Shot.SURVEY, 'mavlink', now)
+        if behaviour.feedback:
+            self._pending.append((
+                now + behaviour.feedback_delay, self._feedback(image, source.system)))
+        if behaviour.triggers:
+            yield CameraStatus(
+                _microseconds(image.time_utc_s), source.system, 0, self._index,
+                CameraStatusType.TRIGGER, 0.0, 0.0, 0.0, 0.0)
+
+    # Images
+
+    def capture(self, shot: Shot, trigger: str, now: float) -> Image:
+        """
+        Take an image now, and record its metadata.
+
+        :param trigger: as in the column of that name.
+        """
+        self._count += 1
+        time_utc, time_source = self._clock(now)
+        position = self._fresh(self._position, now)
+        attitude, mount = self._fresh(self._attitude, now), self._fresh(self._mount, now)
+        columns: dict[str, Any] = dict.fromkeys(COLUMNS)
+        if position:
+            columns |= _position(position.message)
+        elif self.own_gps:
+            place = self.own_gps
+            columns |= {'fix_type': FIX_3D, 'latitude_deg': place.latitude,
+                        'longitude_deg': place.longitude, 'altitude_m': place.altitude}
+        pitch, roll, yaw = (angle / 100 for angle in (
+            mount.message.pointing_a, mount.message.pointing_b, mount.message.pointing_c,
+        )) if mount else (0.0, 0.0, 0.0)
+        if attitude:
+            vehicle = Quaternion.from_euler(
+                attitude.message.roll, attitude.message.pitch, attitude.message.yaw)
+            camera = Quaternion.from_euler(*map(math.radians, (roll, pitch, yaw)))
+            columns |= zip(('roll_deg', 'pitch_deg', 'yaw_deg'), _angles(vehicle), strict=True)
+            columns |= zip(('camera_roll_deg', 'camera_pitch_deg', 'camera_yaw_deg'),
+                           _angles(vehicle * _DOWN * camera * _DOWN.inverse()), strict=True)
+        image = Image(**{
+            **columns, 'camera': self._component, 'image': self._count,
+            'shot': shot.name.lower(), 'trigger': trigger,
+            'img_idx': self._index if trigger == 'mavlink' else None,
+            'time_utc_s': time_utc, 'time_source': time_source,
+            'position_source': Source.INJECTED if position else
+            Source.OWN if self.own_gps else Source.NONE,
+            'position_age_s': position and now - position.at,
+            'attitude_source': Source.INJECTED if attitude else Source.NONE,
+            'attitude_age_s': attitude and now - attitude.at,
+            'mount_source': Source.INJECTED if mount else Source.NONE,
+            'mount_age_s': mount and now - mount.at, 'mount_roll_deg': roll,
+            'mount_pitch_deg': pitch, 'mount_yaw_deg': yaw})
+        if self._ground is None:
+            self._ground = image.altitude_m
+        self.images.append(image)
+        self.records.emit(image.row())
+        return image
+
+    def _fresh(self, injected: Injected[M] | None, now: float) -> Injected[M] | None:
+        return injected if injected and now - injected.at <= self.behaviour.validity else None
+
+    def _clock(self, now: float) -> tuple[float, Source]:
+        """Return the time by the camera's clock, s since 1970, and its source."""
+        if time := self._fresh(self._time, now):
+            return time.message + now - time.at, Source.INJECTED
+        if self.own_gps:
+            return self._epoch + now, Source.OWN
+        # A clock that was set goes on.
+        return (self._time.message + now - self._time.at if self._time else now), Source.NONE
+
+    def _feedback(self, image: Image, system: int) -> CameraFeedback:
+        kind = ExtendedCameraFeedback if self.behaviour.extension else CameraFeedback
+        altitude = image.altitude_m or 0.0
+        return kind(
+            _microseconds(image.time_utc_s), system, 0, self._index,
+            round((image.latitude_deg or 0.0) * 1e7), round((image.longitude_deg or 0.0) * 1e7),
+            altitude, altitude - (self._ground or 0.0), image.camera_roll_deg or 0.0,
+            image.camera_pitch_deg or 0.0, image.camera_yaw_deg or 0.0, FOCAL_LENGTH,
+            CameraFeedbackFlags.CLOSEDLOOP)
+
+    # Time
+
+    def poll(self, now: float) -> Iterable[Message]:
+        """See :meth:`SimulatedDevice.poll`."""
+        self._take_due_images(now)
+        while self._pending and now >= self._pending[0][0]:
+            yield self._pending.popleft()[1]
+
+    def _take_due_images(self, now: float) -> None:
+        while now >= self._image_due:
+            self.capture(Shot.SURVEY, 'interval', self._image_due)
+            self._image_due += self._interval
+
+    def next_deadline(self) -> float:
+        """See :meth:`SimulatedDevice.next_deadline`."""
+        return min(self._image_due, self._pending[0][0] if self._pending else math.inf)
+
+    def snapshot(self, now: float) -> simulated.Snapshot:
+        """See :meth:`SimulatedDevice.snapshot`."""
+        own = Source.OWN if self.own_gps else Source.NONE
+        injected: tuple[tuple[str, Injected[Any] | None, Source], ...] = (
+            ('position', self._position, own), ('attitude', self._attitude, Source.NONE),
+            ('mount', self._mount, Source.NONE))
+        count = f'{self._count:4} image{"s" if self._count != 1 else " "}'
+        state = (count, f'time {self._clock(now)[1].value}', *(
+            f'{name} {(Source.INJECTED if self._fresh(one, now) else other).value}'
+            for name, one, other in injected))
+        return simulated.Snapshot('  '.join(state), state)
+
+
+def _microseconds(seconds: float) -> int:
+    return min(max(round(seconds * 1e6), 0), 2 ** 64 - 1)
+
+
+def read_place(text: str) -> Place | None:
+    """
+    Read ``LAT,LON,ALT`` or ``none``.
+
+    :raises ValueError: if it is neither.
+    """
+    if text == 'none':
+        return None
+    parts = text.split(',')
+    if len(parts) != 3:
+        raise ValueError(f'{text!r} is neither LAT,LON,ALT nor none')
+    latitude, longitude, altitude = parts
+    return Place(number(-90, 90)(latitude), number(-180, 180)(longitude),
+                 number(-1000, 100_000)(altitude))
+
+
+# Over a field near Zurich.
+DEFAULT_PLACE = '47.397742,8.545594,488'
+SETTINGS: Mapping[str, Setting] = {
+    'interval': Setting('S', 'take an image every S seconds (default: 0, none)', number(0, 3600)),
+    'validity': Setting('S', 'time for which injected state is used (default: 5; firmware before '
+                        '1.3.0 had 30)', number(0.001, 3600)),
+    'own_gps': Setting('LAT,LON,ALT', "position of the camera's own GPS, above mean sea level, or "
+                       f'none (default: {DEFAULT_PLACE})', read_place),
+}
+
+
+def _make(
+    settings: Mapping[str, Any], address: Address, several: bool = False,
+) -> SimulatedRedEdge:
+    return SimulatedRedEdge(address, **{
+        'own_gps': read_place(DEFAULT_PLACE),
+        **{name: settings[name] for name in SETTINGS if name in settings}})
+
+
+SIMULATED = simulated.SimulatedType(
+    'camera', 'cameras', SimulatedRedEdge, make=_make,
+    address=lambda settings: Address(DEFAULT_SYSTEM_ID, MAV_COMP_ID_CAMERA),
+    settings=SETTINGS,
+    examples=(
+        'simulator --payload rededge --interval 1 --images flight.csv',
+        'simulator --payload rededge pty:///tmp/ttyREDEDGE',
+        'simulator --payload rededge --fault no-feedback'),
+    mavlink_version=1, url='udpout://127.0.0.1:14592',
+    records=simulated.RecordType(
+        'images', 'write the metadata of each image to FILE as CSV', tuple(COLUMNS)))

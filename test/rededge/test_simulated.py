@@ -1,0 +1,357 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The simulated camera: its answers, the metadata of its images, and its faults."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+from illuminator_ros.rededge.messages import (
+    CameraFeedback,
+    CameraFeedbackFlags,
+    CameraStatus,
+    CameraStatusType,
+    DigicamControl,
+    GpsRawInt,
+    MountStatus,
+    Ping,
+)
+from illuminator_ros.rededge.simulated import (
+    COLUMNS,
+    FAULTS,
+    Image,
+    Place,
+    SIMULATED,
+    SimulatedRedEdge,
+    Source,
+)
+import pytest
+
+HOST = Address(7, 191)
+START = 1000.0
+# UTC, s: of the camera's own GPS at START, and of the host.
+OWN_UTC, HOST_UTC = 1.8e9, 1.7e9
+OWN_PLACE = Place(47.0, 8.0, 400.0)
+FIX = GpsRawInt(int(HOST_UTC * 1e6), 3, 481234567, -91234567, 500_250, 120, 65535, 1234, 35999,
+                17)
+LEVEL_NORTH = Attitude(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def attitude(roll: float, pitch: float, yaw: float) -> Attitude:
+    return Attitude(
+        0, math.radians(roll), math.radians(pitch), math.radians(yaw), 0.0, 0.0, 0.0)
+
+
+def mount(roll: float, pitch: float, yaw: float) -> MountStatus:
+    return MountStatus(1, 100, *(round(100 * angle) for angle in (pitch, roll, yaw)))
+
+
+def control(shot: int, component: int = 100, system: int = 1) -> DigicamControl:
+    return DigicamControl(system, component, 1, 1, 0, 0, shot, 0, 0, 0.0)
+
+
+class Camera:
+    """A simulated camera whose clock a test moves."""
+
+    def __init__(self, fault: str = '', **settings: Any) -> None:
+        self.device = SimulatedRedEdge(
+            Address(255, 100), **{'own_gps': OWN_PLACE, **settings})
+        if fault:
+            self.device.behave(FAULTS.add(self.device.behaviour, fault), START)
+        self.endpoint = SimulatedComponents([Description(Address(255, 100), self.device)], START)
+        self.device.set_clock(OWN_UTC, START)
+        self.now = START
+
+    def tell(self, *messages: Message, source: Address = HOST) -> list[tuple[Address, Any]]:
+        """Give messages to the camera, and return what it sends at once."""
+        for message in messages:
+            self.endpoint.receive(source, message, self.now)
+        return self.sent()
+
+    def sent(self) -> list[tuple[Address, Any]]:
+        sent = list(self.endpoint.outgoing)
+        self.endpoint.outgoing.clear()
+        return sent
+
+    def wait(self, seconds: float) -> list[tuple[Address, Any]]:
+        """Let time pass, and return what the camera sends, besides heartbeats."""
+        until = self.now + seconds
+        while (due := self.endpoint.next_deadline()) <= until:
+            self.now = due
+            self.endpoint.poll(self.now)
+        self.now = until
+        return [(source, one) for source, one in self.sent() if not isinstance(one, Heartbeat)]
+
+    def image(self, *messages: Message, wait: float = 0.0) -> Image:
+        """Return an image that is taken so long after messages (s)."""
+        self.tell(*messages)
+        self.wait(wait)
+        self.tell(control(1))
+        return self.device.images[-1]
+
+
+def test_heartbeat_has_the_contents_of_real_cameras_re_7() -> None:
+    camera = Camera()
+    camera.endpoint.poll(START)
+
+    assert camera.sent() == [(Address(255, 100), Heartbeat(0, 1, 2, 3, 4, 3))]
+
+
+def test_camera_has_the_system_id_of_the_host_that_it_heard_last_re_8() -> None:
+    camera = Camera()
+    camera.tell(heartbeat(18))
+    assert camera.endpoint.components[0].address == Address(7, 100)
+    camera.tell(LEVEL_NORTH, source=Address(9, 1))
+    assert camera.endpoint.components[0].address == Address(9, 100)
+    camera.endpoint.components[0].restart(camera.now)
+    assert camera.endpoint.components[0].address == Address(255, 100)
+
+
+@pytest.mark.parametrize('sequence', [0, 1, 2 ** 32 - 1])
+def test_ping_is_answered_to_its_sender_with_its_sequence_number_re_11(sequence: int) -> None:
+    assert Camera().tell(Ping(5, sequence, 0, 0)) == [
+        (Address(7, 100), Ping(5, sequence, *HOST))]
+
+
+@pytest.mark.parametrize('message', [
+    Ping(5, 1, 7, 100), Ping(5, 1, 7, 1), CommandLong(7, 100, 512, 0, 0, 0, 0, 0, 0, 0, 0)])
+def test_answers_and_commands_are_not_answered(message: Message) -> None:
+    assert Camera().tell(message) == []
+
+
+@pytest.mark.parametrize(('component', 'system', 'taken'), [
+    (100, 7, 1), (100, 200, 1), (0, 0, 1), (0, 200, 1), (1, 7, 0), (101, 0, 0)])
+def test_target_component_selects_the_camera_and_target_system_is_ignored_re_5(
+        component: int, system: int, taken: int) -> None:
+    camera = Camera()
+    camera.tell(control(1, component, system))
+    camera.tell(MountStatus(system, component, 100, 0, 0))
+    assert len(camera.device.images) == taken
+    assert camera.image().mount_source is (Source.INJECTED if taken else Source.NONE)
+
+
+def test_capture_is_followed_by_camera_status_and_later_by_camera_feedback() -> None:
+    camera = Camera()
+    camera.tell(FIX, attitude(10, -15, 40), mount(0, 15, 10))
+    camera.wait(1.0)
+    utc = int((HOST_UTC + 1.0) * 1e6)
+
+    assert camera.tell(control(1)) == [(Address(7, 100), CameraStatus(
+        utc, 7, 0, 1, CameraStatusType.TRIGGER, 0.0, 0.0, 0.0, 0.0))]
+    assert camera.wait(0.1) == []
+    [(source, feedback)] = camera.wait(0.2)
+    assert isinstance(feedback, CameraFeedback)
+    assert source == Address(7, 100)
+    assert (feedback.time_usec, feedback.target_system, feedback.img_idx, feedback.flags) == (
+        utc, 7, 1, CameraFeedbackFlags.CLOSEDLOOP)
+    assert (feedback.lat, feedback.lng, feedback.alt_msl) == (481234567, -91234567, 500.25)
+
+
+def test_img_idx_counts_images_by_mavlink_only() -> None:
+    camera = Camera(interval=1.0)
+    camera.wait(2.5)
+    indexes = [camera.tell(control(shot))[0][1].img_idx for shot in (1, 2)]
+
+    assert indexes == [1, 2]
+    assert [(one.image, one.img_idx, one.trigger, one.shot) for one in camera.device.images] == [
+        (1, None, 'interval', 'survey'), (2, None, 'interval', 'survey'),
+        (3, 1, 'mavlink', 'survey'), (4, 2, 'mavlink', 'panel')]
+
+
+@pytest.mark.parametrize('shot', [0, 3, 255])
+def test_other_values_of_shot_take_no_image(shot: int) -> None:
+    camera = Camera()
+    assert camera.tell(control(shot)) == []
+    assert not camera.device.images
+
+
+def test_image_has_the_injected_values_and_their_ages() -> None:
+    row = dict(zip(COLUMNS, Camera().image(
+        FIX, attitude(10, -15, 400), mount(-33.69, 25.66, 16.1), wait=0.25).row(), strict=True))
+
+    assert row == {
+        'camera': '100', 'image': '1', 'shot': 'survey', 'trigger': 'mavlink', 'img_idx': '1',
+        'time_utc_s': '1700000000.250000', 'time_source': 'injected',
+        'position_source': 'injected', 'position_age_s': '0.250', 'fix_type': '3',
+        'latitude_deg': '48.1234567', 'longitude_deg': '-9.1234567', 'altitude_m': '500.250',
+        'eph_m': '1.20', 'epv_m': '', 'speed_m_s': '12.34', 'course_deg': '359.99',
+        'satellites': '17', 'attitude_source': 'injected', 'attitude_age_s': '0.250',
+        'roll_deg': '10.000', 'pitch_deg': '-15.000', 'yaw_deg': '40.000',
+        'mount_source': 'injected', 'mount_age_s': '0.250', 'mount_roll_deg': '-33.69',
+        'mount_pitch_deg': '25.66', 'mount_yaw_deg': '16.10',
+        'camera_roll_deg': row['camera_roll_deg'], 'camera_pitch_deg': row['camera_pitch_deg'],
+        'camera_yaw_deg': row['camera_yaw_deg']}
+
+
+@pytest.mark.parametrize(('vehicle', 'camera', 'earth'), [
+    ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
+    ((0, 0, 270), (0, 0, 0), (0, 0, 270)),
+    # Panning a camera that looks down is its roll, and turns the top of the image.
+    ((0, 0, 40), (30, 0, 0), (0, 0, 70)),
+    # A stabilised gimbal below a vehicle that pitches and rolls.
+    ((10, -15, 40), (0, 15, 10), (0, 0, 40)),
+    ((0, 0, 0), (0, 45, 0), (0, 45, 0)),
+])
+def test_camera_attitude_is_composed_of_those_of_vehicle_and_mount(
+    vehicle: tuple[float, float, float], camera: tuple[float, float, float],
+    earth: tuple[float, float, float],
+) -> None:
+    image = Camera().image(attitude(*vehicle), mount(*camera))
+
+    roll, pitch, yaw = earth
+    assert image.camera_roll_deg == pytest.approx(roll, abs=1e-6)
+    assert image.camera_pitch_deg == pytest.approx(pitch, abs=1e-6)
+    assert image.camera_yaw_deg == pytest.approx(yaw, abs=1e-6)
+
+
+@pytest.mark.parametrize('message', [
+    FIX, SystemTime(int(HOST_UTC * 1e6), 0), attitude(1, 2, 3), mount(1, 2, 3),
+    GlobalPositionInt(0, 481234567, 0, 0, 0, 0, 100, 0, 0)])
+@pytest.mark.parametrize(('validity', 'wait', 'valid'), [
+    (5.0, 5.0, True), (5.0, 5.001, False), (30.0, 29.0, True)])
+def test_injected_state_counts_for_5_s_or_as_set_re_29(
+        message: Message, validity: float, wait: float, valid: bool) -> None:
+    image = Camera(validity=validity).image(message, wait=wait)
+    sources = {image.position_source, image.time_source, image.attitude_source,
+               image.mount_source}
+    assert (Source.INJECTED in sources) is valid
+
+
+def test_camera_falls_back_to_position_and_time_of_its_own_gps() -> None:
+    image = Camera().image(FIX, wait=6.0)
+
+    assert (image.position_source, image.latitude_deg, image.longitude_deg, image.altitude_m) == (
+        Source.OWN, *OWN_PLACE)
+    assert (image.time_source, image.time_utc_s) == (Source.OWN, OWN_UTC + 6.0)
+    assert image.position_age_s is None
+
+
+def test_camera_without_own_gps_has_no_position_and_its_clock_goes_on() -> None:
+    camera = Camera(own_gps=None)
+    assert camera.image().time_source is Source.NONE
+    image = camera.image(FIX, wait=6.0)
+
+    assert (image.position_source, image.latitude_deg) == (Source.NONE, None)
+    assert (image.time_source, image.time_utc_s) == (Source.NONE, HOST_UTC + 6.0)
+
+
+def test_injected_position_without_3d_fix_is_none_re_16() -> None:
+    fix = GpsRawInt(int(HOST_UTC * 1e6), 2, 1, 2, 3, 65535, 65535, 65535, 65535, 255)
+    image = Camera().image(fix)
+
+    assert (image.position_source, image.fix_type, image.latitude_deg, image.satellites) == (
+        Source.INJECTED, 2, None, None)
+
+
+def test_global_position_implies_a_fix_and_has_speed_and_course_re_18() -> None:
+    image = Camera().image(GlobalPositionInt(0, 0, 0, 0, 0, 300, -400, 0, 0))
+
+    assert (image.fix_type, image.speed_m_s) == (3, 5.0)
+    assert image.course_deg == pytest.approx(306.87, abs=0.01)
+
+
+def test_images_at_an_interval_have_its_times_and_what_was_known_then() -> None:
+    camera = Camera(interval=1.0)
+    # The poll is late: a message comes first that is newer than the image.
+    camera.now = START + 1.2
+    camera.tell(FIX)
+
+    [image] = camera.device.images
+    assert (image.time_utc_s, image.position_source) == (OWN_UTC + 1.0, Source.OWN)
+
+
+@pytest.mark.parametrize(('fault', 'ask', 'answers'), [
+    ('other-ping', Ping(0, 1, 0, 0), [(Address(7, 101), Ping(0, 1, *HOST))]),
+    ('ping-sequence', Ping(0, 2 ** 32 - 1, 0, 0), [(Address(7, 100), Ping(0, 0, *HOST))]),
+    ('ping-target', Ping(0, 1, 0, 0), [(Address(7, 100), Ping(0, 1, 0, 0))]),
+    ('fixed-system', Ping(0, 1, 0, 0), [(Address(255, 100), Ping(0, 1, *HOST))]),
+    ('slow', Ping(0, 1, 0, 0), []),
+    ('silence', Ping(0, 1, 0, 0), []),
+    ('no-status', control(1), []),
+    ('fixed-system', control(1), []),
+])
+def test_fault_changes_the_answer(
+        fault: str, ask: Message, answers: list[tuple[Address, Message]]) -> None:
+    assert Camera(fault).tell(ask) == answers
+
+
+@pytest.mark.parametrize(('fault', 'shown'), [
+    ('no-feedback', lambda sent, camera: not sent),
+    ('late', lambda sent, camera: not sent and len(camera.wait(15.0)) == 1),
+    ('same-index', lambda sent, camera: sent[0][1].img_idx == 0),
+    ('extension', lambda sent, camera: sent[0][1].base_size == 47),
+    ('any-shot', lambda sent, camera: camera.tell(control(77))),
+    ('no-panel', lambda sent, camera: not camera.tell(control(2))),
+    ('no-injection', lambda sent, camera: camera.image(FIX).position_source is Source.OWN),
+    ('stale', lambda sent, camera:
+        camera.image(FIX, wait=60.0).position_source is Source.INJECTED),
+])
+def test_fault_shows_after_a_capture(
+        fault: str, shown: Callable[[list[tuple[Address, Any]], Camera], object]) -> None:
+    camera = Camera(fault)
+    camera.tell(control(1))
+    assert shown(camera.wait(1.0), camera)
+
+
+@pytest.mark.parametrize(('line', 'effect'), [
+    ('capture', lambda device: device.images[-1].shot == 'survey'),
+    ('capture panel', lambda device: device.images[-1].trigger == 'console'),
+    ('interval 2', lambda device: device.next_deadline() == START + 2.0),
+    ('own-gps none', lambda device: device.own_gps is None),
+    ('own-gps -1,2.5,3', lambda device: device.own_gps == Place(-1.0, 2.5, 3.0)),
+])
+def test_command_of_the_console_has_its_effect(
+        line: str, effect: Callable[[SimulatedRedEdge], bool]) -> None:
+    name, *words = line.split()
+    device = Camera().device
+    [command] = [one for one in device.commands if one.name == name]
+    command.do(device, words, START)()
+    assert effect(device)
+
+
+@pytest.mark.parametrize(('line', 'reason'), [
+    ('capture sky', "'sky' is not panel"), ('own-gps 91,0,0', '91 is outside -90 to 90'),
+    ('own-gps 1,2', 'neither LAT,LON,ALT nor none'), ('interval -1', 'outside')])
+def test_wrong_argument_of_the_console_is_named(line: str, reason: str) -> None:
+    name, *words = line.split()
+    device = Camera().device
+    [command] = [one for one in device.commands if one.name == name]
+    with pytest.raises(ValueError, match=reason):
+        command.do(device, words, START)
+
+
+def test_line_of_the_view_has_the_sources_of_the_next_image() -> None:
+    camera = Camera()
+    camera.image(FIX, LEVEL_NORTH)
+    text = camera.device.snapshot(camera.now).text
+    assert '1 image ' in text
+    assert text.split()[2:] == (
+        ['time', 'injected', 'position', 'injected', 'attitude', 'injected', 'mount', 'none'])
+
+
+def test_settings_make_a_camera() -> None:
+    settings = {name: setting.read(text) for name, setting, text in (
+        (name, SIMULATED.all_settings[name], text) for name, text in (
+            ('interval', '2'), ('validity', '30'), ('own_gps', 'none')))}
+    device = SIMULATED.make(settings, Address(255, 100), False)
+
+    assert (device.own_gps, device.behaviour.validity) == (None, 30.0)
+    assert device.next_deadline() == 2.0
+    assert SIMULATED.make({}, Address(255, 100), False).own_gps is not None
