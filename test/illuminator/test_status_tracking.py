@@ -133,7 +133,9 @@ def test_the_sending_time_of_a_delayed_status_follows_from_its_uptime(
     statuses: list[tuple[int, float]], sent_by: float, is_told: bool,
 ) -> None:
     times = SendingTimes()
-    assert [times.take(*one) for one in statuses][-1] == (pytest.approx(sent_by), is_told)
+    by, told = [times.take(*one) for one in statuses][-1]
+    assert by == pytest.approx(sent_by)
+    assert told is is_told
 
 
 @pytest.mark.parametrize(('rate', 'older', 'newer'), [

@@ -52,6 +52,9 @@ class Turner(Payload):
     def next_deadline(self) -> float:
         return math.inf
 
+    def poll(self, now: float) -> None:
+        return
+
     def receive(self, source: Address, message: Message, now: float) -> None:
         raise AssertionError('commands are executed')
 
