@@ -24,6 +24,6 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
         simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
-        checks='illuminator_ros.illuminator.checks.catalogue:CHECKS'),
+        checks='illuminator_ros.illuminator.checks.requirements:CHECKS'),
     PayloadType('rededge', simulated='illuminator_ros.rededge.simulated:SIMULATED'),
 )}

@@ -16,7 +16,7 @@
 
 from dataclasses import replace
 
-from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,

@@ -17,7 +17,7 @@
 from dataclasses import replace
 import math
 
-from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.model import Limits, Mode
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,

@@ -17,7 +17,7 @@
 import json
 from xml.etree import ElementTree
 
-from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import report as reports

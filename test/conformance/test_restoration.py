@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.checks.tester import LightTester
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration, Mode

@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 import tracemalloc
 
-from illuminator_ros.illuminator.checks.catalogue import CHECKS
+from illuminator_ros.illuminator.checks.requirements import CHECKS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (

@@ -19,7 +19,7 @@ from typing import Any
 
 from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
-from illuminator_ros.illuminator.checks.catalogue import REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
 from illuminator_ros.illuminator.simulated_settings import SIMULATED

@@ -22,7 +22,7 @@ from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.cli.conformance.run import LISTEN_TIME
-from illuminator_ros.illuminator.checks.catalogue import CHECKS, REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import CHECKS, REQUIREMENTS
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
