@@ -20,12 +20,14 @@ import argparse
 from collections.abc import Callable, Mapping
 import sys
 import time
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 from .entry_point import discard_output
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, TimestampStore
+
+T = TypeVar('T')
 
 
 class Parser(argparse.ArgumentParser):
@@ -46,26 +48,14 @@ class Parser(argparse.ArgumentParser):
         super().exit(status, message)
 
 
-def number(low: float, high: float) -> Callable[[str], float]:
-    """Return a function that reads a number within a range."""
-    def read(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f'{text} is outside {low:g} to {high:g}')
-        return value
-    read.__name__ = 'number'
-    return read
-
-
-def integer(low: int, high: int) -> Callable[[str], int]:
-    """Return a function that reads an integer within a range."""
-    def read(text: str) -> int:
-        value = int(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f'{text} is outside {low} to {high}')
-        return value
-    read.__name__ = 'integer'
-    return read
+def option(read: Callable[[str], T]) -> Callable[[str], T]:
+    """Return a reader of settings as argparse takes it, which otherwise hides the reason."""
+    def read_option(text: str) -> T:
+        try:
+            return read(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+    return read_option
 
 
 def address(text: str) -> Address:

@@ -16,10 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+import functools
 import itertools
 
-from .events import AnyLightEvent, ClientSnapshot, LightForgotten, LightFound
+from .events import AnyLightEvent, LightForgotten, LightFound
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
@@ -29,6 +30,7 @@ from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, Ma
 from ..payload.discovery import Discovery
 from ..payload.events import Listeners
 from ..payload.identity import Identity
+from ..payload.request import Done, Result
 
 # Lost lights that are asked for a status at once, so that a slow line is not filled.
 MAX_ASKED = 8
@@ -79,12 +81,6 @@ class IlluminatorClient(Payload):
     def limit_reached(self) -> bool:
         """Return whether there are more lights than the client takes."""
         return self._discovery.limit_reached
-
-    def snapshot(self, now: float) -> ClientSnapshot:
-        """Return all lights, for any thread; call it in the link's thread."""
-        return ClientSnapshot(
-            {address: light.snapshot(now) for address, light in self.lights.items()},
-            self.ignored, self.limit_reached)
 
     def _make(self, address: Address) -> Light:
         def emit(event: AnyLightEvent) -> None:
@@ -144,3 +140,40 @@ class IlluminatorClient(Payload):
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
         return self._discovery.next_deadline()
+
+
+def enable_all(
+    lights: Sequence[Light], on: bool, now: float, done: Done, *,
+    name: Callable[[Light], str], detail: str = '',
+) -> None:
+    """
+    Switch all connected lights on or off, in parallel.
+
+    :param done: called once, when the last light has answered. It is a success if all connected
+        lights succeeded, of which there must be one; the message has the outcome of each.
+    :param name: returns the name of a light, for people.
+    :param detail: as for :meth:`Light.enable`.
+    """
+    connected = [light for light in lights if light.connected]
+    outcomes: dict[Light, Result] = {}
+
+    def outcome(light: Light, result: Result, now: float) -> None:
+        outcomes[light] = result
+        if len(outcomes) == len(connected):
+            done(_summary(on, [
+                (name(one), outcomes.get(one) or Result(False, one.unreachable(now)))
+                for one in lights], [outcomes[one].success for one in connected]), now)
+
+    for light in connected:
+        light.enable(on, now, functools.partial(outcome, light), detail=detail)
+    if not connected:
+        lost = '; '.join(f'{name(light)}: {light.unreachable(now)}' for light in lights)
+        done(Result(False, lost or 'no light has been heard yet'), now)
+
+
+def _summary(
+    on: bool, outcomes: list[tuple[str, Result]], successes: list[bool],
+) -> Result:
+    done = f'{sum(successes)} of {len(successes)} {"on" if on else "off"}'
+    return Result(all(successes), '; '.join(
+        [done, *(f'{name}: {result.message}' for name, result in outcomes)]))

@@ -86,7 +86,6 @@ class Pending:
     origin: Origin
     due: float
     attempts: int = 0
-    was_warned: bool = False
 
 
 @dataclass

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -281,18 +280,3 @@ class LightSnapshot:
             events.append(LightHeld(
                 self.address, HolderChanged(None, self.holder, HolderCause.CLAIM)))
         return events
-
-
-@dataclass(frozen=True, slots=True)
-class ClientSnapshot:
-    """
-    All lights at one moment, for any thread.
-
-    :param lights: by address, in the order in which they were found.
-    :param ignored: the first lights that are not wanted.
-    :param limit_reached: whether there are more lights than the client takes.
-    """
-
-    lights: Mapping[Address, LightSnapshot]
-    ignored: tuple[Address, ...]
-    limit_reached: bool

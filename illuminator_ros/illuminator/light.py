@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 from typing import Any
 
@@ -218,7 +218,7 @@ class Light:
             report, now, can_follow=self._tracker.conflict.can_follow,
             switched_at=self._last_switch[1])
         for refresh in self._refreshes:
-            refresh.status = ''
+            refresh.outcomes['ILLUMINATOR_STATUS'] = ''
         self._check_refreshes(now)
 
     def _follow_switch(self, before: bool | None, report: Report[Status], now: float) -> None:
@@ -236,10 +236,8 @@ class Light:
         self._emit(events.LightSwitched(
             self.address, status.enabled, origin, left_out=self._rate.take(now)))
         # A light is switched on again only where a request has switched it on.
-        if self.settings.reassert and not is_own and (on or not before):
-            self._undo_switch(before, now)
-
-    def _undo_switch(self, before: bool, now: float) -> None:
+        if not self.settings.reassert or is_own or not on and before:
+            return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
             self._emit(events.ChangedByOther(self.address, change, undone=False))
@@ -331,26 +329,16 @@ class Light:
             self._configuration.limit_exceeded,
             self._identity_query.identity, self._identity_query.is_settled(now),
             self._tracker.conflict.detected, self.unreachable(now),
-            self._sources.holder if self._sources else None,
+            self._sources.holder or '' if self._sources else None,
             self._sources.since if self._sources else 0.0)
 
     # Requests
 
-    def _can_reach(self, now: float, done: Done) -> bool:
+    def _can_reach(self, now: float, done: Done, refusal: str = '') -> bool:
         """Return whether the light is heard; if not, fail a request with the reason."""
-        if reason := self.unreachable(now):
+        if reason := refusal or self.unreachable(now):
             done(Result(False, reason), now)
         return not reason
-
-    def _may_send(
-        self, source: str, now: float, done: Done, *, enabled: bool | None = None,
-        brightness: float | None = None,
-    ) -> bool:
-        """Return whether a request of a source can be sent; if not, fail it with the reason."""
-        if refusal := self._claim(source, now, enabled=enabled, brightness=brightness):
-            done(Result(False, refusal), now)
-            return False
-        return self._can_reach(now, done)
 
     def enable(
         self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
@@ -364,10 +352,9 @@ class Light:
 
         :param detail: how it was asked for, which :class:`LightSwitched` repeats.
         """
-        if not self._may_send(source, now, done, enabled=on):
-            return
-        self._automatic = None
-        self._switch(on, now, done, detail)
+        if self._can_reach(now, done, self._claim(source, now, enabled=on)):
+            self._automatic = None
+            self._switch(on, now, done, detail)
 
     def note_request(self, now: float, source: str = '') -> None:
         """Note that a source has commanded the light, though its command must wait."""
@@ -431,7 +418,7 @@ class Light:
 
         def done(result: Result, now: float) -> None:
             if not result.success:
-                self._emit(events.WishFailed(self.address, holder, result.message))
+                self._emit(events.WishFailed(self.address, holder or '', result.message))
 
         if not self._can_reach(now, done):
             return
@@ -483,7 +470,7 @@ class Light:
                 self._sources.remember(source, brightness=changes.get('brightness'))
             done(result, now)
 
-        if self._may_send(source, now, done):
+        if self._can_reach(now, done, self._claim(source, now)):
             self._configuration.configure(changes, now, finished)
             self._changed(self, now)
 
@@ -500,7 +487,7 @@ class Light:
             if not self.is_held_by_other(source):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
-        if self._may_send(source, now, failed, brightness=brightness):
+        if self._can_reach(now, failed, self._claim(source, now, brightness=brightness)):
             self._configuration.set_brightness(brightness, now)
             self._changed(self, now)
 
@@ -536,12 +523,12 @@ class Light:
         self._refreshes.append(refresh)
 
         def identified(failure: str, now: float) -> None:
-            refresh.identity = failure
+            refresh.outcomes['COMPONENT_INFORMATION_BASIC'] = failure
             self._check_refreshes(now)
 
         def answered(result: CommandResult, now: float) -> None:
-            if not result.accepted and refresh.status is None:
-                refresh.status = result.describe()
+            if not result.accepted:
+                refresh.outcomes.setdefault('ILLUMINATOR_STATUS', result.describe())
                 self._check_refreshes(now)
 
         self._identity_query.ask(now, identified)
@@ -549,8 +536,8 @@ class Light:
         self._changed(self, now)
 
     def _check_refreshes(self, now: float) -> None:
-        ended = [one for one in self._refreshes if one.is_complete]
-        self._refreshes = [one for one in self._refreshes if not one.is_complete]
+        ended = [one for one in self._refreshes if one.has_ended(now)]
+        self._refreshes = [one for one in self._refreshes if one not in ended]
         for refresh in ended:
             refresh.done(refresh.result(now), now)
 
@@ -579,9 +566,6 @@ class Light:
             self._send_automatic(self._automatic, now)
         self._switching.poll(now)
         self._configuration.poll(now, connected=self.connected)
-        for refresh in self._refreshes:
-            if now >= refresh.until:
-                refresh.give_up()
         self._check_refreshes(now)
 
     @property
@@ -637,7 +621,7 @@ class Light:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
         lost = self.heard_at + self.settings.heartbeat_timeout if self.connected else math.inf
-        refresh = min((refresh.until for refresh in self._refreshes), default=math.inf)
+        refresh = min((one.started for one in self._refreshes), default=math.inf) + REFRESH_LIMIT
         return min(lost, self._question_due, refresh, self._silence_due, self._automatic_due,
                    self._identity_query.next_deadline(),
                    self._sources.next_deadline() if self._sources else math.inf,
@@ -645,33 +629,26 @@ class Light:
                    self._configuration.next_deadline(connected=self.connected))
 
 
+@dataclass(eq=False)
 class _Refresh:
     """
     A request for COMPONENT_INFORMATION_BASIC and ILLUMINATOR_STATUS.
 
     It is a success when a status has come: not every light has an identity.
 
-    :ivar identity: None while it is awaited, '' once it has come, else why not; so is ``status``.
+    :param outcomes: '' for a message that has come, else why it has not.
     """
 
-    def __init__(self, done: Done, now: float) -> None:
-        self.done = done
-        self.until = now + REFRESH_LIMIT
-        self.identity: str | None = None
-        self.status: str | None = None
-        self._started = now
+    done: Done
+    started: float
+    outcomes: dict[str, str] = field(default_factory=dict)
 
-    @property
-    def is_complete(self) -> bool:
-        return self.identity is not None and self.status is not None
-
-    def give_up(self) -> None:
-        self.identity = 'nothing came' if self.identity is None else self.identity
-        self.status = 'nothing came' if self.status is None else self.status
+    def has_ended(self, now: float) -> bool:
+        return len(self.outcomes) == 2 or now >= self.started + REFRESH_LIMIT
 
     def result(self, now: float) -> Result:
-        parts = [f'{name}: {failure or "received"}' for name, failure in (
-            ('ILLUMINATOR_STATUS', self.status),
-            ('COMPONENT_INFORMATION_BASIC', self.identity))]
-        return Result(
-            not self.status, f'{", ".join(parts)} ({format_seconds(now - self._started)})')
+        failures = [(name, self.outcomes.get(name, 'nothing came'))
+                    for name in ('ILLUMINATOR_STATUS', 'COMPONENT_INFORMATION_BASIC')]
+        parts = [f'{name}: {failure or "received"}' for name, failure in failures]
+        return Result(not failures[0][1],
+                      f'{", ".join(parts)} ({format_seconds(now - self.started)})')

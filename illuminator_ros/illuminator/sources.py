@@ -52,38 +52,30 @@ class Wish:
     brightness: float | None = None
 
 
-class Sources:
+class Sources(Arbiter[str]):
     """Decides which source holds a light, and remembers what each has asked for. No I/O."""
 
     def __init__(self, settings: SourceSettings) -> None:
-        self.settings = settings
-        self._arbiter: Arbiter[str] = Arbiter(
+        super().__init__(
             Policy.PRIORITY, settings.names.index, lease=settings.timeout, remembers=True)
+        self.settings = settings
         self._wishes: dict[str, Wish] = {}
-
-    @property
-    def holder(self) -> str:
-        """Return the source that holds the light, '' if none does."""
-        return self._arbiter.holder or ''
-
-    @property
-    def since(self) -> float:
-        """Return when the holder changed last, s."""
-        return self._arbiter.since
 
     @property
     def wish(self) -> Wish:
         """Return what the holder has asked for."""
-        return self._wishes.get(self.holder, Wish())
+        return self._wishes.get(self.holder or '', Wish())
 
     def claim(self, source: str, now: float) -> HolderChanged[str] | None:
         """Take a request of a source, which holds the light from then on if it may."""
-        return self._arbiter.claim(source, now)
+        if not self.is_claimed_by(source):
+            self._wishes.pop(source, None)
+        return super().claim(source, now)
 
     def remember(self, source: str, *, enabled: bool | None = None,
                  brightness: float | None = None) -> None:
         """Remember values that a source has asked for, as long as it claims the light."""
-        if self._arbiter.is_claimed_by(source):
+        if self.is_claimed_by(source):
             old = self._wishes.get(source, Wish())
             self._wishes[source] = replace(
                 old, enabled=old.enabled if enabled is None else enabled,
@@ -91,24 +83,4 @@ class Sources:
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the light, '' if it may."""
-        return '' if source == self.holder else f'held by {self.holder}'
-
-    def renew(self, source: str, now: float) -> None:
-        """Note a sign of life of a source."""
-        self._arbiter.renew(source, now)
-
-    def release(self, source: str, now: float) -> HolderChanged[str] | None:
-        """Take the light from a source that needs it no more."""
-        self._wishes.pop(source, None)
-        return self._arbiter.release(source, now)
-
-    def poll(self, now: float) -> HolderChanged[str] | None:
-        """Take the light from a source that is silent."""
-        change = self._arbiter.poll(now)
-        for source in [one for one in self._wishes if not self._arbiter.is_claimed_by(one)]:
-            del self._wishes[source]
-        return change
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
-        return self._arbiter.next_deadline()
+        return '' if source == self.holder else f'held by {self.holder or ""}'

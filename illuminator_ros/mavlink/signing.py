@@ -71,14 +71,6 @@ class SigningCounters:
     # Signed, but not looked at: the mode is off.
     unchecked: int = 0
 
-    @property
-    def refusals(self) -> str:
-        """Return the refused frames and why, for people; '' where there are none."""
-        return ', '.join(f'{number} frames refused: {reason}' for number, reason in (
-            (self.bad, 'signed with another key'),
-            (self.replayed, 'time stamps too old or repeated (replay protection); '
-                            'compare the clocks of both sides')) if number)
-
 
 def stamp_of(signature: bytes) -> int:
     """Return the time stamp of the 13 bytes behind a signed frame."""

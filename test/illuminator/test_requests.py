@@ -21,7 +21,7 @@ import random
 import re
 from typing import Any
 
-from illuminator_ros.illuminator.group import enable_all
+from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.light import PROGRESS_LIMIT, REFRESH_LIMIT
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties

@@ -23,8 +23,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from illuminator_ros.illuminator.events import LightSnapshot
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.ros.diagnostics import hardware_id, LightsHeard, reports
-from illuminator_ros.illuminator.ros.flag_log import FlagLog, PAUSE
+from illuminator_ros.illuminator.ros.diagnostics import (
+    FLAG_PAUSE,
+    FlagLog,
+    hardware_id,
+    LightsHeard,
+    reports,
+)
 from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.ros.diagnostics import link_snapshot
@@ -201,6 +206,7 @@ def test_each_flag_is_logged_when_it_is_set_and_cleared_and_not_more_often_than_
     log = FlagLog()
     hot = (WARN, 'thermal throttling: dimmed because it is hot')
     assert [log.take(flags, now) for flags, now in (
-        (1, 0.0), (1, 1.0), (0, 2.0), (1, 3.0), (0, PAUSE), (8, PAUSE), (0x18, 2 * PAUSE))] == [
+        (1, 0.0), (1, 1.0), (0, 2.0), (1, 3.0), (0, FLAG_PAUSE), (8, FLAG_PAUSE),
+        (0x18, 2 * FLAG_PAUSE))] == [
         [hot], [], [], [], [(OK, 'thermal throttling cleared')], [(WARN, 'unknown flags 0x8')],
         [(WARN, 'unknown flags 0x18')]]

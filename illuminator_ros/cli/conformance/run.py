@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``conformance`` as a process: link, question, output, signals and reports."""
+"""``conformance`` as a process: command line, link, question, output, signals and reports."""
 
 from __future__ import annotations
 
@@ -31,10 +31,19 @@ import threading
 from types import FrameType
 from typing import Any
 
-from .options import parse
 from ..entry_point import discard_output
-from ..options import mavlink_version, signing
+from ..options import (
+    add_mavlink_version,
+    add_signing,
+    address,
+    mavlink_version,
+    option,
+    Parser,
+    signing,
+)
+from ..payloads import PAYLOADS
 from ..termination import SIGNALS
+from ... import __version__
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent
 from ...mavlink.messages import Address
@@ -45,6 +54,7 @@ from ...payload.checks.coroutine import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
 from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, Result
 from ...payload.checks.runner import absence, CheckRunner, names
+from ...payload.simulated_settings import integer, number
 
 # s to listen before the first command.
 LISTEN_TIME = 4.5
@@ -52,6 +62,69 @@ NOT_OPEN = 'link not open: '
 # Why a link is not open although this computer has done its part; any other reason is its own.
 PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOSTUNREACH,
                errno.ENETUNREACH, errno.EPIPE)
+FIND_TIMEOUT = 10.0
+DEFAULT_PAYLOAD = 'illuminator'
+
+EPILOG = """\
+examples:
+  conformance serial:///dev/ttyACM0:57600
+  conformance udpin://0.0.0.0:14550 --target 1/243 --junit report.xml
+  conformance udpin://127.0.0.1:14590 --yes   the simulator, started without arguments
+  conformance udp://:14541@127.0.0.1:14540    the emulator of the MAVLink guide
+
+The checks change the state of the device; afterwards it is restored.
+exit status: 0 if all checked requirements are met, 1 if not or if no device was found,
+2 if an argument is wrong or this computer cannot open the link."""
+
+
+def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks[Any]]:
+    """
+    Return the options, and the checks of the payload that they name.
+
+    :param args: the command line without the program's name, by default from ``sys.argv``.
+    :raises SystemExit: if an argument is wrong, with status 2.
+    """
+    payload = Parser(prog='conformance', add_help=False)
+    payload.add_argument(
+        '--payload', default=DEFAULT_PAYLOAD, help='the kind of device (default: %(default)s)',
+        choices=[one.name for one in PAYLOADS.values() if one.checks])
+    checks: PayloadChecks[Any] = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
+    parser = Parser(
+        prog='conformance', formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EPILOG,
+        description=f'Checks whether a {checks.device} follows its MAVLink protocols.',
+        parents=[payload])
+    add = parser.add_argument
+    add('url', nargs='?', help='connection URL: UDP, TCP or serial')
+    add('--version', action='version', version=__version__)
+    add('--list', action='store_true', help='list the requirements and exit')
+    add('--yes', action='store_true', help=f'allow it to {checks.risk}, without asking'.replace(
+        '%', '%%'))
+    add('--target', type=option(address), metavar='SYS/COMP',
+        help=f'address of the {checks.device} (default: the first that is heard)')
+    add('--only', action='append', default=[], metavar='NAME',
+        choices=[one.name for one in checks.requirements],
+        help='check this requirement only; may be repeated')
+    for one in checks.options:
+        add(f'--{one.name}', type=option(number(one.low, one.high)), default=one.default,
+            metavar=one.metavar, help=f'{one.help} (default: %(default)g)')
+    add('--wait', type=option(number(0.1, 3600)), default=FIND_TIMEOUT, metavar='S',
+        help=f'how long to wait for the {checks.device} (default: %(default)g)')
+    for part, default in (('system', 255), ('component', 190)):
+        add(f'--{part}-id', type=option(integer(1, 255)), default=default, metavar='ID',
+            help=f'our MAVLink {part} ID (default: %(default)s)')
+    add('--junit', metavar='FILE', help='also write a JUnit report')
+    add('--json', metavar='FILE', help='also write a JSON report with all messages')
+    add('-v', '--verbose', action='store_true',
+        help='show the messages for requirements that are met, too')
+    add_mavlink_version(parser)
+    add_signing(parser)
+    options = parser.parse_args(args)
+    if options.url is None and not options.list:
+        parser.error('the connection URL is missing')
+    for path in filter(None, (options.junit, options.json)):
+        if not Path(path).absolute().parent.is_dir():
+            parser.error(f'{path}: there is no such directory')
+    return options, checks
 
 
 def run(args: Sequence[str] | None = None) -> int:

@@ -36,9 +36,10 @@ from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
 from .view import plain, screen, ViewState
 from ..entry_point import discard_output, one_line
-from ..options import number, Parser
+from ..options import option, Parser
 from ..termination import Termination
 from ... import __version__
+from ...payload.simulated_settings import number
 from ...ros.executor import NodeExecutor
 from ...ros.throttled_log import NodeLog
 
@@ -97,7 +98,7 @@ def parser() -> argparse.ArgumentParser:
         prog='monitor', description=DESCRIPTION, epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     made.add_argument('--once', action='store_true', help='print one table and end')
-    made.add_argument('--wait', type=number(0.1, 3600), default=6.0, metavar='S',
+    made.add_argument('--wait', type=option(number(0.1, 3600)), default=6.0, metavar='S',
                       help='longest search for lights before that table, s (default: 6)')
     made.add_argument('--ascii', action='store_true',
                       help='draw with ASCII characters only')

@@ -21,10 +21,11 @@ from collections.abc import Iterable, Mapping
 
 from .components import SettingError, Types
 from .console import describe_commands
-from ..options import add_mavlink_version, add_signing, integer, Parser
+from ..options import add_mavlink_version, add_signing, option, Parser
 from ..payloads import PAYLOADS
 from ... import __version__
 from ...payload.registry import PayloadType
+from ...payload.simulated_settings import integer
 
 DEFAULT_PAYLOAD = 'illuminator'
 
@@ -85,12 +86,12 @@ def parser(
                              f'(default: {DEFAULT_PAYLOAD})')
     result.add_argument('--file', metavar='FILE',
                         help=f'read url, settings and {", ".join(plurals)} from YAML')
-    result.add_argument('--count', type=integer(1, 200), metavar='N',
+    result.add_argument('--count', type=option(integer(1, 200)), metavar='N',
                         help=f'number of {", ".join(plurals)}, with component ids counted up '
                              '(default: 1)')
-    result.add_argument('--system-id', type=integer(1, 255), metavar='ID',
+    result.add_argument('--system-id', type=option(integer(1, 255)), metavar='ID',
                         help=f'MAVLink system id (default: {profile}{default.system})')
-    result.add_argument('--component-id', type=integer(0, 255), metavar='ID',
+    result.add_argument('--component-id', type=option(integer(0, 255)), metavar='ID',
                         help=f'component id of the first {" or ".join(nouns)} (default: '
                              f'{profile}{default.component})')
     for noun in nouns:

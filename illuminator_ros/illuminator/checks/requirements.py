@@ -56,7 +56,7 @@ async def other_target(tester: LightTester) -> None:
     system, component = session.device
     systems = {one.system for one in taken}
     others = (
-        next(one for one in (messages.Address(system, n) for n in range(200, 256)) if one not in taken),
+        next(messages.Address(system, n) for n in range(200, 256) if (system, n) not in taken),
         next(messages.Address(n, component or 200) for n in range(240, 0, -1) if n not in systems))
     failures = []
     for other in others:
@@ -458,7 +458,8 @@ REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
 def is_light(message: messages.Message) -> bool:
     """Return whether a message identifies its sender as a light."""
     return (isinstance(message, IlluminatorStatus)
-            or isinstance(message, messages.Heartbeat) and message.type == messages.MavType.ILLUMINATOR)
+            or isinstance(message, messages.Heartbeat)
+            and message.type == messages.MavType.ILLUMINATOR)
 
 
 def describe(message: messages.Message) -> str:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The reports of one light's node on /diagnostics: pure functions of snapshots."""
+"""The reports of one light's node on /diagnostics, and log lines on error flags. No ROS calls."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ from ...ros import diagnostics
 
 # s without a status from a light that has sent some; one is requested every 2.5 s.
 STATUS_SILENCE = 10.0
+# s between two log lines on one flag.
+FLAG_PAUSE = 5.0
 
 # The consequence of each flag for the user of the light.
 FLAG_LEVELS: dict[ErrorFlag, tuple[bytes, str]] = {
@@ -43,6 +45,40 @@ def flag_findings(flags: int) -> dict[int, diagnostics.Finding]:
     if unknown := flags & ~KNOWN_FLAGS:
         found[~KNOWN_FLAGS] = (diagnostics.WARN, flag_names(unknown)[0])
     return found
+
+
+class FlagLog:
+    """
+    Reports when each flag is set and cleared, at most every :data:`FLAG_PAUSE`.
+
+    A change within the pause is reported after it, so that the last line on a flag is true.
+    """
+
+    def __init__(self) -> None:
+        # By flag, the name in its last line and the time, s; '' where that said it is cleared.
+        self._told: dict[int, tuple[str, float]] = {}
+
+    def take(self, flags: int, now: float) -> list[diagnostics.Finding]:
+        """
+        Return the lines to log, of level OK for a flag that was cleared.
+
+        :param flags: those of a status; all unknown bits share one line.
+        :param now: when it was received, s.
+        """
+        lines: list[diagnostics.Finding] = []
+        found = flag_findings(flags)
+        for flag in {**self._told, **found}:
+            name = ', '.join(flag_names(flags & flag))
+            told, told_at = self._told.get(flag, ('', -math.inf))
+            if name == told or now < told_at + FLAG_PAUSE:
+                continue
+            self._told[flag] = (name, now)
+            if name:
+                severity, text = found[flag]
+                lines.append((severity, text if text == name else f'{name}: {text}'))
+            else:
+                lines.append((diagnostics.OK, f'{told} cleared'))
+        return lines
 
 
 @dataclass(frozen=True)

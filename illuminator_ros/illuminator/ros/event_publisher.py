@@ -24,7 +24,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
-from .flag_log import FlagLog
+from .diagnostics import FlagLog
 from .. import events, model
 from ..sources import DEFAULT
 from ...payload.arbitration import Cause as HolderCause

@@ -28,8 +28,7 @@ from std_srvs.srv import SetBool
 from . import parameters
 from .light_node import LightNode
 from .. import events
-from ..client import IlluminatorClient
-from ..group import enable_all
+from ..client import enable_all, IlluminatorClient
 from ..light import Light
 from ...mavlink.command import CommandSender
 from ...mavlink.messages import Address
