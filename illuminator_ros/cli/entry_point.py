@@ -28,7 +28,6 @@ from .termination import Termination
 # How to install a missing package.
 _REMEDIES = {
     'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
-    'pymavlink': 'pip install pymavlink',
     'fastcrc': 'pip install fastcrc',
     'rich': "sudo apt install python3-rich, or pip install 'rich>=13.3'",
     'visualization_msgs': 'sudo apt install ros-jazzy-visualization-msgs',

@@ -26,4 +26,5 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
         checks='illuminator_ros.illuminator.checks.requirements:CHECKS'),
     PayloadType('rededge', simulated='illuminator_ros.rededge.simulated:SIMULATED'),
+    PayloadType('gimbal', simulated='illuminator_ros.gimbal.simulated_device:SIMULATED'),
 )}

@@ -35,6 +35,7 @@ from .messages import (
     MavType,
     Message,
 )
+from .stream_queue import StreamGroup
 
 # s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0
@@ -51,11 +52,14 @@ class Endpoint(ABC):
     :ivar messages: the classes of the messages that it receives; the link decodes no others.
     :ivar sends: the classes of messages that it sends; those that it also receives, and those of
         the command protocol, may be left out.
+    :ivar streams: groups of classes of messages that newer ones replace, the most urgent first. A
+        group is sent as one when the line has room; all other messages are sent at once.
     :ivar outgoing: messages to send, each with the address that sends it.
     """
 
     messages: Sequence[type[Message]]
     sends: Sequence[type[Message]] = ()
+    streams: Sequence[StreamGroup] = ()
 
     def __init__(self) -> None:
         self.outgoing: deque[tuple[Address, Message]] = deque()
@@ -90,10 +94,11 @@ class Payload(Protocol):
 
     :ivar messages: the classes of the messages that it receives, HEARTBEAT included if needed.
         Commands are executed if COMMAND_LONG and COMMAND_INT are among them.
-    :ivar sends: the classes of messages that it sends, see :class:`Endpoint`.
+    :ivar sends: the classes of messages that it sends, and ``streams``: see :class:`Endpoint`.
     """
 
     sends: Sequence[type[Message]] = ()
+    streams: Sequence[StreamGroup] = ()
 
     @property
     def messages(self) -> Sequence[type[Message]]:
@@ -120,9 +125,11 @@ class Payload(Protocol):
 
     def poll(self, now: float) -> None:
         """Do everything that is due."""
+        return
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
+        return math.inf
 
 
 class HeartbeatTimer:
@@ -172,6 +179,7 @@ class Component(Endpoint):
         self.messages = tuple(dict.fromkeys(
             (Heartbeat, CommandAck, *(cls for one in payloads for cls in one.messages))))
         self.sends = tuple(dict.fromkeys(cls for one in payloads for cls in one.sends))
+        self.streams = tuple(group for one in payloads for group in one.streams)
         self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)
                            for cls in self.messages}
         self._received = CommandReceiver(self.address)

@@ -40,6 +40,7 @@ from .routing_table import RoutingTable
 from .signing import Signing
 from .signing_files import TimestampKeeper, TimestampStore
 from .statistics import Traffic
+from .stream_queue import StreamQueue
 from .transport import Channel, Peer
 from .url import Url
 
@@ -124,6 +125,9 @@ class Link:
         self._receiver = FrameReader(self._signing, self._classes)
         self._router = RoutingTable()
         self._traffic = Traffic()
+        # Messages that wait for the line, and when it will have sent all that was written, s.
+        self._streams = StreamQueue(endpoint.streams)
+        self._line_free_at = -math.inf
         self._status = LinkStatus(label, clock())
         # When the channel is proved without a frame, and whether a frame was received over it.
         self._proven_at = math.inf
@@ -300,7 +304,7 @@ class Link:
         self._report(now)
         self._due = min(
             self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
-            self._status.next_deadline(), self._snapshot_due,
+            self._status.next_deadline(), self._snapshot_due, self._stream_due(),
             math.inf if self._channel is not None or self._connecting else self._connect_at)
 
     def _report(self, now: float) -> None:
@@ -322,6 +326,7 @@ class Link:
         try:
             if events & selectors.EVENT_WRITE:
                 self._channel.writable(handle)
+                self._work_pending |= bool(self._streams)
             if events & selectors.EVENT_READ:
                 for peer, data in self._channel.receive(handle):
                     self._take(self._channel, peer, data)
@@ -387,29 +392,46 @@ class Link:
 
     def _flush(self) -> None:
         """Send the messages of the endpoint; without a channel they are dropped."""
-        outgoing = self.endpoint.outgoing
-        while outgoing and self._channel is not None:
+        outgoing, replaced = self.endpoint.outgoing, self._streams.replaced
+        if outgoing:
+            urgent = deque(one for one in outgoing if not self._streams.hold(*one))
+            outgoing.clear()
+            self._traffic.frames_dropped += self._streams.replaced - replaced
+            if any(getattr(message, 'target_system', 0) for _, message in urgent):
+                self._hurry_until = self.clock() + HURRY
+            self._send_messages(urgent)
+        while self._streams and self._stream_due() <= self.clock():
+            self._send_messages(deque(self._streams.take()))
+        if self._channel is None:
+            outgoing.clear()
+            self._streams.clear()
+
+    def _stream_due(self) -> float:
+        """Return when messages of streams can be sent, infinity if the channel will tell."""
+        if self._channel is None or self._channel.is_waiting or not self._streams:
+            return math.inf
+        return self._line_free_at
+
+    def _send_messages(self, messages: deque[tuple[Address, Message]]) -> None:
+        while messages and self._channel is not None:
             channel, now = self._channel, self.clock()
             all_peers = channel.peers(now)
             # Frames for the same peers are sent together: each receiver is then woken only once.
             frames: list[bytes] = []
             peers: Sequence[Peer] = ()
-            while outgoing:
-                source, message = outgoing[0]
+            while messages:
+                source, message = messages[0]
                 towards = self._router.towards(message, all_peers, now)
                 if frames and towards != peers:
                     break
                 peers = towards
-                outgoing.popleft()
-                if getattr(message, 'target_system', 0):
-                    self._hurry_until = now + HURRY
+                messages.popleft()
                 self._write(frames, source, message, now)
             try:
                 if frames:
                     self._send(channel, frames, peers)
             except OSError as error:
                 self._lost(error)
-        outgoing.clear()
 
     def _write(self, frames: list[bytes], source: Address, message: Message, now: float) -> None:
         try:
@@ -421,9 +443,11 @@ class Link:
                 _frame_log.debug('sent from %s: %s', source, message)
 
     def _send(self, channel: Channel, frames: list[bytes], peers: Sequence[Peer]) -> None:
-        self._traffic_seen(self.clock())
+        now = self.clock()
+        self._traffic_seen(now)
         dropped = channel.dropped
         channel.send(frames, peers)
+        self._line_free_at = max(now, self._line_free_at) + sum(map(len, frames)) / channel.rate
         self._traffic.frames_dropped += channel.dropped - dropped
         self._traffic.frames_sent += len(frames) * len(peers)
         self._traffic.bytes_sent += sum(map(len, frames)) * len(peers)
@@ -446,6 +470,7 @@ class Link:
             channel.close()
             return
         self._channel = channel
+        self._line_free_at = -math.inf
         self._proven_at = now + PROBATION
         self._frame_received = False
         self._greet_at = now + GREETING_INTERVAL

@@ -18,7 +18,7 @@ Message classes: the fields of a MAVLink message, and its payload's bytes.
 A class is defined from its fields, as the XML definition lists them; the layout and CRC_EXTRA
 follow from those (MAVLink guide, "Packet Serialization"). The classes here belong to services
 that every component has. A payload defines its own, and names those that it handles. Frames of
-all other messages of pymavlink's ``common`` dialect are checked, but not decoded.
+all other messages of the dialect ardupilotmega are checked, but not decoded.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ import struct
 from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
 
 from fastcrc.crc16 import mcrf4xx
-from pymavlink.dialects.v20 import common
+
+from .layouts import DIALECT
 
 UInt8 = Annotated[int, 'B']
 UInt16 = Annotated[int, 'H']
@@ -97,8 +98,7 @@ class Message:
 
 M = TypeVar('M', bound=Message)
 # Every message that can be checked, by message id.
-LAYOUTS: dict[int, Layout] = {
-    id_: Layout(cls.crc_extra, cls.unpacker.size) for id_, cls in common.mavlink_map.items()}
+LAYOUTS: dict[int, Layout] = {id_: Layout(*values) for id_, values in DIALECT.items()}
 
 
 def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], type[M]]:

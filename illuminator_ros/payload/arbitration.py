@@ -93,7 +93,7 @@ class Arbiter(Generic[K]):
 
     def claim(self, source: K, now: float) -> HolderChanged[K] | None:
         """Take a claim of a source; it is granted if the source is :attr:`holder` then."""
-        granted = self._may_hold(source)
+        granted = self.may_hold(source)
         if granted and not self._remembers:
             self._claims.clear()
         if granted or self._remembers:
@@ -127,7 +127,8 @@ class Arbiter(Generic[K]):
         """Return when :meth:`poll` is due, infinity if never."""
         return min(self._claims.values(), default=math.inf) + self._lease
 
-    def _may_hold(self, source: K) -> bool:
+    def may_hold(self, source: K) -> bool:
+        """Return whether a claim of a source would be granted now."""
         if self.holder in (None, source) or source in self._overruling:
             return True
         assert self.holder is not None

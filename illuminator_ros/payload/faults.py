@@ -153,6 +153,8 @@ class Fault:
         """Return a value as it is typed, '' if there is none to type."""
         if self.read is None or value == math.inf:
             return ''
+        if isinstance(value, str):
+            return value
         return value.name.lower() if isinstance(value, MavResult) else f'{value:.10g}'
 
 

@@ -49,11 +49,11 @@ class Turner(Payload):
         self.results = list(results)
         self.executed: list[AnyCommand] = []
 
-    def next_deadline(self) -> float:
-        return math.inf
-
     def poll(self, now: float) -> None:
         return
+
+    def next_deadline(self) -> float:
+        return math.inf
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         raise AssertionError('commands are executed')

@@ -92,8 +92,8 @@ def test_bridge_takes_the_url_as_its_argument(domain: int) -> None:
 @pytest.mark.parametrize(('name', 'package', 'remedy'), [
     ('bridge', 'rclpy', ROS_REMEDY), ('monitor', 'rclpy', ROS_REMEDY),
     ('monitor', 'rich', "sudo apt install python3-rich, or pip install 'rich>=13.3'"),
-    ('bridge', 'pymavlink', 'pip install pymavlink'),
-    ('simulator', 'pymavlink', 'pip install pymavlink'),
+    ('bridge', 'fastcrc', 'pip install fastcrc'),
+    ('simulator', 'fastcrc', 'pip install fastcrc'),
 ])
 def test_missing_package_is_one_line_with_its_remedy_and_status_1(
     name: str, package: str, remedy: str, tmp_path: Path,

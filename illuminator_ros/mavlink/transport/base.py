@@ -20,6 +20,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Hashable, Iterator, Sequence
 import contextlib
+import math
 import os
 import selectors
 import socket
@@ -47,11 +48,18 @@ class Channel(ABC):
     :ivar name: how logs and errors name it.
     :ivar dropped: frames that were not sent because the line or the kernel was full.
     :ivar more: whether the last read may have left bytes.
+    :ivar rate: of the line, bytes/s; infinity where it is not known.
     """
 
     name: str = ''
     dropped: int = 0
     more: bool = False
+    rate: float = math.inf
+
+    @property
+    def is_waiting(self) -> bool:
+        """Return whether frames wait until the channel is writable."""
+        return False
 
     @abstractmethod
     def register(self, selector: selectors.BaseSelector) -> None:
@@ -146,6 +154,11 @@ class Stream:
         self._descriptor = file if isinstance(file, int) else file.fileno()
         self._queue = FrameQueue()
 
+    @property
+    def is_waiting(self) -> bool:
+        """Return whether frames wait until the stream is writable."""
+        return bool(self._queue)
+
     def receive(self) -> bytes | None:
         """Return available bytes, None if there are none yet, b'' at the end."""
         try:
@@ -178,6 +191,11 @@ class StreamChannel(Channel):
         self.name = name
         self._stream = stream
         self._at_end = at_end
+
+    @property
+    def is_waiting(self) -> bool:
+        """See :attr:`Channel.is_waiting`."""
+        return self._stream.is_waiting
 
     def register(self, selector: selectors.BaseSelector) -> None:
         """See :meth:`Channel.register`."""

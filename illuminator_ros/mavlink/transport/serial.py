@@ -21,6 +21,7 @@ import contextlib
 import errno
 import fcntl
 import functools
+import math
 import os
 from pathlib import Path
 import struct
@@ -30,6 +31,8 @@ import tty
 from .base import Channel, Peer, Stream, StreamChannel
 from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
+# 8N1: a start bit, 8 data bits, a stop bit.
+BITS_PER_BYTE = 10
 # Bytes in a pseudo-terminal that no program has read; a serial line would have lost them.
 MAX_UNREAD = 2048
 
@@ -60,7 +63,8 @@ def open_serial(url: SerialUrl) -> Channel:
     with contextlib.suppress(OSError, ValueError, AttributeError):
         port.set_low_latency_mode(True)
     return _LineChannel(
-        port.fileno(), f'serial {url.device} at {url.baud} baud', port.close)
+        port.fileno(), f'serial {url.device} at {url.baud} baud', port.close,
+        rate=url.baud / BITS_PER_BYTE)
 
 
 def open_pty(url: PtyUrl) -> Channel:
@@ -114,9 +118,10 @@ class _LineChannel(StreamChannel):
 
     def __init__(
         self, fd: int, name: str, close: Callable[[], None],
-        before_sending: Callable[[], None] = lambda: None,
+        before_sending: Callable[[], None] = lambda: None, *, rate: float = math.inf,
     ) -> None:
         super().__init__(name, Stream(fd), 'the device has gone')
+        self.rate = rate
         self._fd = fd
         self._close = close
         self._before_sending = before_sending

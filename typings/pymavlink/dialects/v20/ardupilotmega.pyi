@@ -13,3 +13,4 @@
 # limitations under the License.
 
 from pymavlink.dialects.v20.common import MAVLink as MAVLink
+from pymavlink.dialects.v20.common import mavlink_map as mavlink_map

@@ -1,0 +1,638 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A gimbal manager: it decides who controls a gimbal, and gives the device its setpoints.
+
+https://mavlink.io/en/services/gimbal_v2.html leaves it to the players when control moves. Here it
+moves only as a policy says. No I/O.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+import math
+from typing import TypeAlias
+
+from .manager_control import Control, ControlChanged, ControlSettings, Role
+from .manager_presence import ManagerState, Presence, StateChanged
+from .manager_setpoint import (
+    AnySetpoint,
+    clip,
+    Clipped,
+    Demand,
+    direction,
+    GeoPoint,
+    GimbalModel,
+    mix,
+    nudge,
+    Range,
+    read_demand,
+    resolve,
+    Setpoint,
+    STABILISED,
+    STILL,
+    stopped,
+    turned_by,
+)
+from .manager_vehicle import VehicleState
+from .messages import (
+    AutopilotStateForGimbalDevice,
+    Capabilities,
+    GimbalCommand,
+    GimbalDeviceInformation,
+    GimbalDeviceSetAttitude,
+    GimbalManagerInformation,
+    GimbalManagerSetAttitude,
+    GimbalManagerSetManualControl,
+    GimbalManagerSetPitchyaw,
+    GimbalManagerStatus,
+    MAV_TYPE_GIMBAL,
+)
+from ..mavlink import messages as mav
+from ..mavlink.command import Command, CommandResult, CommandSender
+from ..mavlink.command_receiver import AnyCommand
+from ..mavlink.component import Payload
+from ..mavlink.messages import Address, MavResult
+from ..payload.events import Listeners, RateLimit
+from ..payload.mount import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.rotation import Quaternion
+from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+
+# s between GIMBAL_MANAGER_STATUS; between repetitions of a setpoint that stays as it is, at most
+# 1 s by the specification; and of one that follows a place, the vehicle or a rate.
+STATUS_INTERVAL = 0.2
+HOLD_INTERVAL = 0.9
+FOLLOW_INTERVAL = 0.05
+# s between requests for GIMBAL_DEVICE_INFORMATION until it comes.
+INFORMATION_INTERVAL = 5.0
+# s after the last AUTOPILOT_STATE_FOR_GIMBAL_DEVICE of an autopilot in which ours is not sent,
+# and between two of ours.
+AUTOPILOT_SILENCE = 2.0
+AUTOPILOT_INTERVAL = 0.02
+# s after which the attitude of a device is out of date.
+ATTITUDE_AGE = 1.0
+# s within which two different heartbeats of one address show two senders.
+IDENTITY_TIME = 3.0
+# s between two reports of one kind, and kinds that are told apart.
+REPORT_INTERVAL = 1.0
+MAX_REPORTS = 256
+# MAV_FRAMEs of altitudes above mean sea level, and above the home position.
+GLOBAL_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
+_ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
+
+
+@dataclass(frozen=True)
+class ManagerSettings:
+    """
+    The settings of a manager.
+
+    :param device_id: of its device: a component id, 1..6 for a device without MAVLink, or 0 for
+        the first device that is heard.
+    :param nudge_limit: the largest angle that a player in secondary control adds, rad.
+    :param ranges: of the axes of a device without MAVLink.
+    """
+
+    control: ControlSettings = field(default_factory=ControlSettings)
+    device_id: int = 0
+    nudge_limit: float = math.radians(10)
+    ranges: tuple[Range, Range, Range] = (Range(), Range(), Range())
+
+
+@dataclass(frozen=True)
+class DemandRefused:
+    """A player's setpoint was refused; others of it were too, but are not reported."""
+
+    player: Address
+    reason: str
+    unreported: int
+
+
+@dataclass(frozen=True)
+class SetpointClipped:
+    """Angles beyond the ranges of the device were clipped."""
+
+    clipped: tuple[Clipped, ...]
+
+
+@dataclass(frozen=True)
+class SetpointSent:
+    """The device got a setpoint; ``setpoint`` has everything mixed and clipped."""
+
+    setpoint: Setpoint
+
+
+@dataclass(frozen=True)
+class AttitudeReceived:
+    """The device has reported its attitude."""
+
+    status: GimbalDeviceAttitudeStatus
+
+
+@dataclass(frozen=True)
+class InformationReceived:
+    """The device has said what it is."""
+
+    information: GimbalDeviceInformation
+
+
+@dataclass(frozen=True)
+class AddressShared:
+    """A player's address is used by two senders, whose heartbeats differ."""
+
+    player: Address
+
+
+@dataclass(frozen=True)
+class PositionLost:
+    """The gimbal cannot follow its region of interest: the vehicle's position is unknown."""
+
+
+ManagerEvent: TypeAlias = (
+    StateChanged | ControlChanged | DemandRefused | SetpointClipped | SetpointSent
+    | AttitudeReceived | InformationReceived | AddressShared | PositionLost)
+
+
+class GimbalManager(Payload):
+    """
+    The manager of one gimbal.
+
+    :param commands: sends everything, from the manager's address.
+    :ivar events: see above.
+    :ivar control: who has which kind of control.
+    :ivar vehicle: takes the vehicle's state from ROS.
+    :ivar model: the abilities of the device.
+    """
+
+    messages = (
+        mav.Heartbeat, mav.CommandLong, mav.CommandInt, GimbalManagerInformation,
+        GimbalManagerStatus, GimbalManagerSetAttitude, GimbalManagerSetPitchyaw,
+        GimbalManagerSetManualControl, GimbalDeviceInformation, GimbalDeviceAttitudeStatus,
+        AutopilotStateForGimbalDevice, Attitude, GlobalPositionInt)
+    sends = (GimbalManagerInformation, GimbalManagerStatus, GimbalDeviceInformation,
+             GimbalDeviceSetAttitude, GimbalDeviceAttitudeStatus, AutopilotStateForGimbalDevice)
+
+    def __init__(self, commands: CommandSender, settings: ManagerSettings) -> None:
+        self.events: Listeners[ManagerEvent] = Listeners()
+        self.settings = settings
+        self.address = commands.address
+        self.control = Control(settings.control)
+        self.vehicle = VehicleState()
+        self._commands = commands
+        self._presence = Presence(commands.address, settings.device_id, self._state_changed)
+        self.model = (GimbalModel() if self._presence.has_mavlink
+                      else GimbalModel.from_ranges(settings.ranges))
+        self._information: GimbalDeviceInformation | None = None
+        self._status: GimbalDeviceAttitudeStatus | None = None
+        self._status_at = -math.inf
+        self._setpoint: Setpoint | None = None
+        self._offsets = STILL
+        self._place: GeoPoint | None = None
+        self._send_due = self._status_due = self._information_due = math.inf
+        self._autopilot_at = self._state_sent_at = -math.inf
+        self._limits: dict[object, RateLimit] = {}
+        self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
+        self._handlers: dict[int, Callable[[Address, Sequence[float], int, float], MavResult]] = {
+            GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
+            GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
+            GimbalCommand.DO_SET_ROI_LOCATION: self._set_place,
+            GimbalCommand.DO_SET_ROI_NONE: self._clear_place}
+
+    # Snapshots
+
+    @property
+    def state(self) -> ManagerState:
+        """The manager's state."""
+        return self._presence.state
+
+    @property
+    def device(self) -> Address | None:
+        """The address of the device, None if it is not known, or has none."""
+        return self._presence.device
+
+    @property
+    def device_id(self) -> int:
+        """The id of the device, 0 while none is known."""
+        return self._presence.device_id
+
+    @property
+    def has_mavlink(self) -> bool:
+        """Whether the device is a MAVLink component."""
+        return self._presence.has_mavlink
+
+    @property
+    def other(self) -> Address | None:
+        """The other manager of the device that is heard, None if there is none."""
+        return self._presence.other
+
+    @property
+    def information(self) -> GimbalDeviceInformation | None:
+        """The last GIMBAL_DEVICE_INFORMATION of the device."""
+        return self._information
+
+    def status(self, now: float) -> GimbalManagerStatus:
+        """Return the message that tells who is in control."""
+        setpoint, device = self._setpoint, self._device_status(now)
+        flags = MountFlags(0) if setpoint is None else setpoint.device_flags
+        accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+        primary, secondary = (self.control.holder(role) or Address(0, 0) for role in Role)
+        return GimbalManagerStatus(
+            _boot_time(now), int(flags | (accepts and MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)),
+            self.device_id, *primary, *secondary)
+
+    # The payload
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Payload.link_opened`."""
+        self._presence.link_opened(now)
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
+        self._presence.link_closed(now)
+
+    def receive(self, source: Address, message: mav.Message, now: float) -> None:
+        """See :meth:`Payload.receive`."""
+        if isinstance(message, AnySetpoint):
+            if self._is_for_us(message):
+                self._take_setpoint(source, message, now)
+        elif isinstance(message, mav.Heartbeat):
+            self.control.heard(source, now)
+            self._compare_identity(source, message, now)
+            if message.type == MAV_TYPE_GIMBAL:
+                self._presence.hear_device(source, now)
+        elif isinstance(message, GimbalDeviceAttitudeStatus):
+            if self._presence.hear_device(source, now):
+                self.take_attitude(message, now)
+        elif isinstance(message, GimbalDeviceInformation):
+            if self._presence.hear_device(source, now):
+                self._information = message
+                self._information_due = math.inf
+                self.model = GimbalModel.from_information(message)
+                self.events.emit(InformationReceived(message))
+        elif isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
+            self._presence.hear_manager(source, message.gimbal_device_id, now)
+        elif source == Address(self.address.system, mav.MAV_COMP_ID_AUTOPILOT1):
+            if isinstance(message, AutopilotStateForGimbalDevice):
+                self._autopilot_at = now
+            elif isinstance(message, Attitude | GlobalPositionInt):
+                self.vehicle.take(message, now)
+
+    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+        """See :meth:`Payload.execute`."""
+        params, frame = _params(command)
+        if command.command == mav.MavCmd.REQUEST_MESSAGE:
+            return self._send_requested(params[0], now)
+        handler = self._handlers.get(command.command)
+        if handler is None:
+            return None
+        device_id = params[0] if command.command in _ROI_COMMANDS else params[6]
+        if device_id not in (0, self.device_id):
+            return MavResult.DENIED
+        if self.state is not ManagerState.ACTIVE:
+            return (MavResult.DENIED if self.state is ManagerState.INACTIVE
+                    else MavResult.TEMPORARILY_REJECTED)
+        return handler(source, params, frame, now)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        self._presence.poll(now)
+        self._control_changed(self.control.poll(now), now)
+        if now >= self._information_due:
+            self._request_information(now)
+        if now >= self._status_due:
+            self._status_due = max(self._status_due + STATUS_INTERVAL, now)
+            self._commands.send(self.status(now))
+        if now >= self._send_due:
+            self._follow(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return min(self._presence.next_deadline(), self.control.next_deadline(),
+                   self._information_due, self._status_due, self._send_due)
+
+    # The device and the vehicle, as ROS knows them
+
+    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Take the attitude of the device, from the link or of a device without MAVLink."""
+        self._status, self._status_at = status, now
+        if not self.has_mavlink and self.state is ManagerState.ACTIVE:
+            self._commands.send(replace(status, gimbal_device_id=self.device_id))
+        self.events.emit(AttitudeReceived(status))
+
+    def vehicle_changed(self, now: float) -> None:
+        """Tell the device what ROS knows of the vehicle, unless an autopilot does."""
+        if (self.device is None or self.state is not ManagerState.ACTIVE
+                or now < self._autopilot_at + AUTOPILOT_SILENCE
+                or now < self._state_sent_at + AUTOPILOT_INTERVAL):
+            return
+        message = self.vehicle.for_device(self.device, now)
+        if message is not None:
+            self._state_sent_at = now
+            self._commands.send(message)
+
+    # Control
+
+    def _configure(
+        self, source: Address, params: Sequence[float], frame: int, now: float,
+    ) -> MavResult:
+        try:
+            changes = self.control.configure(source, params, now)
+        except ValueError:
+            return MavResult.DENIED
+        if changes is None:
+            return MavResult.DENIED
+        self._control_changed(changes, now)
+        return MavResult.ACCEPTED
+
+    def _control_changed(self, changes: Sequence[ControlChanged], now: float) -> None:
+        for change in changes:
+            if change.role is Role.SECONDARY:
+                self._offsets = STILL
+            elif self._setpoint is not None:
+                # The gimbal stays where it points until the next player says more.
+                self._setpoint = stopped(self._setpoint, now)
+                self._send(now)
+            self.events.emit(change)
+
+    # Setpoints
+
+    def _is_for_us(self, message: AnySetpoint) -> bool:
+        return (message.target_system in (0, self.address.system)
+                and message.target_component in (0, self.address.component)
+                and message.gimbal_device_id in (0, self.device_id))
+
+    def _take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
+        try:
+            demand = read_demand(message, self.model.ranges)
+        except ValueError as error:
+            refusal = f'{message.name}: {error}'
+        else:
+            refusal = self._demand(source, demand, now)
+        if refusal:
+            unreported = self._limit((source, refusal)).take(now)
+            if unreported is not None:
+                self.events.emit(DemandRefused(source, refusal, unreported))
+
+    def _pitch_yaw(
+        self, source: Address, params: Sequence[float], frame: int, now: float,
+    ) -> MavResult:
+        try:
+            pitch, yaw, pitch_rate, yaw_rate = map(math.radians, params[:4])
+            flags = 0 if math.isnan(params[4]) else int(params[4])
+            demand = Demand.from_pitch_yaw(flags, pitch, yaw, pitch_rate, yaw_rate)
+        except (ValueError, OverflowError):
+            return MavResult.DENIED
+        return MavResult.DENIED if self._demand(source, demand, now) else MavResult.ACCEPTED
+
+    def _demand(self, player: Address, demand: Demand, now: float) -> str:
+        """Follow a player's demand; return why it is refused, or ''."""
+        if self.state is not ManagerState.ACTIVE:
+            return f'the manager is not active: {self.state.value}'
+        holder = self.control.holder(Role.PRIMARY)
+        if holder == player:
+            return self._set(demand, now)
+        if self.control.holder(Role.SECONDARY) == player:
+            if demand.flags & (MountFlags.RETRACT | MountFlags.NEUTRAL) or not (
+                    demand.attitude or any(map(math.isfinite, demand.angles))):
+                return 'secondary control adds angles only'
+            self._offsets = nudge(demand, self.settings.nudge_limit)
+            self._send(now)
+            return ''
+        return f'{holder} has control' if holder else 'it must take control first'
+
+    def _set(self, demand: Demand, now: float) -> str:
+        if lacking := self.model.lacks(demand.flags):
+            return f'the gimbal does not have {lacking.name}'
+        current = self._pointing(demand.frame, now)
+        if (current is None and not demand.is_complete) or (
+                self._heading(now) is None
+                and not self.model.accepts(demand.frame, demand.flags)):
+            return 'the heading of the vehicle is unknown'
+        self._place = None
+        self._setpoint = resolve(
+            demand, current or Quaternion(), now, turns=not self.has_mavlink)
+        self._send(now)
+        return ''
+
+    def _pointing(self, frame: YawFrame, now: float) -> Quaternion | None:
+        """Return the attitude of the setpoint, or else of the device, with a yaw in a frame."""
+        heading = self._heading(now)
+        if self._setpoint is not None and (attitude := self._setpoint.at(now)) is not None:
+            if self._setpoint.frame is frame:
+                return attitude
+            return None if heading is None else turned_by(
+                attitude, heading if frame is YawFrame.EARTH else -heading)
+        if (status := self._device_status(now)) is not None:
+            try:
+                seen = MountAttitude.from_status(status).seen_from(frame, heading)
+            except ValueError:
+                seen = None
+            if seen is not None:
+                return Quaternion(*to_mavlink(seen, frame))
+        if frame is YawFrame.VEHICLE:
+            return Quaternion()
+        return None if heading is None else turned_by(Quaternion(), heading)
+
+    def _device_status(self, now: float) -> GimbalDeviceAttitudeStatus | None:
+        return self._status if now < self._status_at + ATTITUDE_AGE else None
+
+    def _heading(self, now: float) -> float | None:
+        """Return the vehicle's heading as the device knows it, or else the vehicle."""
+        if (status := self._device_status(now)) is not None:
+            try:
+                heading = MountAttitude.from_status(status).heading
+            except ValueError:
+                heading = None
+            if heading is not None:
+                return heading
+        return self.vehicle.heading(now)
+
+    def _send(self, now: float) -> None:
+        """Give the device the setpoint, with everything mixed and clipped."""
+        setpoint = self._setpoint
+        if setpoint is None or self.state is not ManagerState.ACTIVE:
+            self._send_due = math.inf
+            return
+        attitude, frame, heading = setpoint.at(now), setpoint.frame, self._heading(now)
+        converts = not self.model.accepts(frame, setpoint.flags)
+        if attitude is not None:
+            attitude, clipped = clip(
+                mix(attitude, self._offsets), self.model.ranges,
+                0.0 if frame is YawFrame.VEHICLE else heading)
+            if clipped and self._limit('clipped').take(now) is not None:
+                self.events.emit(SetpointClipped(tuple(clipped)))
+            if converts and heading is not None:
+                attitude, frame = turned_by(attitude, -heading), YawFrame.VEHICLE
+        sent = replace(setpoint, attitude=attitude, frame=frame, turning=STILL)
+        if self.device is not None:
+            self._commands.send(_device_message(self.device, sent))
+        self.events.emit(SetpointSent(sent))
+        follows = any(setpoint.turning) or self._place is not None or converts
+        self._send_due = now + (FOLLOW_INTERVAL if follows else HOLD_INTERVAL)
+
+    # A region of interest
+
+    def _set_place(
+        self, source: Address, params: Sequence[float], frame: int, now: float,
+    ) -> MavResult:
+        if self.control.holder(Role.PRIMARY) != source:
+            return MavResult.DENIED
+        if frame < 0:
+            return MavResult.COMMAND_INT_ONLY
+        if frame not in (*GLOBAL_FRAMES, *RELATIVE_FRAMES):
+            return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
+        latitude, longitude, altitude = params[4] / 1e7, params[5] / 1e7, params[6]
+        if abs(latitude) > 90 or abs(longitude) > 180 or not math.isfinite(altitude):
+            return MavResult.DENIED
+        above = 0.0 if frame in GLOBAL_FRAMES else self.vehicle.home_altitude
+        if above is None or self.vehicle.position(now) is None or (
+                self._heading(now) is None
+                and not self.model.accepts(YawFrame.EARTH, self._place_flags())):
+            return MavResult.TEMPORARILY_REJECTED
+        self._place = GeoPoint(latitude, longitude, altitude + above)
+        self._follow(now)
+        return MavResult.ACCEPTED
+
+    def _clear_place(
+        self, source: Address, params: Sequence[float], frame: int, now: float,
+    ) -> MavResult:
+        if self.control.holder(Role.PRIMARY) != source:
+            return MavResult.DENIED
+        self._place = None
+        self._send(now)
+        return MavResult.ACCEPTED
+
+    def _place_flags(self) -> MountFlags:
+        return STABILISED | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
+                             else MountFlags.YAW_LOCK)
+
+    def _follow(self, now: float) -> None:
+        """Send the setpoint, which follows a place if there is one."""
+        if self._place is not None:
+            position = self.vehicle.position(now)
+            if position is None:
+                if self._limit('position').take(now) is not None:
+                    self.events.emit(PositionLost())
+            elif (angles := direction(position, self._place)) is not None:
+                self._setpoint = Setpoint(
+                    self._place_flags(), YawFrame.EARTH, Quaternion.from_euler(0.0, *angles),
+                    since=now)
+        self._send(now)
+
+    # Messages
+
+    def _send_requested(self, message_id: float, now: float) -> MavResult | None:
+        message: mav.Message | None
+        if message_id == GimbalManagerInformation.id:
+            message = self._own_information(now)
+        elif message_id == GimbalManagerStatus.id:
+            message = self.status(now)
+        elif message_id == GimbalDeviceInformation.id:
+            message = self._device_information(now)
+        else:
+            return None
+        if self.state is not ManagerState.ACTIVE or message is None:
+            return (MavResult.DENIED if self.state is ManagerState.INACTIVE
+                    else MavResult.TEMPORARILY_REJECTED)
+        self._commands.send(message)
+        return MavResult.ACCEPTED
+
+    def _own_information(self, now: float) -> GimbalManagerInformation:
+        # The manager computes what the device cannot.
+        capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
+        return GimbalManagerInformation(
+            _boot_time(now), int(capabilities), self.device_id, *self._range_values())
+
+    def _range_values(self) -> tuple[float, float, float, float, float, float]:
+        (a, b), (c, d), (e, f) = (
+            [end if math.isfinite(end) else math.nan for end in range_]
+            for range_ in self.model.ranges)
+        return a, b, c, d, e, f
+
+    def _device_information(self, now: float) -> GimbalDeviceInformation | None:
+        """Return the message of the device, which clients ask of its manager."""
+        if self.has_mavlink:
+            return self._information and replace(
+                self._information, gimbal_device_id=self.device_id)
+        return GimbalDeviceInformation(
+            _boot_time(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
+            int(self.model.capabilities & 0xFFFF), 0, *self._range_values(), self.device_id)
+
+    def _request_information(self, now: float) -> None:
+        self._information_due = now + INFORMATION_INTERVAL
+        if self.device is not None:
+            self._commands.start(Command(
+                self.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
+                now, _ignore)
+
+    def _state_changed(self, change: StateChanged, now: float) -> None:
+        active = change.after is ManagerState.ACTIVE
+        self._status_due = now if active else math.inf
+        self._send_due = now if active else math.inf
+        if change.after is ManagerState.INACTIVE:
+            self._setpoint = self._place = None
+            self._offsets = STILL
+        elif change.after is ManagerState.LISTENING:
+            # A manager that sends no status answers a request.
+            self._commands.send(Command(
+                Address(0, 0), mav.MavCmd.REQUEST_MESSAGE,
+                (GimbalManagerInformation.id,)).message(0, as_int=False))
+            if self.has_mavlink and self._information is None:
+                self._information_due = now
+        elif change.after is ManagerState.NO_DEVICE and self.has_mavlink:
+            # The next device may be another one.
+            self._information, self._information_due = None, math.inf
+            self.model = GimbalModel()
+        self.events.emit(change)
+
+    def _compare_identity(self, source: Address, message: mav.Heartbeat, now: float) -> None:
+        if source not in (self.control.holder(role) for role in Role):
+            self._identities.pop(source, None)
+            return
+        identity = message.type, message.autopilot
+        before, at = self._identities.get(source, (identity, now))
+        self._identities[source] = identity, now
+        if (before != identity and now < at + IDENTITY_TIME
+                and self._limit(source).take(now) is not None):
+            self.events.emit(AddressShared(source))
+
+    def _limit(self, kind: object) -> RateLimit:
+        if kind not in self._limits and len(self._limits) >= MAX_REPORTS:
+            del self._limits[next(iter(self._limits))]
+        return self._limits.setdefault(kind, RateLimit(REPORT_INTERVAL))
+
+
+def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttitude:
+    attitude = setpoint.attitude
+    q = UNSET if attitude is None else (attitude.w, attitude.x, attitude.y, attitude.z)
+    return GimbalDeviceSetAttitude(*device, int(setpoint.device_flags), q, *setpoint.rates)
+
+
+def _params(command: AnyCommand) -> tuple[Sequence[float], int]:
+    """Return param1 to param7 of a command, and its MAV_FRAME, -1 for a COMMAND_LONG."""
+    if isinstance(command, mav.CommandInt):
+        return (command.param1, command.param2, command.param3, command.param4, command.x,
+                command.y, command.z), command.frame
+    return (command.param1, command.param2, command.param3, command.param4, command.param5,
+            command.param6, command.param7), -1
+
+
+def _boot_time(now: float) -> int:
+    return int(now * 1000) & 0xFFFFFFFF
+
+
+def _ignore(result: CommandResult, now: float) -> None:
+    """Take no notice of a result: the message comes by itself or is requested again."""
+

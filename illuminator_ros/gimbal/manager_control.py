@@ -1,0 +1,163 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Primary and secondary control of a gimbal, as DO_GIMBAL_MANAGER_CONFIGURE sets it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from ..mavlink.messages import Address
+from ..payload.arbitration import Arbiter, Cause, Policy
+
+# Params of MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, for system id and component id alike.
+NO_PLAYER, UNCHANGED, SENDER, REMOVE_SENDER = 0, -1, -2, -3
+
+
+class Role(Enum):
+    """The two kinds of control of the gimbal protocol v2."""
+
+    PRIMARY = 'primary'
+    SECONDARY = 'secondary'
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """
+    The rules by which control moves from player to player.
+
+    :param priority: players, the highest first; all others rank below them, and equally.
+    :param overruling: players that take control under each policy.
+    :param lease: s without a heartbeat of a player after which its control ends, > 0.
+    """
+
+    policy: Policy = Policy.HOLD
+    priority: tuple[Address, ...] = ()
+    overruling: frozenset[Address] = frozenset()
+    lease: float = 3.0
+
+
+@dataclass(frozen=True)
+class ControlChanged:
+    """
+    A role has another player.
+
+    :param before: the player that had it, None if none had.
+    :param after: the player that has it now, None if none has.
+    :param by: the player that caused the change, None where the lease ended.
+    """
+
+    role: Role
+    before: Address | None
+    after: Address | None
+    cause: Cause
+    by: Address | None = None
+
+
+class Control:
+    """
+    Decides who is in primary and in secondary control. No I/O; times are s.
+
+    Each role is held by at most one player. A player may also give a role that it may have to
+    another player.
+    """
+
+    def __init__(self, settings: ControlSettings) -> None:
+        def rank(player: Address) -> int:
+            ranks = settings.priority
+            return ranks.index(player) if player in ranks else len(ranks)
+
+        self._arbiters = {role: Arbiter(
+            settings.policy, rank, lease=settings.lease, overruling=settings.overruling)
+            for role in Role}
+
+    def holder(self, role: Role) -> Address | None:
+        """Return the player that has a role, None if none has."""
+        return self._arbiters[role].holder
+
+    def since(self, role: Role) -> float:
+        """Return when a role got its player, s."""
+        return self._arbiters[role].since
+
+    def configure(
+        self, source: Address, params: Sequence[float], now: float,
+    ) -> list[ControlChanged] | None:
+        """
+        Execute MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, both roles or neither.
+
+        Clients such as MAVSDK claim both roles where they need the primary one. The secondary one
+        then stays with another player that has it.
+
+        :param params: param1 to param4.
+        :return: None if it is denied.
+        :raises ValueError: if the params have no meaning.
+        """
+        primary = self._wanted(Role.PRIMARY, source, *params[0:2])
+        secondary = self._wanted(Role.SECONDARY, source, *params[2:4])
+        if primary == secondary == source and not self._may_give(Role.SECONDARY, source, source):
+            secondary = self.holder(Role.SECONDARY)
+        wanted = {Role.PRIMARY: primary, Role.SECONDARY: secondary}
+        if not all(self._may_give(role, source, player) for role, player in wanted.items()):
+            return None
+        return [change for role, player in wanted.items()
+                if (change := self._give(role, source, player, now))]
+
+    def heard(self, player: Address, now: float) -> None:
+        """Note a heartbeat of a player."""
+        for arbiter in self._arbiters.values():
+            arbiter.renew(player, now)
+
+    def poll(self, now: float) -> list[ControlChanged]:
+        """Take the roles from players whose lease has ended."""
+        return [ControlChanged(role, change.before, change.after, change.cause)
+                for role, arbiter in self._arbiters.items() if (change := arbiter.poll(now))]
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        return min(arbiter.next_deadline() for arbiter in self._arbiters.values())
+
+    def _wanted(
+        self, role: Role, source: Address, system: float, component: float,
+    ) -> Address | None:
+        """Return the player that shall have a role."""
+        holder = self.holder(role)
+        special: dict[float, Address | None] = {
+            NO_PLAYER: None, UNCHANGED: holder, SENDER: source,
+            REMOVE_SENDER: None if holder == source else holder}
+        if system == component and system in special:
+            return special[system]
+        # Also false for NaN.
+        if all(1 <= id_ <= 255 and id_ % 1 == 0 for id_ in (system, component)):
+            return Address(int(system), int(component))
+        raise ValueError(f'{system:g}/{component:g} does not name a player')
+
+    def _may_give(self, role: Role, source: Address, player: Address | None) -> bool:
+        return player == self.holder(role) or self._arbiters[role].may_hold(source)
+
+    def _give(
+        self, role: Role, source: Address, player: Address | None, now: float,
+    ) -> ControlChanged | None:
+        arbiter, before = self._arbiters[role], self.holder(role)
+        if player == before:
+            return None
+        if before != source:
+            arbiter.claim(source, now)
+        if player != source:
+            arbiter.release(source, now)
+            if player is not None:
+                arbiter.claim(player, now)
+        cause = Cause.RELEASE if before == source else Cause.CLAIM
+        return ControlChanged(role, before, player, cause, source)

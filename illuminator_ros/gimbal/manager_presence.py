@@ -1,0 +1,179 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether a gimbal manager may be active: its device is heard, no other manager announces it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+from .messages import NON_MAVLINK_IDS
+from ..mavlink.messages import Address
+
+# s without a message after which a device, or another manager, is lost.
+DEVICE_TIMEOUT = 3.0
+MANAGER_TIMEOUT = 3.0
+# s for which a manager listens for others: at least, and more for each of eight addresses, so that
+# of two that begin together one announces the device first.
+LISTENING_TIME, ADDRESS_TIME = 2.0, 0.25
+
+
+class ManagerState(Enum):
+    """
+    The states of a gimbal manager.
+
+    Only an ACTIVE one announces the device and gives it setpoints. LISTENING waits for other
+    managers of the device, INACTIVE has heard one.
+    """
+
+    NO_DEVICE = 'no device'
+    LISTENING = 'listening'
+    ACTIVE = 'active'
+    INACTIVE = 'inactive'
+
+
+class ManagerInput(Enum):
+    """The inputs that change the state of a gimbal manager."""
+
+    DEVICE_HEARD = 'device heard'
+    DEVICE_LOST = 'device lost'
+    TIME_OVER = 'time over'
+    MANAGER_HEARD = 'manager heard'
+    MANAGER_LOST = 'manager lost'
+
+
+# Inputs that are not here leave the state as it is.
+TRANSITIONS: dict[tuple[ManagerState, ManagerInput], ManagerState] = {
+    (ManagerState.NO_DEVICE, ManagerInput.DEVICE_HEARD): ManagerState.LISTENING,
+    (ManagerState.LISTENING, ManagerInput.TIME_OVER): ManagerState.ACTIVE,
+    (ManagerState.LISTENING, ManagerInput.MANAGER_HEARD): ManagerState.INACTIVE,
+    (ManagerState.LISTENING, ManagerInput.DEVICE_LOST): ManagerState.NO_DEVICE,
+    (ManagerState.ACTIVE, ManagerInput.MANAGER_HEARD): ManagerState.INACTIVE,
+    (ManagerState.ACTIVE, ManagerInput.DEVICE_LOST): ManagerState.NO_DEVICE,
+    (ManagerState.INACTIVE, ManagerInput.MANAGER_LOST): ManagerState.LISTENING,
+    (ManagerState.INACTIVE, ManagerInput.DEVICE_LOST): ManagerState.NO_DEVICE,
+}
+
+
+@dataclass(frozen=True)
+class StateChanged:
+    """
+    A manager has another state.
+
+    :param device: the address of its device, None for one without MAVLink.
+    :param other: the other manager that was heard, None if there is none.
+    """
+
+    before: ManagerState
+    after: ManagerState
+    device_id: int
+    device: Address | None
+    other: Address | None
+
+
+class Presence:
+    """
+    The device of a manager, and other managers of it. No I/O; times are s.
+
+    :param address: of the manager.
+    :param device_id: of the device; 1..6 for one without MAVLink, 0 for the first that is heard.
+    :param changed: takes each change of the state.
+    :ivar device: the address of the device, None while none is known.
+    :ivar other: the other manager, None if none is heard.
+    """
+
+    def __init__(
+        self, address: Address, device_id: int,
+        changed: Callable[[StateChanged, float], None],
+    ) -> None:
+        self.state = ManagerState.NO_DEVICE
+        self.device: Address | None = None
+        self.other: Address | None = None
+        self._address = address
+        self._wanted = device_id
+        self._changed = changed
+        self._device_heard = self._other_heard = -math.inf
+        self._listening_until = math.inf
+
+    @property
+    def has_mavlink(self) -> bool:
+        """Whether the device is a MAVLink component."""
+        return self._wanted not in NON_MAVLINK_IDS
+
+    @property
+    def device_id(self) -> int:
+        """The id of the device, 0 while none is known."""
+        return self.device.component if self.device else self._wanted
+
+    def link_opened(self, now: float) -> None:
+        """Note that messages can be sent."""
+        if not self.has_mavlink:
+            self._take(ManagerInput.DEVICE_HEARD, now)
+
+    def link_closed(self, now: float) -> None:
+        """Note that nothing can be heard any more."""
+        self.other = None
+        self._take(ManagerInput.DEVICE_LOST, now)
+
+    def hear_device(self, source: Address, now: float) -> bool:
+        """Take a message of a gimbal device; return whether it is the manager's."""
+        if (not self.has_mavlink or source.system != self._address.system
+                or self._wanted not in (0, source.component)
+                or self.device not in (None, source)):
+            return False
+        self.device, self._device_heard = source, now
+        self._take(ManagerInput.DEVICE_HEARD, now)
+        return True
+
+    def hear_manager(self, source: Address, device_id: int, now: float) -> None:
+        """Take the announcement of a device by a manager."""
+        if source != self.device and (
+                source.system != self._address.system or device_id != self.device_id):
+            return
+        self.other, self._other_heard = source, now
+        self._take(ManagerInput.MANAGER_HEARD, now)
+
+    def poll(self, now: float) -> None:
+        """Note the ends of times."""
+        if self.device and now >= self._device_heard + DEVICE_TIMEOUT:
+            self._take(ManagerInput.DEVICE_LOST, now)
+            # Another device may be meant where none is named.
+            self.device = None
+        if self.other and now >= self._other_heard + MANAGER_TIMEOUT:
+            self.other = None
+            self._take(ManagerInput.MANAGER_LOST, now)
+        if now >= self._listening_until:
+            self._take(ManagerInput.TIME_OVER, now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        return min(
+            self._listening_until,
+            self._device_heard + DEVICE_TIMEOUT if self.device else math.inf,
+            self._other_heard + MANAGER_TIMEOUT if self.other else math.inf)
+
+    def _take(self, input_: ManagerInput, now: float) -> None:
+        before = self.state
+        self.state = TRANSITIONS.get((before, input_), before)
+        if self.state is before:
+            return
+        self._listening_until = math.inf
+        if self.state is ManagerState.LISTENING:
+            self._listening_until = (
+                now + LISTENING_TIME + ADDRESS_TIME * (self._address.component % 8))
+        self._changed(
+            StateChanged(before, self.state, self.device_id, self.device, self.other), now)

@@ -1,0 +1,402 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Setpoints of a gimbal: reading, mixing and limiting them. Pure functions; MAVLink's conventions.
+
+Rotations are those of FRD axes. Roll and pitch are relative to the horizon, yaw to north or to the
+vehicle's heading, as the :class:`~..payload.mount.YawFrame` says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+import math
+from typing import NamedTuple
+
+from .messages import (
+    Capabilities,
+    GimbalDeviceInformation,
+    GimbalManagerSetAttitude,
+    GimbalManagerSetManualControl,
+    GimbalManagerSetPitchyaw,
+)
+from ..payload.mount import Components, MountFlags, yaw_frame, YawFrame
+from ..payload.rotation import Quaternion, Vector
+
+AXES = ('roll', 'pitch', 'yaw')
+NONE: Vector = (math.nan,) * 3
+STILL: Vector = (0.0,) * 3
+# The attitude is set by the flag alone.
+POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
+STABILISED = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+# Flags that GIMBAL_DEVICE_SET_ATTITUDE passes on; those of the yaw frame are set by its value.
+_PASSED_ON = (POSES | STABILISED | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
+              | MountFlags.RC_MIXED)
+# rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
+MANUAL_RATE = 0.5
+# The capability that a flag needs.
+_NEEDED = {MountFlags.RETRACT: Capabilities.HAS_RETRACT,
+           MountFlags.NEUTRAL: Capabilities.HAS_NEUTRAL,
+           MountFlags.YAW_LOCK: Capabilities.HAS_YAW_LOCK}
+# Equatorial radius, m, and squared eccentricity of WGS 84.
+_RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
+
+
+class Range(NamedTuple):
+    """The range of an axis, rad, infinite where it is not known."""
+
+    low: float = -math.inf
+    high: float = math.inf
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the axis cannot turn."""
+        return self.low == self.high
+
+
+@dataclass(frozen=True)
+class GimbalModel:
+    """
+    The abilities of a gimbal; all unknown at first.
+
+    :param capabilities: 0 where unknown.
+    :param ranges: of roll, pitch, and yaw relative to the vehicle.
+    """
+
+    capabilities: Capabilities = Capabilities(0)
+    ranges: tuple[Range, Range, Range] = (Range(), Range(), Range())
+
+    @classmethod
+    def from_information(cls, message: GimbalDeviceInformation) -> GimbalModel:
+        """Read the message of a device; an axis that it lacks stays at 0."""
+        capabilities = Capabilities(message.cap_flags | message.cap_flags2)
+
+        def axis(low: float, high: float, flag: Capabilities) -> Range:
+            if capabilities and not capabilities & flag:
+                return Range(0.0, 0.0)
+            return Range(-math.inf if math.isnan(low) else low,
+                         math.inf if math.isnan(high) else high)
+
+        return cls(capabilities, (
+            axis(message.roll_min, message.roll_max, Capabilities.HAS_ROLL_AXIS),
+            axis(message.pitch_min, message.pitch_max, Capabilities.HAS_PITCH_AXIS),
+            axis(message.yaw_min, message.yaw_max, Capabilities.HAS_YAW_AXIS)))
+
+    @classmethod
+    def from_ranges(cls, ranges: tuple[Range, Range, Range]) -> GimbalModel:
+        """Return a gimbal that is stabilised and points to any attitude within the ranges."""
+        flags = (Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_LOCK,
+                 Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_PITCH_LOCK,
+                 Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_FOLLOW
+                 | Capabilities.HAS_YAW_LOCK | Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+        capabilities = Capabilities.HAS_NEUTRAL
+        for range_, flag in zip(ranges, flags, strict=True):
+            capabilities |= Capabilities(0) if range_.is_fixed else flag
+        return cls(capabilities, ranges)
+
+    def lacks(self, flags: MountFlags) -> MountFlags:
+        """Return those of the flags that the gimbal cannot follow."""
+        lacking = MountFlags(0)
+        for flag, needed in _NEEDED.items():
+            if flags & flag and self.capabilities and not self.capabilities & needed:
+                lacking |= flag
+        return lacking
+
+    def accepts(self, frame: YawFrame, flags: MountFlags) -> bool:
+        """Return whether the gimbal can be given a yaw that is relative to a frame."""
+        return (frame is YawFrame.VEHICLE or not self.capabilities
+                or bool(self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+                or bool(flags & MountFlags.YAW_LOCK))
+
+
+@dataclass(frozen=True)
+class Demand:
+    """
+    A player's request, as one message or command has it.
+
+    :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
+    :param rates: of the axes, rad/s; NaN where none is given.
+    :param attitude: replaces the angles, None if none is given.
+    :raises ValueError: if the flags name both yaw frames, or a value is infinite.
+    """
+
+    flags: MountFlags = MountFlags(0)
+    angles: Vector = NONE
+    rates: Vector = NONE
+    attitude: Quaternion | None = None
+
+    def __post_init__(self) -> None:
+        yaw_frame(self.flags)
+        if any(map(math.isinf, (*self.angles, *self.rates))):
+            raise ValueError('an angle or a rate is infinite')
+
+    @property
+    def frame(self) -> YawFrame:
+        """The frame of its yaw."""
+        return yaw_frame(self.flags)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the attitude that follows depends on nothing else."""
+        return (bool(self.flags & POSES) or self.attitude is not None
+                or all(map(math.isfinite, self.angles)))
+
+    @classmethod
+    def from_attitude(cls, message: GimbalManagerSetAttitude) -> Demand:
+        """
+        Read GIMBAL_MANAGER_SET_ATTITUDE.
+
+        :raises ValueError: if the quaternion is not a rotation, or see above.
+        """
+        return cls(MountFlags(message.flags), rates=(
+            message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
+            attitude=_attitude(message.q))
+
+    @classmethod
+    def from_pitch_yaw(
+        cls, flags: int, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float,
+    ) -> Demand:
+        """
+        Read the values of GIMBAL_MANAGER_SET_PITCHYAW, rad and rad/s; with an angle, roll is 0.
+
+        :raises ValueError: see above.
+        """
+        roll = math.nan if math.isnan(pitch) and math.isnan(yaw) else 0.0
+        return cls(MountFlags(flags), (roll, pitch, yaw), (math.nan, pitch_rate, yaw_rate))
+
+    @classmethod
+    def from_manual_control(
+        cls, message: GimbalManagerSetManualControl, ranges: tuple[Range, Range, Range],
+    ) -> Demand:
+        """
+        Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of the rates.
+
+        :raises ValueError: if a value is beyond -1..1, or see above.
+        """
+        values = message.pitch, message.yaw, message.pitch_rate, message.yaw_rate
+        if any(abs(value) > 1 for value in values):
+            raise ValueError('a deflection is beyond -1 and 1')
+
+        def share(value: float, range_: Range) -> float:
+            return value * (min(range_.high, math.pi) if value > 0
+                            else -max(range_.low, -math.pi))
+
+        return cls.from_pitch_yaw(
+            message.flags, share(message.pitch, ranges[1]), share(message.yaw, ranges[2]),
+            message.pitch_rate * MANUAL_RATE, message.yaw_rate * MANUAL_RATE)
+
+
+# A message that sets the attitude of a gimbal.
+AnySetpoint = GimbalManagerSetAttitude | GimbalManagerSetPitchyaw | GimbalManagerSetManualControl
+
+
+def read_demand(message: AnySetpoint, ranges: tuple[Range, Range, Range]) -> Demand:
+    """
+    Read a message of a player.
+
+    :raises ValueError: if it is not valid.
+    """
+    if isinstance(message, GimbalManagerSetAttitude):
+        return Demand.from_attitude(message)
+    if isinstance(message, GimbalManagerSetManualControl):
+        return Demand.from_manual_control(message, ranges)
+    return Demand.from_pitch_yaw(
+        message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
+
+
+def _attitude(q: Components) -> Quaternion | None:
+    return None if all(map(math.isnan, q)) else Quaternion(*q).normalized()
+
+
+@dataclass(frozen=True)
+class Setpoint:
+    """
+    The setpoint of a gimbal.
+
+    :param attitude: None where only the rates count.
+    :param rates: rad/s, that the device follows; NaN where it chooses.
+    :param turning: rad/s, by which the manager turns the attitude.
+    :param since: when the attitude applies, s.
+    """
+
+    flags: MountFlags
+    frame: YawFrame
+    attitude: Quaternion | None
+    rates: Vector = NONE
+    turning: Vector = STILL
+    since: float = 0.0
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether a flag alone sets the attitude."""
+        return bool(self.flags & POSES)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the gimbal turns on with it."""
+        return self.attitude is None or any(self.turning)
+
+    def at(self, now: float) -> Quaternion | None:
+        """Return the attitude at a time."""
+        if self.attitude is None or not any(self.turning):
+            return self.attitude
+        return _from_angles(_each(
+            lambda angle, rate: angle + rate * (now - self.since), self.attitude.euler(),
+            self.turning))
+
+    @property
+    def device_flags(self) -> MountFlags:
+        """The flags for the device."""
+        return self.flags & _PASSED_ON | self.frame.flag
+
+
+def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> Setpoint:
+    """
+    Return the setpoint that a demand makes.
+
+    :param current: the attitude in the frame of the demand, from which axes without an angle
+        begin.
+    :param turns: whether the manager must turn the gimbal where only rates are given.
+    """
+    flags, frame = demand.flags, demand.frame
+    if flags & POSES:
+        return Setpoint(flags, frame, None, since=now)
+    if demand.attitude is not None:
+        return Setpoint(flags, frame, demand.attitude, demand.rates, since=now)
+    given = [math.isfinite(angle) for angle in demand.angles]
+    rates = demand.rates
+    only_rate = [not has_angle and math.isfinite(rate)
+                 for has_angle, rate in zip(given, rates, strict=True)]
+    if any(only_rate) and not any(given) and not turns:
+        return Setpoint(flags, frame, None, _each(
+            lambda rate: rate if math.isfinite(rate) else 0.0, rates), since=now)
+    angles = _each(lambda asked, has_angle, angle: asked if has_angle else angle,
+                   demand.angles, given, current.euler())
+    return Setpoint(
+        flags, frame, _from_angles(angles) if any(given) else current,
+        _each(lambda rate, has_angle: rate if has_angle else math.nan, rates, given),
+        _each(lambda rate, alone: rate if alone else 0.0, rates, only_rate), now)
+
+
+def stopped(setpoint: Setpoint, now: float) -> Setpoint:
+    """Return the setpoint that ends the motion of another one."""
+    if setpoint.is_pose or not setpoint.moves:
+        return setpoint
+    attitude = setpoint.at(now)
+    return replace(setpoint, attitude=attitude, turning=STILL, since=now,
+                   rates=STILL if attitude is None else NONE)
+
+
+def nudge(demand: Demand, limit: float) -> Vector:
+    """Return the offsets that a player in secondary control adds, rad, each within the limit."""
+    angles = demand.angles if demand.attitude is None else demand.attitude.euler()
+    return _each(lambda angle: max(-limit, min(limit, angle)) if math.isfinite(angle) else 0.0,
+                 angles)
+
+
+def mix(attitude: Quaternion, offsets: Vector) -> Quaternion:
+    """Return an attitude with offsets added to its angles."""
+    if not any(offsets):
+        return attitude
+    return _from_angles(_each(lambda angle, offset: angle + offset, attitude.euler(), offsets))
+
+
+class Clipped(NamedTuple):
+    """An angle beyond the range of its axis, rad: as asked for, and as set."""
+
+    axis: str
+    asked: float
+    limit: float
+
+
+def clip(
+    attitude: Quaternion, ranges: tuple[Range, Range, Range], offset: float | None,
+) -> tuple[Quaternion, list[Clipped]]:
+    """
+    Return an attitude within the ranges, and the angles that were clipped.
+
+    :param offset: the direction from which the range of the yaw counts, rad in the frame of the
+        attitude; None where it is not known, which leaves the yaw as it is.
+    """
+    roll, pitch, yaw = attitude.euler()
+    clipped = []
+    angles = [roll, pitch, yaw]
+    for index, (axis, range_) in enumerate(zip(AXES, ranges, strict=True)):
+        zero = offset if axis == 'yaw' else 0.0
+        if zero is None or range_.high - range_.low >= 2 * math.pi - 1e-6:
+            continue
+        asked = _nearest(angles[index] - zero, range_)
+        limit = max(range_.low, min(range_.high, asked))
+        # A difference by float32 rounding does not count.
+        if abs(limit - asked) > 1e-5:
+            clipped.append(Clipped(axis, asked, limit))
+            angles[index] = limit + zero
+    return (_from_angles(angles), clipped) if clipped else (attitude, [])
+
+
+def _nearest(angle: float, range_: Range) -> float:
+    """Return the angle, or the same direction a turn away, that is nearest to a range."""
+    return min((angle, angle + 2 * math.pi, angle - 2 * math.pi),
+               key=lambda one: max(range_.low - one, one - range_.high, 0.0))
+
+
+def turned_by(attitude: Quaternion, yaw: float) -> Quaternion:
+    """Return an attitude whose yaw is greater by an angle, rad."""
+    return Quaternion.from_euler(0.0, 0.0, yaw) * attitude
+
+
+def _each(function: Callable[..., float], *values: Sequence[float]) -> Vector:
+    """Return the results of a function for each axis."""
+    roll, pitch, yaw = map(function, *values)
+    return roll, pitch, yaw
+
+
+def _from_angles(angles: Sequence[float]) -> Quaternion:
+    roll, pitch, yaw = angles
+    return Quaternion.from_euler(roll, max(-math.pi / 2, min(math.pi / 2, pitch)), yaw)
+
+
+class GeoPoint(NamedTuple):
+    """
+    A place.
+
+    :param latitude: and longitude, deg.
+    :param altitude: m above mean sea level.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+
+def direction(origin: GeoPoint, target: GeoPoint) -> tuple[float, float] | None:
+    """
+    Return pitch and yaw of the line from one place to another, rad.
+
+    The error is below 0.1 deg within 10 km.
+
+    :return: None if the places are nearer than 0.1 m, so that there is no direction.
+    """
+    latitude = math.radians((origin.latitude + target.latitude) / 2)
+    curvature = 1 - _ECCENTRICITY_2 * math.sin(latitude) ** 2
+    across = (target.longitude - origin.longitude + 180) % 360 - 180
+    north = (math.radians(target.latitude - origin.latitude)
+             * _RADIUS * (1 - _ECCENTRICITY_2) / curvature ** 1.5)
+    east = math.radians(across) * _RADIUS / curvature ** 0.5 * math.cos(latitude)
+    up = target.altitude - origin.altitude
+    if math.hypot(north, east, up) < 0.1:
+        return None
+    return math.atan2(up, math.hypot(north, east)), math.atan2(east, north)

@@ -1,0 +1,112 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The state of the vehicle that carries a gimbal, from the link or from ROS."""
+
+from __future__ import annotations
+
+import math
+from typing import Generic, TypeVar
+
+from .manager_setpoint import GeoPoint
+from .messages import AutopilotStateForGimbalDevice
+from ..mavlink.messages import Address
+from ..payload.rotation import Quaternion, Vector
+from ..payload.vehicle import Attitude, GlobalPositionInt
+
+T = TypeVar('T')
+
+# s after which a value is out of date.
+MAX_AGE = 1.0
+# ESTIMATOR_STATUS_FLAGS: attitude, and horizontal and vertical velocity.
+ESTIMATES_ATTITUDE, ESTIMATES_VELOCITY = 1, 2 | 4
+
+
+class _Latest(Generic[T]):
+    """The latest values of the link and of ROS; the value of the link comes first."""
+
+    def __init__(self) -> None:
+        self._values: dict[bool, tuple[T, float]] = {}
+
+    def set(self, value: T, now: float, *, link: bool) -> None:  # noqa: A003
+        self._values[link] = value, now
+
+    def get(self, now: float) -> T | None:
+        return next((value for link in (True, False) if link in self._values
+                     for value, at in (self._values[link],) if now < at + MAX_AGE), None)
+
+
+class VehicleState:
+    """
+    Attitude, velocity and position of the vehicle; NED and FRD. No I/O; times are s.
+
+    Values of the link's autopilot come before those of ROS. A value older than :data:`MAX_AGE`
+    is unknown.
+    """
+
+    def __init__(self) -> None:
+        self._attitude: _Latest[Quaternion] = _Latest()
+        self._yaw_rate: _Latest[float] = _Latest()
+        self._velocity: _Latest[Vector] = _Latest()
+        self._position: _Latest[GeoPoint] = _Latest()
+        self._home_altitude: float | None = None
+
+    def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
+        """Take a message of the autopilot."""
+        if isinstance(message, Attitude):
+            self._attitude.set(Quaternion.from_euler(
+                message.roll, message.pitch, message.yaw), now, link=True)
+        else:
+            self._position.set(GeoPoint(
+                message.lat / 1e7, message.lon / 1e7, message.alt / 1e3), now, link=True)
+            self._home_altitude = (message.alt - message.relative_alt) / 1e3
+
+    def set_attitude(self, attitude: Quaternion, yaw_rate: float, now: float) -> None:
+        """Take an attitude from ROS, with the rate about the down axis, rad/s, NaN if unknown."""
+        self._attitude.set(attitude, now, link=False)
+        self._yaw_rate.set(yaw_rate, now, link=False)
+
+    def set_velocity(self, velocity: Vector, now: float) -> None:
+        """Take a velocity from ROS, m/s."""
+        self._velocity.set(velocity, now, link=False)
+
+    def set_position(self, position: GeoPoint, now: float) -> None:
+        """Take a position from ROS."""
+        self._position.set(position, now, link=False)
+
+    def heading(self, now: float) -> float | None:
+        """Return the yaw from north, rad, None if it is unknown."""
+        attitude = self._attitude.get(now)
+        return None if attitude is None else attitude.euler()[2]
+
+    def position(self, now: float) -> GeoPoint | None:
+        """Return the position, None if it is unknown."""
+        return self._position.get(now)
+
+    @property
+    def home_altitude(self) -> float | None:
+        """The altitude from which relative altitudes count, m above mean sea level."""
+        return self._home_altitude
+
+    def for_device(self, device: Address, now: float) -> AutopilotStateForGimbalDevice | None:
+        """Return the message for a gimbal device, None if the attitude is unknown."""
+        attitude, velocity = self._attitude.get(now), self._velocity.get(now)
+        if attitude is None:
+            return None
+        yaw_rate = self._yaw_rate.get(now)
+        return AutopilotStateForGimbalDevice(
+            *device, int(now * 1e6), (attitude.w, attitude.x, attitude.y, attitude.z), 0,
+            *(velocity or (math.nan,) * 3), 0, math.nan,
+            ESTIMATES_ATTITUDE | (ESTIMATES_VELOCITY if velocity else 0), 0,
+            math.nan if yaw_rate is None else yaw_rate)

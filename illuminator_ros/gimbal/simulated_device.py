@@ -1,0 +1,450 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A simulated gimbal device: it obeys its gimbal manager and no other component.
+
+https://mavlink.io/en/services/gimbal_v2.html. Its manager is the component of its own system that
+announces it: that names the device's component id in GIMBAL_MANAGER_STATUS or
+GIMBAL_MANAGER_INFORMATION. The first one stays its manager until it has been silent for
+:data:`MANAGER_TIMEOUT`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+import math
+from typing import Any
+
+from . import messages as gimbal
+from .messages import Capabilities, ErrorFlags
+from .simulated_motion import AXES, GimbalMechanics, GimbalMotion, limit_fields, Range
+from .. import __version__
+from ..mavlink.messages import Address, Message
+from ..payload.faults import Behaviour, Fault, FaultTable
+from ..payload.faults import FAULTS as COMPONENT_FAULTS
+from ..payload.mount import MountFlags, yaw_frame, YawFrame
+from ..payload.rotation import Quaternion, Vector
+from ..payload.simulated import (
+    AnyCommand,
+    Change,
+    ConsoleCommand,
+    Reply,
+    SimulatedDevice,
+    SimulatedType,
+    Snapshot,
+)
+from ..payload.simulated_settings import integer, number, one_of, Setting, text
+from ..payload.vehicle import GimbalDeviceAttitudeStatus
+
+# s without an announcement after which a manager no longer is one.
+MANAGER_TIMEOUT = 5.0
+# rad of movement that deserve a line of the view.
+TRAVEL_STEP = math.radians(15.0)
+
+_degrees = number(-180.0, 180.0)
+
+
+@dataclass(frozen=True)
+class GimbalBehaviour(Behaviour):
+    """
+    How a simulated gimbal behaves; the defaults follow the protocol.
+
+    :param enforces_control: whether it ignores setpoints of components that do not control it.
+    :param reports: whether it sends its status.
+    :param frozen_flags: whether its status shows the flags of the start.
+    :param frozen_axis: the name of an axis that does not move, '' for none.
+    :param jump: angle by which every tenth reported attitude is wrong, degrees.
+    :param names_frame: whether the status names its yaw frame.
+    :param false_flags: GIMBAL_DEVICE_ERROR_FLAGS that are set without a reason.
+    :param identifies: whether it sends its INFORMATION message.
+    :param static_information: whether its INFORMATION message always has the same content.
+    :param limits_range: whether it keeps within the range that it reports.
+    :param stops: whether a rate of 0 stops it.
+    :param accepts_earth_always: whether it claims to accept yaw in the earth frame without a
+        heading.
+    :param takes_manager_set: whether a device obeys the messages to managers.
+    """
+
+    heartbeat_type: int = gimbal.MAV_TYPE_GIMBAL
+    enforces_control: bool = True
+    reports: bool = True
+    frozen_flags: bool = False
+    frozen_axis: str = ''
+    jump: float = 0.0
+    names_frame: bool = True
+    false_flags: int = 0
+    identifies: bool = True
+    static_information: bool = True
+    limits_range: bool = True
+    stops: bool = True
+    accepts_earth_always: bool = False
+    takes_manager_set: bool = False
+
+
+# The faults of devices and of managers.
+GIMBAL_FAULTS = FaultTable({
+    **COMPONENT_FAULTS,
+    'obeys-everybody': Fault('enforces_control', 'obeys components that do not control it',
+                             default=False),
+    'no-status': Fault('reports', 'sends no status', default=False),
+    'stale-flags': Fault('frozen_flags', 'reports the flags of its start'),
+    'frozen-axis': Fault('frozen_axis', 'an axis does not move', 'AXIS', one_of(AXES), 'pitch'),
+    'jumps': Fault('jump', 'every tenth reported attitude is wrong by DEG', 'DEG',
+                   number(1, 180), 20.0),
+    'no-frame': Fault('names_frame', 'does not name the yaw frame of its attitude',
+                      default=False),
+    'flags': Fault('false_flags', 'reports failure flags without a reason', 'FLAGS',
+                   integer(1, 0xFFFFFFFF), int(ErrorFlags.MOTOR_ERROR)),
+    'no-identity': Fault('identifies', 'sends no INFORMATION message', default=False),
+    'changing-identity': Fault('static_information', 'changes the limits that it reports',
+                               default=False),
+    'no-limits': Fault('limits_range', 'turns beyond the range that it reports', default=False),
+    'runaway': Fault('stops', 'goes on turning when the rate is set to 0', default=False),
+})
+# A device takes no commands that change it, so that it has no result to get wrong.
+FAULTS = FaultTable({
+    **{name: fault for name, fault in GIMBAL_FAULTS.items()
+       if name not in ('refuse', 'progress', 'busy', 'disobey')},
+    'false-north': Fault('accepts_earth_always', 'claims to accept yaw relative to north without '
+                         'a heading from the vehicle'),
+    'manager-set': Fault('takes_manager_set', 'obeys the messages to gimbal managers'),
+})
+
+
+@dataclass(frozen=True)
+class GimbalProperties:
+    """
+    The properties of a simulated gimbal.
+
+    :param manager: the only component that a device obeys, None for one that announces itself.
+    :param status_interval: s between messages with its attitude.
+    """
+
+    address: Address = Address(1, gimbal.MAV_COMP_ID_GIMBAL)
+    mechanics: GimbalMechanics = GimbalMechanics()
+    vendor: str = 'illuminator_ros'
+    model: str = 'simulator'
+    custom_name: str = ''
+    manager: Address | None = None
+    status_interval: float = 0.1
+    behaviour: GimbalBehaviour = GimbalBehaviour()
+
+
+class SimulatedMount:
+    """
+    The gimbal of a device, or of a manager that is its own device: motion, and what it reports.
+
+    :param device_id: gimbal_device_id of its messages, 0 for a component of its own.
+    """
+
+    def __init__(self, properties: GimbalProperties, device_id: int, now: float) -> None:
+        self.motion = GimbalMotion(properties.mechanics, now)
+        self._properties = properties
+        self._device_id = device_id
+        self._booted_at = now
+        self._first_flags = self.motion.flags
+        self._informed = self._reported = 0
+
+    def uptime_ms(self, now: float) -> int:
+        """Return the time since the start, ms, wrapping as the field does."""
+        return int((now - self._booted_at) * 1000) & 0xFFFFFFFF
+
+    def behave(self, behaviour: GimbalBehaviour, now: float) -> None:
+        """Apply the faults of the axes."""
+        self.motion.advance(now)
+        self.motion.fail(behaviour.frozen_axis, limited=behaviour.limits_range)
+
+    def set(  # noqa: A003 - the word of the messages
+        self, flags: int, frame: YawFrame, angles: Vector, rates: Vector,
+        behaviour: GimbalBehaviour, now: float,
+    ) -> None:
+        """Take a setpoint, see :meth:`GimbalMotion.set`."""
+        rate_only = not any(map(math.isfinite, angles)) and any(map(math.isfinite, rates))
+        stop = rate_only and not any(rate for rate in rates if math.isfinite(rate))
+        if not behaviour.ignores_changes and (behaviour.stops or not stop):
+            self.motion.set(flags, frame, angles, rates, now)
+
+    def flags(self, behaviour: GimbalBehaviour) -> MountFlags:
+        """Return the flags of the setpoint as they are reported."""
+        return self._first_flags if behaviour.frozen_flags else self.motion.flags
+
+    def status(
+        self, behaviour: GimbalBehaviour, now: float, failures: int = 0,
+    ) -> GimbalDeviceAttitudeStatus | None:
+        """
+        Return the status of this moment, None if it sends none.
+
+        :param failures: GIMBAL_DEVICE_ERROR_FLAGS besides those of the axes.
+        """
+        if not behaviour.reports:
+            return None
+        motion = self.motion
+        motion.advance(now)
+        known = motion.heading_known(now)
+        frame = motion.frame if known else YawFrame.VEHICLE
+        flags = self.flags(behaviour)
+        if behaviour.names_frame:
+            flags |= frame.flag
+        if behaviour.accepts_earth_always or known and (
+                motion.mechanics.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME):
+            flags |= MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+        q = motion.attitude(frame)
+        self._reported += 1
+        if behaviour.jump and not self._reported % 10:
+            q = Quaternion.from_euler(0.0, 0.0, math.radians(behaviour.jump)) * q
+        turning = motion.vehicle.rate if known else math.nan
+        roll_rate, pitch_rate, yaw_rate = motion.rates
+        return GimbalDeviceAttitudeStatus(
+            0, 0, self.uptime_ms(now), int(flags), (q.w, q.x, q.y, q.z),
+            roll_rate, pitch_rate, yaw_rate + (turning if frame is YawFrame.EARTH else 0.0),
+            int(motion.limits()) | failures | behaviour.false_flags,
+            motion.vehicle.yaw if known else math.nan, turning, self._device_id)
+
+    def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
+        """Return the fields roll_min to yaw_max of an INFORMATION message."""
+        fields = limit_fields(self._properties.mechanics)
+        self._informed += 1
+        return fields if behaviour.static_information else {
+            **fields, 'pitch_max': fields['pitch_max'] + 0.01 * self._informed}
+
+    def information(
+        self, behaviour: GimbalBehaviour, now: float,
+    ) -> gimbal.GimbalDeviceInformation | None:
+        """Return the INFORMATION of a device, None if it sends none."""
+        if not behaviour.identifies:
+            return None
+        properties, capabilities = self._properties, int(self.motion.mechanics.capabilities)
+        vendor, model, custom = (
+            name.encode()[:31] for name in (
+                properties.vendor, properties.model, properties.custom_name))
+        release = [int(part) for part in __version__.split('.')[:3]]
+        version = sum(part << 8 * place for place, part in enumerate(release))
+        return gimbal.GimbalDeviceInformation(
+            self.uptime_ms(now), vendor, model, custom, version, version,
+            properties.address.system << 8 | properties.address.component,
+            capabilities & 0xFFFF, 0, **self.limits(behaviour),
+            gimbal_device_id=self._device_id, cap_flags2=capabilities)
+
+    def describe(self, now: float, *notes: str) -> Snapshot:
+        """Return the actual state of this moment, for people."""
+        motion = self.motion
+        motion.advance(now)
+        roll, pitch, yaw = map(math.degrees, motion.angles)
+        state = (*(str(flag.name) for flag in (MountFlags.RETRACT, MountFlags.NEUTRAL,
+                                          MountFlags.YAW_LOCK) if flag & motion.flags),
+                 *(str(flag.name) for flag in ErrorFlags if flag & motion.limits()),
+                 *filter(None, notes))
+        shown = tuple(str(one).lower().replace('_', ' ') for one in state)
+        return Snapshot(
+            '  '.join((f'roll {roll:6.1f}  pitch {pitch:6.1f}  yaw {yaw:6.1f} deg', *shown)),
+            (*shown, motion.moving), motion.travelled / TRAVEL_STEP)
+
+
+def _turn(device: Any, words: list[str], now: float) -> Change:
+    pitch, yaw = (math.radians(_degrees(word)) for word in words)
+    return partial(device.mount.motion.turn, pitch, yaw, now)
+
+
+COMMANDS: tuple[ConsoleCommand[Any, Change], ...] = (
+    ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon and vehicle',
+                   _turn, (2,)),
+)
+
+
+class SimulatedGimbal(SimulatedDevice):
+    """
+    A simulated gimbal device, without the link: see :class:`SimulatedDevice`.
+
+    :ivar manager: the component that it obeys, None while no component announces itself.
+    """
+
+    messages = (
+        gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus,
+        gimbal.GimbalDeviceSetAttitude, gimbal.AutopilotStateForGimbalDevice,
+        gimbal.GimbalManagerSetAttitude)
+    sends = (GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
+    faults = FAULTS
+    commands = COMMANDS
+    behaviour: GimbalBehaviour
+
+    def __init__(self, properties: GimbalProperties) -> None:
+        super().__init__(properties.behaviour)
+        self.properties = properties
+        self.restart(0.0)
+
+    def restart(self, now: float) -> None:
+        """See :meth:`SimulatedDevice.restart`; it forgets its manager."""
+        self.mount = SimulatedMount(self.properties, 0, now)
+        self.mount.behave(self.behaviour, now)
+        self.manager = self.properties.manager
+        self._announced_at = now
+
+    def behave(self, behaviour: Behaviour, now: float) -> None:
+        """See :meth:`SimulatedDevice.behave`."""
+        super().behave(behaviour, now)
+        self.mount.behave(self.behaviour, now)
+
+    def streams(self) -> Mapping[int, float]:
+        """See :meth:`SimulatedDevice.streams`."""
+        return {GimbalDeviceAttitudeStatus.id: self.properties.status_interval}
+
+    def message(self, message_id: int, now: float) -> Message | None:
+        """See :meth:`SimulatedDevice.message`."""
+        if message_id == GimbalDeviceAttitudeStatus.id:
+            self._expire(now)
+            return self.mount.status(
+                self.behaviour, now, 0 if self.manager else ErrorFlags.NO_MANAGER)
+        if message_id == gimbal.GimbalDeviceInformation.id:
+            return self.mount.information(self.behaviour, now)
+        return None
+
+    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
+        """See :meth:`SimulatedDevice.execute`: no command moves a device."""
+        return None
+
+    def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
+        """See :meth:`SimulatedDevice.receive`."""
+        self._expire(now)
+        own, behaviour = self.properties.address, self.behaviour
+        if isinstance(message, gimbal.GimbalManagerInformation | gimbal.GimbalManagerStatus):
+            # Component ids are unique in one system only.
+            if (message.gimbal_device_id == own.component and source.system == own.system
+                    and self.manager in (None, source)):
+                self.manager, self._announced_at = source, now
+        elif isinstance(message, gimbal.AutopilotStateForGimbalDevice):
+            if source.system == own.system:
+                self._take_heading(message, now)
+        elif (isinstance(message, gimbal.GimbalDeviceSetAttitude) or behaviour.takes_manager_set
+                ) and (source == self.manager or not behaviour.enforces_control):
+            self._set(message, now)
+        return ()
+
+    def _expire(self, now: float) -> None:
+        if self.properties.manager is None and now - self._announced_at >= MANAGER_TIMEOUT:
+            self.manager = None
+
+    def _take_heading(self, message: gimbal.AutopilotStateForGimbalDevice, now: float) -> None:
+        try:
+            roll, pitch, yaw = Quaternion(*message.q).normalized().euler()
+        except ValueError:
+            return
+        # 0 means that it is unknown.
+        self.mount.motion.take_heading(
+            roll, pitch, yaw, message.angular_velocity_z or math.nan, now)
+
+    def _set(
+        self, message: gimbal.GimbalDeviceSetAttitude | gimbal.GimbalManagerSetAttitude,
+        now: float,
+    ) -> None:
+        try:
+            frame = yaw_frame(message.flags)
+        except ValueError:
+            return
+        if frame is YawFrame.EARTH and not self.mount.motion.heading_known(now):
+            return
+        angles = (math.nan,) * 3
+        if all(map(math.isfinite, message.q)):
+            try:
+                angles = Quaternion(*message.q).normalized().euler()
+            except ValueError:
+                return
+        self.mount.set(
+            message.flags, frame, angles,
+            (message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
+            self.behaviour, now)
+
+    def snapshot(self, now: float) -> Snapshot:
+        """See :meth:`SimulatedDevice.snapshot`."""
+        self._expire(now)
+        return self.mount.describe(
+            now, f'manager {self.manager}' if self.manager else 'no manager',
+            '' if self.mount.motion.heading_known(now) else 'heading unknown')
+
+
+_SPANS = ('roll_range', 'pitch_range', 'yaw_range')
+
+
+def _span(text_: str) -> Range:
+    parts = text_.split(',')
+    if len(parts) != 2:
+        raise ValueError(f'{text_!r} is not MIN,MAX')
+    low, high = (math.radians(_degrees(part)) for part in parts)
+    if low > high:
+        raise ValueError(f'{text_}: the minimum is above the maximum')
+    return Range(low, high)
+
+
+def _capabilities(names: str) -> Capabilities:
+    known = {str(one.name).lower(): one for one in Capabilities}
+    result = Capabilities(0)
+    for name in names.split(','):
+        result |= known[one_of(known)(name.strip().lower())]
+    return result
+
+
+# The settings of devices and of managers.
+MECHANICS: dict[str, Setting] = {
+    'vendor': Setting('TEXT', 'vendor_name', text),
+    'model': Setting('TEXT', 'model_name', text),
+    'custom_name': Setting('TEXT', 'custom_name', text),
+    'status_interval': Setting('S', 'time between attitudes; 0 sends them only on request '
+                               '(default: 0.1)', number(0, 3600)),
+    'roll_range': Setting('MIN,MAX', 'degrees from the horizon (default: -45,45)', _span),
+    'pitch_range': Setting('MIN,MAX', 'likewise, up is positive (default: -120,45)', _span),
+    'yaw_range': Setting('MIN,MAX', 'degrees from the front of the vehicle, right is positive; '
+                         '-180,180 has no stop (default: -170,170)', _span),
+    'axis_rate': Setting('DEG_S', 'highest rate of each axis (default: 60)', number(0.1, 1000)),
+    'drift': Setting('DEG_S', 'drift of a locked yaw without a heading from the vehicle '
+                     '(default: 0.5)', number(-10, 10)),
+    'lacks': Setting('NAME,...', 'GIMBAL_DEVICE_CAP_FLAGS that it does not have, such as '
+                     'has_yaw_lock', _capabilities),
+}
+SETTINGS: dict[str, Setting] = {
+    **MECHANICS,
+    'manager': Setting('ID', 'component id of its manager; without it, the first component that '
+                       'announces itself', integer(1, 255)),
+}
+
+
+def mechanics(settings: Mapping[str, Any]) -> GimbalMechanics:
+    """Return the mechanics that settings describe."""
+    default = GimbalMechanics()
+    given: dict[str, Any] = {
+        name.removesuffix('_range'): settings[name] for name in _SPANS if name in settings}
+    for name, field in (('axis_rate', 'rate'), ('drift', 'drift')):
+        if name in settings:
+            given[field] = math.radians(settings[name])
+    endless = given.get('yaw', default.yaw).turns
+    return replace(default, **given, capabilities=(
+        default.capabilities | (Capabilities.SUPPORTS_INFINITE_YAW if endless else 0))
+        & ~settings.get('lacks', 0))
+
+
+def properties(settings: Mapping[str, Any], address: Address) -> GimbalProperties:
+    """Return the gimbal that settings describe."""
+    names = ('vendor', 'model', 'custom_name', 'status_interval')
+    manager = settings.get('manager')
+    return GimbalProperties(
+        address, mechanics(settings), **{name: settings[name] for name in names
+                                         if name in settings},
+        manager=Address(address.system, manager) if manager else None)
+
+
+SIMULATED = SimulatedType(
+    'gimbal', 'gimbals', SimulatedGimbal,
+    make=lambda settings, address, several: SimulatedGimbal(properties(settings, address)),
+    address=lambda settings: GimbalProperties.address, settings=SETTINGS)

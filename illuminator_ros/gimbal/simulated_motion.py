@@ -1,0 +1,298 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The motion of a simulated gimbal: axes with rates and ranges, locks, and a drifting heading."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from .messages import Capabilities, ErrorFlags
+from ..payload.mount import MountFlags, YawFrame
+from ..payload.rotation import Quaternion, Vector
+
+# s without a heading from the vehicle after which its heading is unknown.
+HEADING_TIMEOUT = 2.0
+# Angles that are equal, rad.
+RESOLUTION = 1e-6
+UNSET: Vector = (math.nan,) * 3
+# The flags that a setpoint may set.
+SETTABLE = (MountFlags.RETRACT | MountFlags.NEUTRAL | MountFlags.ROLL_LOCK
+            | MountFlags.PITCH_LOCK | MountFlags.YAW_LOCK)
+AXES = ('roll', 'pitch', 'yaw')
+_HAS_AXIS = {'roll': Capabilities.HAS_ROLL_AXIS, 'pitch': Capabilities.HAS_PITCH_AXIS,
+             'yaw': Capabilities.HAS_YAW_AXIS}
+_LOCKS = (MountFlags.ROLL_LOCK, MountFlags.PITCH_LOCK, MountFlags.YAW_LOCK)
+_FOLLOWS = (Capabilities.HAS_ROLL_FOLLOW, Capabilities.HAS_PITCH_FOLLOW,
+            Capabilities.HAS_YAW_FOLLOW)
+_HAS_LOCK = (Capabilities.HAS_ROLL_LOCK, Capabilities.HAS_PITCH_LOCK, Capabilities.HAS_YAW_LOCK)
+_AT_LIMIT = (ErrorFlags.AT_ROLL_LIMIT, ErrorFlags.AT_PITCH_LIMIT, ErrorFlags.AT_YAW_LIMIT)
+CAPABILITIES = (
+    Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL
+    | Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_FOLLOW | Capabilities.HAS_ROLL_LOCK
+    | Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_PITCH_FOLLOW | Capabilities.HAS_PITCH_LOCK
+    | Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_FOLLOW | Capabilities.HAS_YAW_LOCK
+    | Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+
+
+def wrapped(angle: float) -> float:
+    """Return an angle within -pi..pi, rad."""
+    return math.remainder(angle, math.tau)
+
+
+class Range(NamedTuple):
+    """The range of an axis, rad."""
+
+    low: float
+    high: float
+
+    @property
+    def turns(self) -> bool:
+        """Return whether it is a full turn, which has no stop."""
+        return self.high - self.low >= math.tau - RESOLUTION
+
+    def clip(self, angle: float) -> float:
+        """Return the nearest angle within the range."""
+        return min(max(angle, self.low), self.high)
+
+
+NO_STOPS = Range(-math.pi, math.pi)
+
+
+@dataclass(frozen=True)
+class GimbalMechanics:
+    """
+    What a gimbal can do.
+
+    :param roll, pitch: relative to the horizon.
+    :param yaw: relative to the vehicle's heading; a full turn has no stop.
+    :param rate: highest rate of each axis, rad/s.
+    :param drift: of the gimbal's own heading where it gets none from the vehicle, rad/s.
+    :param retracted: roll, pitch and yaw of the retracted position, rad.
+    """
+
+    roll: Range = Range(*map(math.radians, (-45.0, 45.0)))
+    pitch: Range = Range(*map(math.radians, (-120.0, 45.0)))
+    yaw: Range = Range(*map(math.radians, (-170.0, 170.0)))
+    rate: float = math.radians(60.0)
+    drift: float = math.radians(0.5)
+    retracted: Vector = (0.0, math.radians(45.0), 0.0)
+    capabilities: Capabilities = CAPABILITIES
+
+    @property
+    def ranges(self) -> tuple[Range, Range, Range]:
+        """Return the ranges in the order of the axes."""
+        return self.roll, self.pitch, self.yaw
+
+
+class VehicleAttitude(NamedTuple):
+    """
+    The attitude of the vehicle, rad.
+
+    :param yaw: its heading, rad from north.
+    :param rate: of the heading, rad/s; NaN if unknown.
+    :param until: when it is no longer current, s.
+    """
+
+    roll: float
+    pitch: float
+    yaw: float
+    rate: float
+    until: float
+
+
+@dataclass
+class _Axis:
+    """
+    One axis.
+
+    :ivar angle: rad; velocity: rad/s.
+    :ivar target: in the reference of the axis, rad; it turns at ``rate``, rad/s.
+    :ivar speed: at which the axis approaches the target, rad/s.
+    :ivar beyond: whether the target is out of range.
+    """
+
+    angle: float = 0.0
+    velocity: float = 0.0
+    target: float = 0.0
+    rate: float = 0.0
+    speed: float = 0.0
+    beyond: bool = False
+
+    def advance(self, seconds: float, goal: float, span: Range, *, endless: bool) -> None:
+        """Approach a goal, rad, for some time."""
+        within = goal if endless else span.clip(goal)
+        self.beyond = abs(within - goal) > RESOLUTION
+        error = wrapped(within - self.angle) if endless else within - self.angle
+        # A target that turns is followed at its rate.
+        step = math.copysign(min(abs(error), max(self.speed, abs(self.rate)) * seconds), error)
+        self.velocity = step / seconds
+        self.angle = wrapped(self.angle + step) if endless else self.angle + step
+        if self.beyond and abs(within - self.angle) < RESOLUTION:
+            # A target that turns on at the stop would take as long to return.
+            self.target += self.angle - goal if self.rate else 0.0
+
+
+@dataclass
+class GimbalMotion:
+    """
+    The axes of a gimbal: roll and pitch relative to the horizon, yaw relative to the vehicle.
+
+    It computes the state of a moment when it is asked for; ``now`` is s.
+
+    :ivar flags: the flags of the latest setpoint.
+    :ivar frame: the yaw frame of the latest setpoint.
+    :ivar travelled: sum of the angles of all movements, rad.
+    """
+
+    mechanics: GimbalMechanics
+    now: float
+    flags: MountFlags = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+    frame: YawFrame = YawFrame.VEHICLE
+    vehicle: VehicleAttitude = VehicleAttitude(0.0, 0.0, 0.0, math.nan, -math.inf)
+    travelled: float = 0.0
+    _axes: tuple[_Axis, _Axis, _Axis] = field(
+        default_factory=lambda: (_Axis(), _Axis(), _Axis()))
+    _frozen_axis: str = ''
+    _limited: bool = True
+
+    def fail(self, frozen_axis: str, *, limited: bool) -> None:
+        """Let an axis stand still, '' for none, and the axes keep within their ranges or not."""
+        self._frozen_axis, self._limited = frozen_axis, limited
+
+    def heading_known(self, now: float) -> bool:
+        """Return whether the vehicle's heading is known."""
+        return now < self.vehicle.until
+
+    def _heading(self, now: float) -> float:
+        """Return the heading as the gimbal's gyros have it: it drifts while it is unknown."""
+        lost = max(0.0, now - max(self.vehicle.until, 0.0))
+        return wrapped(self.vehicle.yaw + self.mechanics.drift * lost)
+
+    def take_heading(self, roll: float, pitch: float, yaw: float, rate: float, now: float,
+                     valid: float = HEADING_TIMEOUT) -> None:
+        """Take the attitude of the vehicle, rad, and its turning rate, rad/s."""
+        self.advance(now)
+        self.vehicle = VehicleAttitude(roll, pitch, yaw, rate, now + valid)
+
+    def locked(self, axis: int) -> bool:
+        """Return whether an axis is held against the horizon or against north."""
+        can_follow = self.mechanics.capabilities & _FOLLOWS[axis]
+        can_lock = self.mechanics.capabilities & _HAS_LOCK[axis]
+        return bool(can_lock and (self.flags & _LOCKS[axis] or not can_follow))
+
+    def _references(self, now: float) -> Vector:
+        """Return for each axis what is added to its target to have its angle."""
+        vehicle = self.vehicle
+        roll, pitch = (0.0 if self.locked(axis) else angle
+                       for axis, angle in enumerate((vehicle.roll, vehicle.pitch)))
+        return roll, pitch, -self._heading(now) if self.locked(2) else 0.0
+
+    def set(  # noqa: A003 - the word of the messages
+        self, flags: int, frame: YawFrame, angles: Vector, rates: Vector, now: float,
+    ) -> None:
+        """
+        Take a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
+
+        :param angles: roll, pitch and yaw, rad; NaN leaves an axis to its rate.
+        :param rates: rad/s; beside an angle the rate at which it is approached, NaN for none.
+            An axis with neither keeps its angle.
+        """
+        self.advance(now)
+        self.flags, self.frame = MountFlags(flags) & SETTABLE, frame
+        if flags & (MountFlags.RETRACT | MountFlags.NEUTRAL):
+            # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).
+            angles = self.mechanics.retracted if flags & MountFlags.RETRACT else (0.0,) * 3
+            rates, self.frame = UNSET, YawFrame.VEHICLE
+        references = self._references(now)
+        for index, (axis, angle, rate) in enumerate(zip(self._axes, angles, rates, strict=True)):
+            axis.rate, axis.speed = 0.0, self.mechanics.rate
+            if math.isfinite(angle):
+                axis.target = angle
+                if index == 2:
+                    own = self._heading(now) if self.frame is YawFrame.EARTH else 0.0
+                    axis.target = angle - own - references[index]
+                if math.isfinite(rate) and rate:
+                    axis.speed = min(abs(rate), self.mechanics.rate)
+            else:
+                axis.target = axis.angle - references[index]
+                if math.isfinite(rate):
+                    axis.rate = Range(-self.mechanics.rate, self.mechanics.rate).clip(rate)
+
+    def turn(self, pitch: float, yaw: float, now: float) -> None:
+        """Move it by hand: it keeps these angles, rad, relative to horizon and vehicle."""
+        self.advance(now)
+        references = self._references(now)
+        for index, angle in ((1, pitch), (2, yaw)):
+            axis = self._axes[index]
+            before, axis.angle = axis.angle, self.mechanics.ranges[index].clip(angle)
+            self.travelled += abs(axis.angle - before)
+            axis.target, axis.rate = axis.angle - references[index], 0.0
+
+    def advance(self, now: float) -> None:
+        """Move until a moment."""
+        seconds, self.now = now - self.now, now
+        if seconds <= 0:
+            return
+        references, capabilities = self._references(now), self.mechanics.capabilities
+        for name, axis, span, reference in zip(
+                AXES, self._axes, self.mechanics.ranges, references, strict=True):
+            axis.target += axis.rate * seconds
+            goal = axis.target + reference
+            if name == 'yaw':
+                # An angle is within a turn of the stops, a rate goes on from where it is.
+                goal = axis.angle + wrapped(goal - axis.angle) if axis.rate else wrapped(goal)
+            if name == self._frozen_axis or not capabilities & _HAS_AXIS[name]:
+                goal = axis.angle
+            axis.advance(seconds, goal, span if self._limited else NO_STOPS,
+                         endless=name == 'yaw' and span.turns)
+            self.travelled += abs(axis.velocity) * seconds
+
+    @property
+    def angles(self) -> Vector:
+        """Return roll, pitch and yaw, rad, yaw relative to the vehicle."""
+        roll, pitch, yaw = self._axes
+        return roll.angle, pitch.angle, yaw.angle
+
+    @property
+    def rates(self) -> Vector:
+        """Return their rates, rad/s."""
+        roll, pitch, yaw = self._axes
+        return roll.velocity, pitch.velocity, yaw.velocity
+
+    @property
+    def moving(self) -> bool:
+        """Return whether an axis moves, slow drift aside."""
+        return any(abs(rate) > self.mechanics.drift * 1.5 + RESOLUTION for rate in self.rates)
+
+    def limits(self) -> ErrorFlags:
+        """Return the flags of the axes whose setpoint is out of their range."""
+        return ErrorFlags(sum(flag for flag, axis in zip(_AT_LIMIT, self._axes, strict=True)
+                              if axis.beyond))
+
+    def attitude(self, frame: YawFrame) -> Quaternion:
+        """Return the attitude in MAVLink's axes; the earth frame needs the heading."""
+        roll, pitch, yaw = self.angles
+        return Quaternion.from_euler(
+            roll, pitch, yaw + self.vehicle.yaw if frame is YawFrame.EARTH else yaw)
+
+
+def limit_fields(mechanics: GimbalMechanics) -> Mapping[str, float]:
+    """Return the fields roll_min to yaw_max of an INFORMATION message."""
+    return {f'{name}_{end}': value
+            for name, span in zip(AXES, mechanics.ranges, strict=True)
+            for end, value in zip(('min', 'max'), span, strict=True)}

@@ -1,0 +1,67 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Messages of which only the newest is worth sending; no I/O, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .messages import Address, Message
+
+# Classes of messages that are sent together, and replaced together.
+StreamGroup = Sequence[type[Message]]
+
+
+class StreamQueue:
+    """
+    Holds messages of streams until the line has room, and drops those that newer ones replace.
+
+    A slow line would otherwise carry them late, and other messages behind them.
+
+    :param groups: the most urgent first.
+    :ivar replaced: messages that were dropped for newer ones.
+    """
+
+    def __init__(self, groups: Sequence[StreamGroup]) -> None:
+        self.replaced = 0
+        self._places = {cls: place for place, group in enumerate(groups) for cls in group}
+        self._held: list[list[tuple[Address, Message]]] = [[] for _ in groups]
+
+    def __bool__(self) -> bool:
+        return any(self._held)
+
+    def hold(self, source: Address, message: Message) -> bool:
+        """Take a message, if it belongs to a stream; return whether it does."""
+        place = self._places.get(type(message))
+        if place is None:
+            return False
+        held = self._held[place]
+        if any(type(other) is type(message) for _, other in held):
+            self.replaced += len(held)
+            held.clear()
+        held.append((source, message))
+        return True
+
+    def take(self) -> list[tuple[Address, Message]]:
+        """Return the messages of the most urgent group that has some."""
+        place = next(place for place, held in enumerate(self._held) if held)
+        held, self._held[place] = self._held[place], []
+        return held
+
+    def clear(self) -> None:
+        """Drop all: the link is closed."""
+        for held in self._held:
+            held.clear()

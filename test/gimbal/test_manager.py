@@ -1,0 +1,592 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A gimbal manager: its messages, and the way of a setpoint from a player to the device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from typing import Any
+
+from illuminator_ros.gimbal.manager import (
+    AddressShared,
+    AttitudeReceived,
+    DemandRefused,
+    HOLD_INTERVAL,
+    PositionLost,
+    SetpointClipped,
+    SetpointSent,
+)
+from illuminator_ros.gimbal.manager_control import ControlChanged, ControlSettings, Role
+from illuminator_ros.gimbal.manager_presence import ManagerState
+from illuminator_ros.gimbal.manager_setpoint import Range
+from illuminator_ros.gimbal.messages import (
+    AutopilotStateForGimbalDevice,
+    Capabilities,
+    GimbalCommand,
+    GimbalDeviceInformation,
+    GimbalDeviceSetAttitude,
+    GimbalManagerInformation,
+    GimbalManagerSetAttitude,
+    GimbalManagerSetManualControl,
+    GimbalManagerStatus,
+)
+from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat, MavResult, MavType
+from illuminator_ros.payload.arbitration import Cause, Policy
+from illuminator_ros.payload.mount import MountFlags, UNSET
+from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
+import pytest
+from support.gimbal_manager import (
+    attitude_status,
+    AUTOPILOT,
+    configure,
+    DEVICE,
+    FULL,
+    GUEST,
+    information,
+    long,
+    ManagerRig,
+    NAN,
+    of,
+    OURS,
+    PILOT,
+    pitch_yaw,
+    pitch_yaw_command,
+    position,
+    region,
+    request,
+    vehicle_yaw,
+)
+
+F = MountFlags
+
+
+def in_control(player: Address = PILOT, **settings: Any) -> ManagerRig:
+    """Return a manager with a player in primary control."""
+    rig = ManagerRig(**settings)
+    assert rig.take(player) is MavResult.ACCEPTED
+    return rig
+
+
+def euler(message: GimbalDeviceSetAttitude) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw of a setpoint, rounded, rad."""
+    roll, pitch, yaw = (round(angle, 4) for angle in Quaternion(*message.q).euler())
+    return roll, pitch, yaw
+
+
+def last(rig: ManagerRig) -> GimbalDeviceSetAttitude:
+    return rig.messages(GimbalDeviceSetAttitude)[-1]
+
+
+# GM-10, GM-27: INFORMATION is static and on request, STATUS says who is in control
+
+def test_gm_27_information_is_sent_on_request_with_what_the_device_reports() -> None:
+    rig = ManagerRig(device=information(yaw_max=NAN, cap_flags2=0))
+
+    ack, answer = rig.give(PILOT, request(GimbalManagerInformation))
+
+    assert ack.result == MavResult.ACCEPTED
+    assert replace(answer, time_boot_ms=0, yaw_max=0.0) == GimbalManagerInformation(
+        0, int(FULL | Capabilities.CAN_POINT_LOCATION_GLOBAL), DEVICE.component, -0.5, 0.5, -0.5,
+        0.5, -0.5, 0.0)
+    assert math.isnan(answer.yaw_max)
+    assert len(rig.messages(GimbalManagerInformation)) == 1
+
+
+@pytest.mark.parametrize('to', [Address(1, 0), Address(0, 0)])
+def test_gm_27_a_request_to_all_components_is_answered(to: Address) -> None:
+    rig = ManagerRig()
+
+    sent = rig.give(PILOT, request(GimbalManagerInformation, to))
+
+    assert len(of(GimbalManagerInformation, sent)) == len(of(CommandAck, sent)) == 1
+
+
+def test_the_manager_passes_on_the_information_of_its_device() -> None:
+    rig = ManagerRig()
+
+    _, answer = rig.give(PILOT, request(GimbalDeviceInformation))
+
+    assert answer == replace(rig.device_information, gimbal_device_id=DEVICE.component)
+
+
+def test_gm_10_the_status_is_sent_five_times_a_second() -> None:
+    rig = in_control()
+    begun = rig.now
+
+    rig.run(10.0, each=rig.heartbeats(PILOT))
+
+    statuses = rig.messages(GimbalManagerStatus, begun)
+    assert 49 <= len(statuses) <= 51
+    assert {(one.gimbal_device_id, one.primary_control_sysid, one.primary_control_compid,
+             one.secondary_control_sysid, one.secondary_control_compid)
+            for one in statuses[1:]} == {(DEVICE.component, *PILOT, 0, 0)}
+
+
+def test_the_status_has_the_flags_of_the_setpoint() -> None:
+    rig = in_control()
+    flags = F.ROLL_LOCK | F.PITCH_LOCK | F.YAW_LOCK
+
+    rig.give(PILOT, pitch_yaw(0.0, 0.0, flags=flags))
+
+    assert rig.manager.status(rig.now).flags == flags | F.YAW_IN_EARTH_FRAME
+
+
+# GM-16, GM-17, GM-19: only the player in control reaches the device
+
+def test_gm_16_a_player_in_control_sets_the_attitude_of_the_device() -> None:
+    rig = in_control()
+
+    [message] = rig.points(PILOT, 0.2, -0.3)
+
+    assert (message.target_system, message.target_component) == DEVICE
+    assert euler(message) == (0.0, 0.2, -0.3)
+    assert F(message.flags) == F.YAW_IN_VEHICLE_FRAME
+
+
+@pytest.mark.parametrize('holder', [None, PILOT])
+def test_gm_14_a_player_that_is_not_in_control_is_refused(holder: Address | None) -> None:
+    rig = in_control(holder) if holder else ManagerRig()
+    rig.give(AUTOPILOT, position(47.0, 8.0, 500.0))
+
+    assert rig.points(GUEST) == []
+    assert [rig.result(GUEST, command) for command in (
+        pitch_yaw_command(1, 1), region(47.1, 8.0, 0.0), long(GimbalCommand.DO_SET_ROI_NONE))
+    ] == [MavResult.DENIED] * 3
+    assert rig.messages(GimbalDeviceSetAttitude) == []
+    [refused] = of(DemandRefused, rig.events)
+    assert refused.player == GUEST
+    assert (f'{holder} has control' if holder else 'take control first') in refused.reason
+
+
+def test_refusals_are_reported_once_a_second() -> None:
+    rig = in_control()
+    for _ in range(100):
+        rig.points(GUEST)
+
+    rig.run(1.0, each=rig.heartbeats(PILOT))
+    rig.points(GUEST)
+
+    assert [one.unreported for one in of(DemandRefused, rig.events)] == [0, 99]
+
+
+@pytest.mark.parametrize(('policy', 'overrules', 'result'), [
+    (Policy.HOLD, False, MavResult.DENIED), (Policy.HOLD, True, MavResult.ACCEPTED),
+    (Policy.TAKEOVER, False, MavResult.ACCEPTED)])
+def test_gm_17_control_moves_as_the_policy_says(
+        policy: Policy, overrules: bool, result: MavResult) -> None:
+    rig = in_control(control=ControlSettings(
+        policy, overruling=frozenset({GUEST} if overrules else ())))
+
+    assert rig.take(GUEST) is result
+
+    obeyed, ignored = (GUEST, PILOT) if result is MavResult.ACCEPTED else (PILOT, GUEST)
+    assert rig.points(ignored) == []
+    assert len(rig.points(obeyed)) == 1
+
+
+@pytest.mark.parametrize('device_id', [0, DEVICE.component, 155])
+def test_gm_28_messages_and_commands_of_other_devices_are_refused(device_id: int) -> None:
+    rig = in_control()
+    ours = device_id != 155
+
+    result = rig.result(PILOT, pitch_yaw_command(1, 1, device_id=device_id))
+    sent = rig.give(PILOT, pitch_yaw(0.1, 0.1, device_id=device_id))
+
+    assert result is (MavResult.ACCEPTED if ours else MavResult.DENIED)
+    assert len(sent) == ours
+
+
+def test_a_setpoint_to_another_manager_is_ignored() -> None:
+    rig = in_control()
+
+    assert rig.give(PILOT, pitch_yaw(0.1, 0.1, to=Address(1, 1))) == []
+
+
+def test_gm_16_the_gimbal_stays_where_it_points_when_its_player_falls_silent() -> None:
+    rig = in_control()
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.1, yaw_rate=0.0))
+    assert last(rig).q == pytest.approx(UNSET, nan_ok=True)
+
+    rig.run(3.5)
+
+    assert (last(rig).angular_velocity_x, last(rig).angular_velocity_y,
+            last(rig).angular_velocity_z) == (0.0, 0.0, 0.0)
+    assert of(ControlChanged, rig.events)[-1] == ControlChanged(
+        Role.PRIMARY, PILOT, None, Cause.SILENCE)
+
+
+# Setpoints
+
+def test_a_setpoint_is_repeated_at_least_once_a_second() -> None:
+    rig = in_control()
+    rig.points(PILOT)
+    begun = rig.now
+
+    rig.run(10.0, each=rig.heartbeats(PILOT))
+
+    times = [begun, *(at for at, message in rig.sent
+                      if at > begun and isinstance(message, GimbalDeviceSetAttitude))]
+    assert max(b - a for a, b in zip(times, times[1:], strict=False)) <= 1.0
+    assert len(times) <= 10.0 / HOLD_INTERVAL + 2
+
+
+Q = Quaternion.from_euler(0.1, 0.2, 0.3)
+HALF = (Q.w / 2, Q.x / 2, Q.y / 2, Q.z / 2)
+# A message of a player; angles (rad), rates (rad/s) and flags that the device gets.
+SETPOINTS: dict[str, tuple[Any, Any, Any, MountFlags]] = {
+    'quaternion': (
+        GimbalManagerSetAttitude(*OURS, int(F.YAW_LOCK), 0, HALF, NAN, 0.2, 0.3),
+        (0.1, 0.2, 0.3), (NAN, 0.2, 0.3), F.YAW_LOCK | F.YAW_IN_EARTH_FRAME),
+    'rates of a quaternion message': (
+        GimbalManagerSetAttitude(*OURS, 0, 0, UNSET, 0.1, NAN, 0.3),
+        None, (0.1, 0.0, 0.3), F.YAW_IN_VEHICLE_FRAME),
+    'angles': (
+        pitch_yaw(0.2, 0.3, flags=F.ROLL_LOCK | F.YAW_IN_EARTH_FRAME),
+        (0.0, 0.2, 0.3), (NAN,) * 3, F.ROLL_LOCK | F.YAW_IN_EARTH_FRAME),
+    'angles with rates': (
+        pitch_yaw(0.2, 0.3, 0.4, 0.5), (0.0, 0.2, 0.3), (NAN, 0.4, 0.5), F.YAW_IN_VEHICLE_FRAME),
+    'pitch only': (pitch_yaw(0.2), (0.0, 0.2, 0.25), (NAN,) * 3, F.YAW_IN_VEHICLE_FRAME),
+    'rates': (pitch_yaw(pitch_rate=0.1), None, (0.0, 0.1, 0.0), F.YAW_IN_VEHICLE_FRAME),
+    'flags only': (
+        pitch_yaw(flags=F.PITCH_LOCK), (0.05, 0.15, 0.25), (NAN,) * 3,
+        F.PITCH_LOCK | F.YAW_IN_VEHICLE_FRAME),
+    'command': (
+        pitch_yaw_command(math.degrees(0.2), math.degrees(-0.3)), (0.0, 0.2, -0.3), (NAN,) * 3,
+        F.YAW_IN_VEHICLE_FRAME),
+    'rates of a command': (
+        pitch_yaw_command(NAN, NAN, math.degrees(0.1), math.degrees(0.2)),
+        None, (0.0, 0.1, 0.2), F.YAW_IN_VEHICLE_FRAME),
+    'full deflection': (
+        GimbalManagerSetManualControl(*OURS, 0, 0, 1.0, -1.0, NAN, NAN),
+        (0.0, 0.5, -0.5), (NAN,) * 3, F.YAW_IN_VEHICLE_FRAME),
+    'rates of a stick': (
+        GimbalManagerSetManualControl(*OURS, 0, 0, NAN, NAN, 0.5, -1.0),
+        None, (0.0, 0.25, -0.5), F.YAW_IN_VEHICLE_FRAME),
+    'neutral': (
+        pitch_yaw(flags=F.NEUTRAL), None, (NAN,) * 3, F.NEUTRAL | F.YAW_IN_VEHICLE_FRAME),
+}
+
+
+@pytest.mark.parametrize('case', SETPOINTS)
+def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
+    message, angles, rates, flags = SETPOINTS[case]
+    rig = in_control()
+    q = Quaternion.from_euler(0.05, 0.15, 0.25)
+    rig.give(DEVICE, attitude_status((q.w, q.x, q.y, q.z)))
+
+    sent, = of(GimbalDeviceSetAttitude, rig.give(PILOT, message))
+
+    assert F(sent.flags) == flags
+    assert (sent.angular_velocity_x, sent.angular_velocity_y,
+            sent.angular_velocity_z) == pytest.approx(rates, nan_ok=True)
+    assert (euler(sent) == angles) if angles else all(map(math.isnan, sent.q))
+
+
+@pytest.mark.parametrize('message', [
+    GimbalManagerSetAttitude(*OURS, 0, 0, (0.0, 0.0, 0.0, 0.0), NAN, NAN, NAN),
+    GimbalManagerSetAttitude(*OURS, 0, 0, (1.0, NAN, 0.0, 0.0), NAN, NAN, NAN),
+    GimbalManagerSetAttitude(*OURS, 0, 0, UNSET, math.inf, NAN, NAN),
+    pitch_yaw(math.inf, 0.0), pitch_yaw(0.0, 0.0, flags=32 | 64),
+    GimbalManagerSetManualControl(*OURS, 0, 0, 1.5, 0.0, NAN, NAN),
+    pitch_yaw_command(math.inf, 0.0), pitch_yaw_command(0.0, 0.0, flags=96)], ids=repr)
+def test_an_invalid_setpoint_is_refused_and_named(message: Any) -> None:
+    rig = in_control()
+
+    sent = rig.give(PILOT, message)
+
+    assert of(GimbalDeviceSetAttitude, sent) == []
+    acks = of(CommandAck, sent)
+    assert [ack.result for ack in acks] == [MavResult.DENIED] * len(acks)
+    assert len(acks) + len(of(DemandRefused, rig.events)) == 1
+
+
+def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
+    rig = in_control(device=information(FULL & ~Capabilities.HAS_YAW_LOCK))
+
+    result = rig.result(PILOT, pitch_yaw_command(0, 0, flags=F.YAW_LOCK))
+
+    assert result is MavResult.DENIED
+    assert rig.give(PILOT, pitch_yaw(0.1, 0.0, flags=F.YAW_LOCK)) == []
+    assert 'YAW_LOCK' in of(DemandRefused, rig.events)[0].reason
+
+
+@pytest.mark.parametrize('heading', [NAN, 1.0])
+def test_gm_2_a_yaw_from_north_is_converted_for_a_device_that_knows_no_north(
+        heading: float) -> None:
+    rig = in_control(device=information(
+        FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME & ~Capabilities.HAS_YAW_LOCK))
+    rig.give(DEVICE, attitude_status(heading=heading))
+    rig.heading = heading
+
+    sent = of(GimbalDeviceSetAttitude,
+              rig.give(PILOT, pitch_yaw(0.1, 1.2, flags=F.YAW_IN_EARTH_FRAME)))
+
+    if math.isnan(heading):
+        assert sent == []
+        assert 'heading' in of(DemandRefused, rig.events)[0].reason
+        return
+    assert euler(sent[0]) == (0.0, 0.1, 0.2)
+    assert F(sent[0].flags) == F.YAW_IN_VEHICLE_FRAME
+    # It follows the vehicle when that turns.
+    rig.heading = 1.1
+    rig.run(1.0)
+    assert euler(last(rig)) == (0.0, 0.1, 0.1)
+
+
+# GM-9: nudging adds, overriding replaces; limits come last
+
+@pytest.mark.parametrize(('asked', 'pitch'), [(0.1, 0.3), (-0.1, 0.1), (1.0, 0.4), (-1.0, 0.0)])
+def test_gm_9_the_secondary_player_adds_no_more_than_the_limit(
+        asked: float, pitch: float) -> None:
+    rig = in_control(nudge_limit=0.2)
+    rig.points(PILOT, 0.2, 0.1)
+    assert rig.result(GUEST, configure(-1, -1, *GUEST)) is MavResult.ACCEPTED
+
+    [message] = rig.points(GUEST, asked, 0.0)
+
+    assert euler(message) == (0.0, pitch, 0.1)
+    # Overriding replaces the setpoint, not the offset.
+    assert euler(rig.points(PILOT, 0.0, 0.0)[0]) == (0.0, round(pitch - 0.2, 4), 0.0)
+    assert rig.result(GUEST, configure(-3, -3, -3, -3)) is MavResult.ACCEPTED
+    assert euler(rig.points(PILOT, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
+
+
+@pytest.mark.parametrize('message', [
+    pitch_yaw(pitch_rate=0.1), pitch_yaw(flags=F.RETRACT), pitch_yaw()])
+def test_gm_9_the_secondary_player_sets_neither_rates_nor_flags(message: Any) -> None:
+    rig = in_control()
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+
+    assert rig.give(GUEST, message) == []
+
+
+def test_gm_9_limits_are_applied_after_mixing_and_reported() -> None:
+    rig = in_control(nudge_limit=0.2)
+    rig.points(PILOT, 0.4, -0.1)
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+
+    [message] = rig.points(GUEST, 0.2, 0.0)
+
+    assert euler(message) == (0.0, 0.5, -0.1)
+    [[clipped]] = [one.clipped for one in of(SetpointClipped, rig.events)]
+    assert (clipped.axis, round(clipped.asked, 4), clipped.limit) == ('pitch', 0.6, 0.5)
+
+
+def test_gm_5_an_axis_that_the_device_lacks_is_not_turned() -> None:
+    rig = in_control(device=information(FULL & ~Capabilities.HAS_YAW_AXIS))
+
+    [message] = rig.points(PILOT, 0.1, 0.4)
+
+    assert euler(message) == (0.0, 0.1, 0.0)
+    assert [one.axis for event in of(SetpointClipped, rig.events)
+            for one in event.clipped] == ['yaw']
+
+
+# GM-8: regions of interest
+
+def following(**device: Any) -> ManagerRig:
+    """Return a manager that points at a place 1 km north of the vehicle, which heads east."""
+    everywhere: dict[str, Any] = {
+        f'{axis}_{end}': NAN for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')}
+    rig = in_control(device=replace(information(), **everywhere, **device))
+    rig.give(AUTOPILOT, position(47.0, 8.0, 500.0, home=400.0), vehicle_yaw(math.pi / 2))
+    assert rig.result(PILOT, region(47.008993, 8.0, 500.0)) is MavResult.ACCEPTED
+    return rig
+
+
+def test_gm_8_the_gimbal_follows_a_place_while_the_vehicle_moves() -> None:
+    rig = following()
+    assert euler(last(rig)) == (0.0, 0.0, 0.0)
+    assert F(last(rig).flags) & (F.YAW_LOCK | F.YAW_IN_EARTH_FRAME)
+
+    rig.give(AUTOPILOT, position(47.008993, 7.986836, 1500.0))
+    rig.run(0.2)
+
+    assert euler(last(rig)) == pytest.approx((0.0, -math.pi / 4, math.pi / 2), abs=0.002)
+
+
+def test_gm_8_a_device_without_north_gets_the_yaw_from_the_vehicle() -> None:
+    rig = following(cap_flags=int(
+        FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME & ~Capabilities.HAS_YAW_LOCK))
+
+    assert euler(last(rig)) == (0.0, 0.0, round(-math.pi / 2, 4))
+    assert F(last(rig).flags) & F.YAW_IN_VEHICLE_FRAME
+
+
+def test_gm_8_a_new_setpoint_or_clearing_ends_the_region_of_interest() -> None:
+    for ending in (pitch_yaw(0.0, 0.0), long(GimbalCommand.DO_SET_ROI_NONE)):
+        rig = following()
+        rig.give(PILOT, ending)
+        before = euler(last(rig))
+
+        rig.give(AUTOPILOT, position(46.0, 8.0, 1500.0))
+        rig.run(2.0)
+
+        assert euler(last(rig)) == before
+
+
+def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
+    rig = following()
+    before = euler(last(rig))
+
+    rig.run(3.0, each=rig.heartbeats(PILOT))
+
+    assert euler(last(rig)) == before
+    assert len(of(PositionLost, rig.events)) in (2, 3)
+
+
+@pytest.mark.parametrize(('command', 'result'), [
+    (region(47.1, 8.0, 100.0, frame=3), MavResult.ACCEPTED),
+    (region(47.1, 8.0, 100.0, frame=10), MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
+    (region(97.1, 8.0, 100.0), MavResult.DENIED),
+    (region(47.1, 8.0, NAN), MavResult.DENIED),
+    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, 47, 8, 0), MavResult.COMMAND_INT_ONLY)])
+def test_gm_8_a_region_of_interest_is_answered_with_its_reason(
+        command: Any, result: MavResult) -> None:
+    rig = following()
+
+    assert rig.result(PILOT, command) is result
+
+
+def test_gm_8_an_altitude_above_home_is_converted() -> None:
+    rig = following()
+
+    rig.give(PILOT, region(47.008993, 8.0, 1100.0, frame=3))
+
+    # Home is at 400 m and the vehicle at 500 m: the place is 1000 m above it.
+    assert euler(last(rig))[1] == pytest.approx(math.pi / 4, abs=0.002)
+
+
+def test_gm_8_without_a_position_a_region_of_interest_is_rejected_for_now() -> None:
+    rig = in_control()
+
+    assert rig.result(PILOT, region(47.1, 8.0, 0.0)) is MavResult.TEMPORARILY_REJECTED
+
+
+# GM-22: a device without MAVLink
+
+def test_gm_22_a_device_without_mavlink_gets_no_message_of_the_gimbal_set() -> None:
+    rig = in_control(device_id=1, ranges=(Range(0.0, 0.0), Range(-1.5, 0.5), Range(-2.0, 2.0)))
+    rig.manager.vehicle.set_attitude(Quaternion(), 0.0, rig.now)
+    rig.manager.vehicle_changed(rig.now)
+
+    rig.give(PILOT, pitch_yaw(1.0, 0.3))
+
+    assert rig.messages(GimbalDeviceSetAttitude) == []
+    assert rig.messages(AutopilotStateForGimbalDevice) == []
+    setpoint = of(SetpointSent, rig.events)[-1].setpoint
+    assert setpoint.attitude is not None
+    assert [round(angle, 4) for angle in setpoint.attitude.euler()] == [0.0, 0.5, 0.3]
+
+
+def test_gm_22_the_manager_turns_a_device_that_takes_no_rates() -> None:
+    rig = in_control(device_id=1, ranges=(Range(), Range(-1.0, 1.0), Range(-2.0, 2.0)))
+    rig.give(PILOT, pitch_yaw(0.1, 0.0))
+
+    rig.give(PILOT, pitch_yaw(yaw_rate=0.5))
+    rig.run(1.0, each=rig.heartbeats(PILOT))
+
+    setpoint = of(SetpointSent, rig.events)[-1].setpoint
+    assert setpoint.attitude is not None
+    assert setpoint.attitude.euler() == pytest.approx((0.0, 0.1, 0.5), abs=0.03)
+
+
+def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:
+    rig = ManagerRig(device_id=1, ranges=(Range(0.0, 0.0), Range(-1.5, 0.5), Range(-2.0, 2.0)))
+
+    [ack, device], [_, manager] = (
+        rig.give(PILOT, request(cls)) for cls in (GimbalDeviceInformation,
+                                                  GimbalManagerInformation))
+    rig.manager.take_attitude(attitude_status(), rig.now)
+    rig.give(PILOT)
+
+    assert (device.gimbal_device_id, manager.gimbal_device_id) == (1, 1)
+    assert (manager.roll_max, manager.pitch_min, manager.yaw_max) == (0.0, -1.5, 2.0)
+    assert not manager.cap_flags & Capabilities.HAS_ROLL_AXIS
+    assert manager.cap_flags & Capabilities.HAS_PITCH_AXIS
+    assert [one.gimbal_device_id for one in rig.messages(GimbalDeviceAttitudeStatus)] == [1]
+
+
+# GM-20, GM-23: the device and the vehicle
+
+def test_gm_20_the_attitude_of_the_device_is_an_event() -> None:
+    rig = ManagerRig()
+
+    rig.give(DEVICE, attitude_status(HALF))
+
+    assert of(AttitudeReceived, rig.events)[-1].status.q == HALF
+    assert rig.messages(GimbalDeviceAttitudeStatus) == []
+
+
+@pytest.mark.parametrize('autopilot_sends', [False, True])
+def test_the_device_learns_the_vehicle_from_ros_where_no_autopilot_tells_it(
+        autopilot_sends: bool) -> None:
+    rig = ManagerRig()
+    vehicle = rig.manager.vehicle
+    vehicle.set_velocity((1.0, 2.0, 3.0), rig.now)
+    vehicle.set_attitude(Q, 0.4, rig.now)
+    if autopilot_sends:
+        rig.give(AUTOPILOT, AutopilotStateForGimbalDevice(
+            *DEVICE, 0, HALF, 0, 0.0, 0.0, 0.0, 0, 0.0, 0, 0))
+
+    for _ in range(3):
+        rig.manager.vehicle_changed(rig.now)
+    rig.give(PILOT)
+
+    sent = rig.messages(AutopilotStateForGimbalDevice)
+    assert len(sent) == (not autopilot_sends)
+    for one in sent:
+        assert one.q == (Q.w, Q.x, Q.y, Q.z)
+        assert (one.vx, one.vy, one.vz, one.angular_velocity_z) == (1.0, 2.0, 3.0, 0.4)
+
+
+# A forged address
+
+@pytest.mark.parametrize(('second', 'shared'), [(MavType.GCS, False), (MavType.SUBMARINE, True)])
+def test_two_senders_with_the_address_of_the_player_in_control_are_reported(
+        second: MavType, shared: bool) -> None:
+    rig = in_control()
+    rig.give(PILOT, heartbeat(MavType.GCS))
+
+    rig.run(0.5)
+    rig.give(PILOT, heartbeat(second))
+
+    assert of(AddressShared, rig.events) == [AddressShared(PILOT)] * shared
+
+
+# States
+
+def test_commands_are_rejected_for_now_until_the_manager_is_active() -> None:
+    rig = ManagerRig(active=False)
+    rig.run(1.0)
+
+    assert rig.manager.state is ManagerState.LISTENING
+    assert rig.take(PILOT) is MavResult.TEMPORARILY_REJECTED
+    assert rig.messages(GimbalManagerStatus) == []
+
+
+def test_the_manager_follows_a_device_that_is_exchanged() -> None:
+    rig = ManagerRig()
+    rig.device_is_there = False
+    rig.run(3.5)
+    assert rig.manager.state is ManagerState.NO_DEVICE
+
+    rig.device_information = information(pitch_max=0.25)
+    rig.device_is_there = True
+    rig.run(5.0)
+
+    assert rig.manager.model.ranges[1].high == 0.25

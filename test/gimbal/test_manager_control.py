@@ -1,0 +1,146 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Control of a gimbal: every pair of holder and event under each policy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+from illuminator_ros.gimbal.manager_control import Control, ControlChanged, ControlSettings, Role
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.arbitration import Cause, Policy
+import pytest
+from support.tables import table
+
+PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal.md'
+PLAYER, LOWER, HIGHER, OVERRULING = (Address(255, id_) for id_ in (10, 20, 30, 40))
+THIRD = Address(7, 7)
+LEASE = 3.0
+HOLDERS = {'none': None, 'the player': PLAYER, 'a lower player': LOWER,
+           'a higher player': HIGHER, 'an overruling player': OVERRULING}
+# The events of the page: params of DO_GIMBAL_MANAGER_CONFIGURE.
+EVENTS = {
+    'takes control': (*PLAYER, -1, -1),
+    'gives control to another': (*THIRD, -1, -1),
+    'sets "no one"': (0, 0, -1, -1),
+    'releases its control': (-3, -3, -3, -3),
+    'changes nothing': (-1, -1, -1, -1),
+}
+NAMES = {player: name for name, player in HOLDERS.items()} | {THIRD: 'the other'}
+
+
+def control(policy: Policy = Policy.HOLD, *, overrules: bool = False) -> Control:
+    return Control(ControlSettings(
+        policy, (HIGHER, PLAYER, LOWER), frozenset({OVERRULING, *([PLAYER] * overrules)}), LEASE))
+
+
+def held(policy: Policy, holder: Address | None, *, overrules: bool = False) -> Control:
+    one = control(policy, overrules=overrules)
+    if holder is not None:
+        assert one.configure(holder, (*holder, -1, -1), 0.0) is not None
+    return one
+
+
+def after(policy: Policy, holder: Address | None, event: str, *, overrules: bool = False) -> str:
+    """Return who has primary control after an event of the player, or that it was denied."""
+    one = held(policy, holder, overrules=overrules)
+    changes = one.configure(PLAYER, EVENTS[event], 1.0)
+    if changes is None:
+        assert one.holder(Role.PRIMARY) == holder
+        return 'DENIED'
+    assert len(changes) == (one.holder(Role.PRIMARY) != holder)
+    return NAMES[one.holder(Role.PRIMARY)]
+
+
+def test_each_pair_of_holder_and_event_ends_as_the_page_says() -> None:
+    assert table(PAGE.read_text(), 'in control before') == [
+        [name, event, *(after(policy, holder, event) for policy in Policy),
+         after(Policy.HOLD, holder, event, overrules=True)]
+        for name, holder in HOLDERS.items() for event in EVENTS]
+
+
+def test_the_diagram_of_the_page_has_each_change_of_control() -> None:
+    changes = {change for policy in Policy for holder in HOLDERS.values() for event in EVENTS
+               for change in held(policy, holder).configure(PLAYER, EVENTS[event], 1.0) or ()}
+    changes |= set(held(Policy.HOLD, PLAYER).poll(LEASE))
+    [diagram] = re.findall(r'```\n(FREE.*?)```', PAGE.read_text(), re.DOTALL)
+
+    assert set(re.findall(r'(\w+) +--(\w+)--> +(\w+)', diagram)) == {
+        ('HELD' if one.before else 'FREE', one.cause.name, 'HELD' if one.after else 'FREE')
+        for one in changes}
+
+
+@pytest.mark.parametrize('policy', Policy)
+@pytest.mark.parametrize('role', Role)
+def test_control_ends_after_the_lease_without_a_heartbeat_of_its_player(
+        policy: Policy, role: Role) -> None:
+    one = control(policy)
+    one.configure(PLAYER, (*PLAYER, -1, -1) if role is Role.PRIMARY else (-1, -1, *PLAYER), 0.0)
+    one.heard(PLAYER, 1.0)
+    one.heard(LOWER, 3.9)
+
+    assert one.next_deadline() == 1.0 + LEASE
+    assert one.poll(3.9) == []
+    assert one.poll(4.0) == [ControlChanged(role, PLAYER, None, Cause.SILENCE)]
+    assert one.holder(role) is None
+
+
+@pytest.mark.parametrize('params', [
+    (255, -1), (-2, 190), (-3, 0), (256, 1), (1, 0), (0, 1), (1.5, 1), (float('nan'),) * 2,
+    (float('inf'), 1), (-4, -4)])
+@pytest.mark.parametrize('place', [0, 2])
+def test_params_that_name_no_player_change_nothing(
+        params: tuple[float, float], place: int) -> None:
+    one = control()
+    whole = (*params, *PLAYER) if place == 0 else (*PLAYER, *params)
+
+    with pytest.raises(ValueError, match='does not name a player'):
+        one.configure(PLAYER, whole, 0.0)
+
+    assert [one.holder(role) for role in Role] == [None, None]
+
+
+def test_the_sender_takes_control_with_the_id_for_itself() -> None:
+    one = control()
+
+    assert one.configure(PLAYER, (-2, -2, -1, -1), 0.0) == [
+        ControlChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
+
+
+def test_both_roles_change_or_neither() -> None:
+    one = control()
+    one.configure(LOWER, (-1, -1, *LOWER), 0.0)
+
+    assert one.configure(PLAYER, (*PLAYER, *THIRD), 1.0) is None
+    assert [one.holder(role) for role in Role] == [None, LOWER]
+
+
+def test_a_player_that_claims_both_roles_gets_the_primary_one_beside_another_secondary() -> None:
+    one = control()
+    one.configure(LOWER, (-1, -1, *LOWER), 0.0)
+
+    assert one.configure(PLAYER, (*PLAYER, *PLAYER), 1.0) == [
+        ControlChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
+    assert [one.holder(role) for role in Role] == [PLAYER, LOWER]
+
+
+def test_a_player_that_has_both_roles_releases_both() -> None:
+    one = control()
+    one.configure(PLAYER, (*PLAYER, *PLAYER), 0.0)
+
+    changes = one.configure(PLAYER, (-3, -3, -3, -3), 1.0)
+
+    assert changes == [ControlChanged(role, PLAYER, None, Cause.RELEASE, PLAYER) for role in Role]

@@ -1,0 +1,193 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The Two Commandments: only one manager of a gimbal is active."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+from illuminator_ros.gimbal.manager_presence import (
+    MANAGER_TIMEOUT,
+    ManagerInput,
+    ManagerState,
+    StateChanged,
+    TRANSITIONS,
+)
+from illuminator_ros.gimbal.messages import (
+    GimbalDeviceSetAttitude,
+    GimbalManagerInformation,
+    GimbalManagerStatus,
+)
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
+import pytest
+from support.gimbal_manager import (
+    attitude_status,
+    configure,
+    DEVICE,
+    ManagerRig,
+    of,
+    PILOT,
+    request,
+)
+
+PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal.md'
+OTHER = Address(1, 191)
+
+
+def status(device_id: int = DEVICE.component) -> GimbalManagerStatus:
+    return GimbalManagerStatus(0, 0, device_id, 0, 0, 0, 0)
+
+
+def test_the_diagram_of_the_page_has_the_transitions_of_the_table() -> None:
+    [diagram] = re.findall(r'```\n(NO_DEVICE.*?)```', PAGE.read_text(), re.DOTALL)
+    drawn = re.findall(r'(?=\b([A-Z_]+) +--([A-Z_]+)--> +([A-Z_]+))', diagram)
+
+    assert sorted(drawn) == sorted((state.name, by.name, then.name)
+                                   for (state, by), then in TRANSITIONS.items())
+
+
+def reached(state: ManagerState) -> ManagerRig:
+    rig = ManagerRig(active=False)
+    if state is ManagerState.NO_DEVICE:
+        rig.device_is_there = False
+        rig.run(4.0)
+    elif state is ManagerState.LISTENING:
+        rig.run(0.5)
+    else:
+        rig.run(5.0)
+        if state is ManagerState.INACTIVE:
+            rig.give(OTHER, status())
+    assert rig.manager.state is state
+    return rig
+
+
+@pytest.mark.parametrize('input_', ManagerInput)
+@pytest.mark.parametrize('state', ManagerState)
+def test_each_input_leads_to_the_state_of_the_table(
+        state: ManagerState, input_: ManagerInput) -> None:
+    rig = reached(state)
+    if input_ is ManagerInput.DEVICE_HEARD:
+        rig.device_is_there = True
+        rig.run(0.5)
+    elif input_ is ManagerInput.DEVICE_LOST:
+        rig.component.link_closed(rig.now, 'cut')
+    elif input_ is ManagerInput.MANAGER_HEARD:
+        rig.give(OTHER, status())
+    elif input_ is ManagerInput.MANAGER_LOST:
+        rig.run(MANAGER_TIMEOUT)
+        rig.give(PILOT)
+    elif state is not ManagerState.INACTIVE:
+        rig.run(2.6)
+    expected = TRANSITIONS.get((state, input_), state)
+
+    if (state, input_) == (ManagerState.LISTENING, ManagerInput.MANAGER_LOST):
+        # Its time is over meanwhile.
+        expected = ManagerState.ACTIVE
+    assert rig.manager.state is expected
+
+
+@pytest.mark.parametrize('message', [
+    status(), GimbalManagerInformation(0, 0, DEVICE.component, *(0.0,) * 6)])
+@pytest.mark.parametrize('when', [ManagerState.LISTENING, ManagerState.ACTIVE])
+def test_gm_18_another_manager_of_the_device_makes_ours_inactive_and_is_named(
+        when: ManagerState, message: GimbalManagerStatus | GimbalManagerInformation) -> None:
+    rig = reached(when)
+
+    rig.give(OTHER, message)
+    begun = rig.now
+    rig.run(1.0)
+
+    assert of(StateChanged, rig.events)[-1] == StateChanged(
+        when, ManagerState.INACTIVE, DEVICE.component, DEVICE, OTHER)
+    assert rig.messages(GimbalManagerStatus, begun) == []
+    assert [rig.result(PILOT, command) for command in (
+        configure(*PILOT), request(GimbalManagerInformation))] == [MavResult.DENIED] * 2
+
+
+def test_gm_19_an_inactive_manager_gives_the_device_no_setpoint() -> None:
+    rig = ManagerRig()
+    rig.take(PILOT)
+    rig.points(PILOT)
+
+    rig.run(0.1)
+    begun = rig.now
+    rig.give(OTHER, status())
+    rig.run(2.0, each=rig.heartbeats(PILOT))
+
+    assert rig.points(PILOT) == rig.messages(GimbalDeviceSetAttitude, begun) == []
+
+
+def test_gm_24_a_device_with_a_manager_of_its_own_keeps_ours_inactive() -> None:
+    rig = reached(ManagerState.LISTENING)
+
+    rig.give(DEVICE, status(1))
+
+    assert rig.manager.state is ManagerState.INACTIVE
+    assert rig.manager.other == DEVICE
+
+
+@pytest.mark.parametrize(('source', 'device_id'), [
+    (OTHER, 171), (Address(2, 191), DEVICE.component)])
+def test_gm_26_the_manager_of_another_device_leaves_ours_active(
+        source: Address, device_id: int) -> None:
+    rig = ManagerRig()
+
+    rig.give(source, status(device_id))
+
+    assert rig.manager.state is ManagerState.ACTIVE
+
+
+def test_gm_18_ours_becomes_active_when_the_other_manager_is_gone() -> None:
+    rig = reached(ManagerState.INACTIVE)
+
+    rig.run(MANAGER_TIMEOUT + 5.0)
+
+    assert rig.manager.state is ManagerState.ACTIVE
+
+
+def test_gm_18_managers_that_send_no_status_are_asked_before_ours_announces_anything() -> None:
+    rig = reached(ManagerState.LISTENING)
+
+    asked = [one for one in rig.messages(CommandLong) if one.target_system == 0]
+
+    assert [one.param1 for one in asked] == [GimbalManagerInformation.id]
+    assert rig.messages(GimbalManagerStatus) == []
+
+
+@pytest.mark.parametrize('apart', [0.0, 1.0])
+def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(apart: float) -> None:
+    first = ManagerRig(active=False)
+    first.run(apart)
+    second = ManagerRig(active=False, address=Address(1, 195))
+    second.now = first.now
+    seen = [0, 0]
+    for _ in range(200):
+        for index, rig in enumerate((first, second)):
+            rig.run(0.05)
+            for _, message in rig.sent[seen[index]:]:
+                (second, first)[index].give(rig.component.address, message)
+            seen[index] = len(rig.sent)
+
+    assert {first.manager.state, second.manager.state} == {
+        ManagerState.ACTIVE, ManagerState.INACTIVE}
+
+
+def test_a_gimbal_of_another_system_is_not_managed() -> None:
+    rig = reached(ManagerState.NO_DEVICE)
+
+    rig.give(Address(2, 154), attitude_status())
+
+    assert rig.manager.state is ManagerState.NO_DEVICE

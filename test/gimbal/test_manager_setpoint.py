@@ -1,0 +1,194 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Setpoints of a gimbal: conversions against independent ones, mixing, limits, directions."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from illuminator_ros.gimbal.manager_setpoint import (
+    clip,
+    Demand,
+    direction,
+    GeoPoint,
+    mix,
+    nudge,
+    Range,
+    resolve,
+    Setpoint,
+    stopped,
+    turned_by,
+)
+from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
+import numpy
+import pytest
+
+Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
+ANGLES = st.floats(-math.pi, math.pi)
+PITCHES = st.floats(-math.pi / 2, math.pi / 2) | st.sampled_from((-math.pi / 2, math.pi / 2))
+ATTITUDES = st.tuples(ANGLES, PITCHES, ANGLES)
+SMALL = st.floats(-0.3, 0.3)
+
+
+def scipy(attitude: Quaternion) -> Any:
+    return Rotation.from_quat((attitude.x, attitude.y, attitude.z, attitude.w))
+
+
+def apart(attitude: Quaternion, other: Any) -> float:
+    """Return the angle between two rotations, rad."""
+    return float((scipy(attitude).inv() * other).magnitude())
+
+
+@given(st.floats(-1, 1), PITCHES, ANGLES)
+def test_gm_4_pitch_and_yaw_become_the_quaternion_that_another_program_makes(
+        roll: float, pitch: float, yaw: float) -> None:
+    setpoint = resolve(Demand(angles=(roll, pitch, yaw)), Quaternion(), 0.0, turns=False)
+
+    assert setpoint.attitude is not None
+    assert apart(setpoint.attitude, Rotation.from_euler('ZYX', (yaw, pitch, roll))) < 1e-6
+
+
+@given(ATTITUDES, ANGLES)
+def test_gm_2_another_yaw_frame_is_a_turn_about_the_down_axis(
+        angles: tuple[float, float, float], heading: float) -> None:
+    attitude = Quaternion.from_euler(*angles)
+
+    turned = turned_by(attitude, heading)
+
+    assert apart(turned, Rotation.from_euler('z', heading) * scipy(attitude)) < 1e-6
+
+
+@given(ATTITUDES, SMALL, SMALL, SMALL)
+def test_gm_9_offsets_add_to_the_angles(
+        angles: tuple[float, float, float], roll: float, pitch: float, yaw: float) -> None:
+    assume(abs(angles[1] + pitch) < math.pi / 2 and abs(angles[1]) < 1.55)
+
+    mixed = mix(Quaternion.from_euler(*angles), (roll, pitch, yaw))
+
+    assert apart(mixed, Rotation.from_euler(
+        'ZYX', (angles[2] + yaw, angles[1] + pitch, angles[0] + roll))) < 1e-6
+
+
+@given(ATTITUDES, st.floats(0.0, 1.0))
+def test_gm_9_an_offset_is_never_above_the_limit(
+        angles: tuple[float, float, float], limit: float) -> None:
+    for demand in (Demand(angles=angles), Demand(attitude=Quaternion.from_euler(*angles))):
+        assert all(abs(offset) <= limit for offset in nudge(demand, limit))
+
+
+RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends))
+                     for _ in range(3)))
+
+
+@given(ATTITUDES, RANGES, st.none() | ANGLES)
+def test_a_clipped_attitude_is_within_all_ranges_and_its_violations_are_named(
+        angles: tuple[float, float, float], ranges: tuple[Range, Range, Range],
+        zero: float | None) -> None:
+    attitude = Quaternion.from_euler(*angles)
+
+    inside, clipped = clip(attitude, ranges, zero)
+
+    roll, pitch, yaw = inside.euler()
+    # At the singular pitch only the sum of roll and yaw is defined.
+    assume(abs(pitch) < 1.55)
+    assert ranges[0].low - 1e-4 <= roll <= ranges[0].high + 1e-4
+    assert ranges[1].low - 1e-4 <= pitch <= ranges[1].high + 1e-4
+    if zero is not None:
+        assert any(ranges[2].low - 1e-4 <= yaw - zero + turn <= ranges[2].high + 1e-4
+                   for turn in (-4 * math.pi, -2 * math.pi, 0, 2 * math.pi, 4 * math.pi))
+    assert (inside == attitude) == (not clipped)
+    assert clip(inside, ranges, zero)[0].angle_to(inside) < 1e-3
+
+
+@pytest.mark.parametrize(('yaw', 'range_', 'limit'), [
+    (3.0, Range(-2.0, 2.0), 2.0), (-3.0, Range(-2.0, 2.0), -2.0), (-2.0, Range(0.0, 5.0), -2.0),
+    (3.0, Range(-math.pi, math.pi), 3.0), (3.0, Range(), 3.0), (0.4, Range(0.0, 0.0), 0.0)])
+def test_a_yaw_is_clipped_to_the_nearer_end_of_its_range(
+        yaw: float, range_: Range, limit: float) -> None:
+    inside, _ = clip(Quaternion.from_euler(0.0, 0.1, yaw), (Range(), Range(), range_), 0.0)
+
+    assert inside.euler() == pytest.approx((0.0, 0.1, limit))
+
+
+PLACES = st.tuples(st.floats(-80, 80), st.floats(-180, 180), st.floats(-100, 3000))
+
+
+def in_space(place: GeoPoint) -> numpy.ndarray[tuple[int], numpy.dtype[numpy.float64]]:
+    """Return the place in coordinates from the centre of the earth, m (WGS 84)."""
+    latitude, longitude = math.radians(place.latitude), math.radians(place.longitude)
+    squared = 6.69437999014e-3
+    radius = 6378137.0 / math.sqrt(1 - squared * math.sin(latitude) ** 2)
+    return numpy.array((
+        (radius + place.altitude) * math.cos(latitude) * math.cos(longitude),
+        (radius + place.altitude) * math.cos(latitude) * math.sin(longitude),
+        (radius * (1 - squared) + place.altitude) * math.sin(latitude)))
+
+
+@given(PLACES, ANGLES, st.floats(20, 5000), st.floats(-1000, 1000))
+def test_gm_8_the_direction_to_a_place_is_that_between_two_points_in_space(
+        origin: tuple[float, float, float], bearing: float, distance: float,
+        up: float) -> None:
+    here = GeoPoint(*origin)
+    there = GeoPoint(
+        here.latitude + math.degrees(distance * math.cos(bearing) / 6.37e6),
+        here.longitude + math.degrees(distance * math.sin(bearing) / 6.37e6
+                                      / math.cos(math.radians(here.latitude))),
+        here.altitude + up)
+    latitude, longitude = math.radians(here.latitude), math.radians(here.longitude)
+    to_ned = Rotation.from_euler('ZY', (longitude, -latitude - math.pi / 2)).inv()
+    line = to_ned.apply(in_space(there) - in_space(here))
+
+    angles = direction(here, there)
+
+    assert angles is not None
+    pointed = Quaternion.from_euler(0.0, *angles).rotate((1.0, 0.0, 0.0))
+    line = line / numpy.linalg.norm(line)
+    assert math.acos(min(1.0, float(line @ numpy.array(pointed)))) < math.radians(0.1)
+
+
+def test_gm_8_the_same_place_has_no_direction() -> None:
+    assert direction(GeoPoint(47.0, 180.0, 0.0), GeoPoint(47.0, -180.0, 0.05)) is None
+
+
+@given(ATTITUDES, SMALL, SMALL, SMALL, st.floats(0, 10))
+def test_a_stopped_setpoint_stays_where_it_was(
+        angles: tuple[float, float, float], roll: float, pitch: float, yaw: float,
+        elapsed: float) -> None:
+    moving = Setpoint(MountFlags(0), YawFrame.EARTH, Quaternion.from_euler(*angles),
+                      turning=(roll, pitch, yaw), since=5.0)
+
+    still = stopped(moving, 5.0 + elapsed)
+
+    at_stop, later = moving.at(5.0 + elapsed), still.at(100.0)
+    assert at_stop is not None
+    assert later == at_stop
+
+
+@given(ATTITUDES, st.sampled_from(YawFrame))
+def test_gm_4_a_turn_in_steps_ends_where_a_turn_at_once_ends(
+        angles: tuple[float, float, float], frame: YawFrame) -> None:
+    assume(abs(angles[1]) < 1.2)
+    moving = Setpoint(MountFlags(0), frame, Quaternion.from_euler(*angles),
+                      turning=(0.0, 0.1, -0.2), since=0.0)
+
+    end = moving.at(2.0)
+
+    assert end is not None
+    assert apart(end, Rotation.from_euler(
+        'ZYX', (angles[2] - 0.4, angles[1] + 0.2, angles[0]))) < 1e-6

@@ -1,0 +1,311 @@
+"""The simulated gimbal device follows the gimbal protocol v2: its manager, axes and frames."""
+
+from __future__ import annotations
+
+import math
+
+from illuminator_ros.gimbal import messages as gimbal
+from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags
+from illuminator_ros.gimbal.simulated_device import (
+    FAULTS,
+    GimbalBehaviour,
+    GimbalProperties,
+    MANAGER_TIMEOUT,
+    SIMULATED,
+    SimulatedGimbal,
+)
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, MavResult
+from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
+import pytest
+
+NAN = math.nan
+DEVICE, MANAGER, OTHER = Address(1, 154), Address(1, 191), Address(1, 190)
+FOLLOW = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+LOCK = FOLLOW | MountFlags.YAW_LOCK
+UNSET = (NAN, NAN, NAN)
+
+
+class Bench:
+    """A simulated device with a manager; angles in degrees, time as it is told."""
+
+    def __init__(self, *faults: str, announced: bool = True, **settings: object) -> None:
+        device: SimulatedGimbal = SIMULATED.make(settings, DEVICE, False)
+        for fault in faults:
+            device.behave(FAULTS.add(device.behaviour, fault), 0.0)
+        self.now = 1000.0
+        self.endpoint = SimulatedComponents([Description(DEVICE, device)], self.now)
+        self.device = device
+        self._announced = announced
+
+    def give(self, message: object, source: Address = MANAGER) -> None:
+        self.endpoint.receive(source, message, self.now)
+
+    def announce(self, source: Address = MANAGER, device_id: int = 154) -> None:
+        self.give(gimbal.GimbalManagerStatus(0, 0, device_id, 0, 0, 0, 0), source)
+
+    def heading(self, degrees: float, source: Address = MANAGER) -> None:
+        q = Quaternion.from_euler(0.0, 0.0, math.radians(degrees))
+        self.give(gimbal.AutopilotStateForGimbalDevice(
+            1, 154, 0, (q.w, q.x, q.y, q.z), 0, NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5), source)
+
+    def point(
+        self, *degrees: float, flags: int = FOLLOW | YawFrame.VEHICLE.flag,
+        rates: tuple[float, float, float] = UNSET, source: Address = MANAGER,
+        target: Address = DEVICE,
+    ) -> None:
+        if self._announced:
+            self.announce()
+        q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
+        self.give(gimbal.GimbalDeviceSetAttitude(
+            *target, flags, (q.w, q.x, q.y, q.z), *rates), source)
+
+    def after(self, seconds: float) -> GimbalDeviceAttitudeStatus:
+        """Let time pass, and return the status."""
+        self.now += seconds
+        status = self.device.message(GimbalDeviceAttitudeStatus.id, self.now)
+        assert isinstance(status, GimbalDeviceAttitudeStatus)
+        return status
+
+    def angles(self, seconds: float = 0.0) -> tuple[float, ...]:
+        """Let time pass, and return roll, pitch and yaw as the status reports them, degrees."""
+        euler = Quaternion(*self.after(seconds).q).euler()
+        return tuple(round(math.degrees(angle), 3) + 0.0 for angle in euler)
+
+
+def test_a_setpoint_is_approached_at_the_rate_of_the_axes_and_kept() -> None:
+    bench = Bench(axis_rate=10.0)
+    bench.point(0.0, -45.0, -30.0)
+    assert bench.angles(1.0) == (0.0, -10.0, -10.0)
+    assert bench.angles(3.0) == (0.0, -40.0, -30.0)
+    assert bench.angles(10.0) == (0.0, -45.0, -30.0)
+    assert bench.after(1.0).angular_velocity_y == 0.0
+
+
+def test_a_rate_turns_until_it_is_zero_and_an_unset_setpoint_changes_nothing() -> None:
+    bench = Bench()
+    bench.point(rates=(NAN, -math.radians(10.0), math.radians(5.0)))
+    assert bench.after(1.0).angular_velocity_y == pytest.approx(-math.radians(10.0))
+    bench.point(rates=(NAN, 0.0, NAN))
+    held = bench.angles()
+    assert held == (0.0, -10.0, 5.0)
+    bench.point()
+    assert bench.angles(5.0) == held
+    bench.point(0.0, -30.0, 5.0, rates=(NAN, math.radians(2.0), NAN))
+    assert bench.angles(5.0) == (0.0, -20.0, 5.0)
+
+
+@pytest.mark.parametrize(('degrees', 'reached', 'flag'), [
+    ((0.0, 50.0, 0.0), (0.0, 45.0, 0.0), ErrorFlags.AT_PITCH_LIMIT),
+    ((60.0, 0.0, 0.0), (45.0, 0.0, 0.0), ErrorFlags.AT_ROLL_LIMIT),
+    ((0.0, 0.0, 175.0), (0.0, 0.0, 170.0), ErrorFlags.AT_YAW_LIMIT)])
+def test_an_axis_stops_at_the_end_of_its_range_and_reports_it(
+        degrees: tuple[float, ...], reached: tuple[float, ...], flag: ErrorFlags) -> None:
+    bench = Bench()
+    bench.point(*degrees)
+    assert bench.angles(4.0) == reached
+    assert bench.after(0.1).failure_flags == flag
+    bench.point(0.0, 0.0, 0.0)
+    assert bench.after(4.0).failure_flags == 0
+
+
+def test_a_rate_leaves_the_end_of_a_range_at_once() -> None:
+    bench = Bench()
+    bench.point(rates=(NAN, 1.0, NAN))
+    for _ in range(20):
+        bench.after(0.5)
+    bench.point(rates=(NAN, math.radians(-10.0), NAN))
+    assert bench.angles(1.0) == (0.0, 35.0, 0.0)
+
+
+def test_yaw_without_a_stop_takes_the_shorter_way() -> None:
+    bench = Bench(yaw_range=SIMULATED.settings['yaw_range'].read('-180,180'))
+    bench.point(0.0, 0.0, 170.0)
+    bench.after(10.0)
+    bench.point(0.0, 0.0, -170.0)
+    assert bench.angles(0.1) == (0.0, 0.0, 176.0)
+    assert bench.device.mount.motion.mechanics.capabilities & Capabilities.SUPPORTS_INFINITE_YAW
+
+
+# Its manager
+
+def test_gm_19_a_device_obeys_the_component_of_its_system_that_announces_it() -> None:
+    bench = Bench(announced=False)
+    assert bench.after(0.0).failure_flags == ErrorFlags.NO_MANAGER
+    bench.announce(device_id=155)
+    bench.announce(Address(2, 191))
+    bench.point(0.0, -10.0, 0.0)
+    assert bench.angles(5.0) == (0.0, 0.0, 0.0)
+    bench.announce()
+    for stranger in (OTHER, Address(2, 191), Address(255, 190)):
+        bench.point(0.0, -10.0, 0.0, source=stranger)
+    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
+    bench.point(0.0, -10.0, 0.0)
+    assert bench.angles(1.0) == (0.0, -10.0, 0.0)
+    assert bench.after(0.0).failure_flags == 0
+
+
+def test_gm_18_the_manager_stays_until_it_is_silent() -> None:
+    bench = Bench(announced=False)
+    bench.announce()
+    bench.now += MANAGER_TIMEOUT - 0.1
+    bench.announce(OTHER)
+    assert bench.device.manager == MANAGER
+    bench.now += 0.1
+    bench.announce(OTHER)
+    assert bench.device.manager == OTHER
+    bench.announce()
+    bench.point(0.0, -10.0, 0.0)
+    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
+
+
+def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() -> None:
+    bench = Bench(announced=False, manager=7)
+    bench.announce()
+    bench.now += 2 * MANAGER_TIMEOUT
+    bench.point(0.0, -10.0, 0.0)
+    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
+    bench.point(0.0, -10.0, 0.0, source=Address(1, 7))
+    assert bench.angles(1.0) == (0.0, -10.0, 0.0)
+
+
+def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
+    bench = Bench()
+    down = Quaternion.from_euler(0.0, -0.5, 0.0)
+    q = (down.w, down.x, down.y, down.z)
+    bench.give(gimbal.GimbalManagerSetAttitude(*DEVICE, FOLLOW, 154, q, NAN, NAN, NAN))
+    bench.give(CommandLong(*DEVICE, 1000, 0, -20.0, 0.0, NAN, NAN, 0, 0, 154))
+    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
+    (ack,) = [one for _, one in bench.endpoint.outgoing if isinstance(one, CommandAck)]
+    assert ack.result == MavResult.UNSUPPORTED
+
+
+def test_a_setpoint_for_another_component_or_with_both_frames_is_ignored() -> None:
+    bench = Bench()
+    bench.point(0.0, -10.0, 0.0, target=Address(1, 171))
+    bench.point(0.0, -10.0, 0.0, flags=96)
+    bench.give(gimbal.GimbalDeviceSetAttitude(*DEVICE, 32, (0, 0, 0, 0), NAN, NAN, NAN))
+    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
+
+
+# Frames, heading and modes
+
+def test_gm_3_without_a_heading_yaw_relative_to_north_is_not_accepted() -> None:
+    bench = Bench()
+    bench.point(0.0, 0.0, 30.0, flags=LOCK | YawFrame.EARTH.flag)
+    status = bench.after(1.0)
+    assert bench.angles() == (0.0, 0.0, 0.0)
+    assert not status.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+    assert math.isnan(status.delta_yaw)
+
+
+def test_gm_3_a_locked_yaw_follows_the_heading_and_drifts_without_one() -> None:
+    bench = Bench(drift=0.5)
+    bench.heading(40.0)
+    bench.point(0.0, 0.0, 30.0, flags=LOCK | YawFrame.VEHICLE.flag)
+    assert bench.angles(1.0) == (0.0, 0.0, 30.0)
+    bench.heading(60.0)
+    assert bench.angles(1.0) == (0.0, 0.0, 10.0)
+    # Two seconds after the last heading it begins to drift.
+    assert bench.angles(11.0) == (0.0, 0.0, 5.0)
+    bench.heading(60.0)
+    assert bench.angles(1.0) == (0.0, 0.0, 10.0)
+
+
+@pytest.mark.parametrize('lock', [FOLLOW, LOCK])
+def test_gm_2_the_frame_of_the_number_and_the_mode_of_the_axis_are_independent(
+        lock: MountFlags) -> None:
+    bench = Bench()
+    bench.heading(40.0)
+    bench.point(0.0, -20.0, 30.0, flags=lock | YawFrame.EARTH.flag)
+    status = bench.after(1.0)
+    assert status.flags == lock | YawFrame.EARTH.flag | MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+    assert bench.angles() == (0.0, -20.0, 30.0)
+    assert math.degrees(status.delta_yaw) == pytest.approx(40.0)
+    bench.heading(50.0)
+    assert bench.angles(1.0) == (0.0, -20.0, 30.0 if lock == LOCK else 40.0)
+
+
+@pytest.mark.parametrize(('flags', 'pitch'), [(FOLLOW, -10.0), (MountFlags.ROLL_LOCK, 10.0)])
+def test_pitch_is_held_against_the_horizon_or_follows_the_vehicle(
+        flags: MountFlags, pitch: float) -> None:
+    bench = Bench()
+    bench.point(0.0, -10.0, 0.0, flags=flags | YawFrame.VEHICLE.flag)
+    q = Quaternion.from_euler(0.0, math.radians(20.0), 0.0)
+    bench.give(gimbal.AutopilotStateForGimbalDevice(
+        1, 154, 0, (q.w, q.x, q.y, q.z), 0, NAN, NAN, NAN, 0, NAN, 0, 0))
+    assert bench.angles(1.0) == (0.0, pitch, 0.0)
+
+
+@pytest.mark.parametrize(('flags', 'degrees'), [
+    (MountFlags.RETRACT | MountFlags.NEUTRAL, (0.0, 45.0, 0.0)),
+    (MountFlags.NEUTRAL, (0.0, 0.0, 0.0))])
+def test_retract_and_neutral_take_precedence_over_the_attitude(
+        flags: MountFlags, degrees: tuple[float, ...]) -> None:
+    bench = Bench()
+    bench.point(0.0, -20.0, 30.0)
+    bench.after(2.0)
+    bench.point(0.0, -20.0, 30.0, flags=flags | YawFrame.VEHICLE.flag)
+    assert bench.after(2.0).flags & 3 == flags
+    assert bench.angles() == degrees
+
+
+def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
+    lacks = SIMULATED.settings['lacks'].read('has_yaw_axis, HAS_YAW_LOCK')
+    bench = Bench(lacks=lacks)
+    bench.point(0.0, -20.0, 30.0)
+    assert bench.angles(2.0) == (0.0, -20.0, 0.0)
+    information = bench.device.message(gimbal.GimbalDeviceInformation.id, bench.now)
+    assert isinstance(information, gimbal.GimbalDeviceInformation)
+    assert not information.cap_flags & (Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK)
+
+
+# Faults, and a person
+
+@pytest.mark.parametrize(('fault', 'source', 'degrees'), [
+    ('obeys-everybody', Address(255, 190), (0.0, -20.0, 30.0)),
+    ('frozen-axis', MANAGER, (0.0, 0.0, 30.0)),
+    ('frozen-axis=yaw', MANAGER, (0.0, -20.0, 0.0)),
+    ('lie', MANAGER, (0.0, 0.0, 0.0))])
+def test_a_fault_changes_what_moves(
+        fault: str, source: Address, degrees: tuple[float, ...]) -> None:
+    bench = Bench(fault)
+    bench.point(0.0, -20.0, 30.0, source=source)
+    assert bench.angles(2.0) == degrees
+
+
+def test_faults_of_the_status() -> None:
+    stale, silent, nameless, jumping = map(Bench, ('stale-flags', 'no-status', 'no-frame',
+                                                   'jumps=30'))
+    stale.point(flags=MountFlags.NEUTRAL | YawFrame.VEHICLE.flag)
+    assert stale.after(0.1).flags == FOLLOW | YawFrame.VEHICLE.flag
+    assert silent.device.message(GimbalDeviceAttitudeStatus.id, silent.now) is None
+    assert nameless.after(0.1).flags == FOLLOW
+    assert [jumping.angles(0.1)[2] for _ in range(11)] == [0.0] * 9 + [30.0, 0.0]
+
+
+def test_a_person_turns_it_and_reads_its_state() -> None:
+    bench = Bench(announced=False, manager=191)
+    (turn,) = bench.device.commands
+    turn.do(bench.device, ['-20', '15'], bench.now)()
+    assert bench.angles(1.0) == (0.0, -20.0, 15.0)
+    assert bench.device.snapshot(bench.now).text == (
+        'roll    0.0  pitch  -20.0  yaw   15.0 deg  manager 1/191  heading unknown')
+    with pytest.raises(ValueError, match='outside'):
+        turn.do(bench.device, ['-200', '0'], bench.now)
+
+
+@pytest.mark.parametrize(('name', 'text', 'reason'), [
+    ('pitch_range', '-90', 'is not MIN,MAX'), ('yaw_range', '90,-90', 'minimum is above'),
+    ('roll_range', '-200,0', 'outside'), ('lacks', 'has_wings', 'is not one of has_retract')])
+def test_a_wrong_setting_is_refused_with_the_reason(name: str, text: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        SIMULATED.settings[name].read(text)
+
+
+def test_without_settings_it_is_the_gimbal_of_the_properties() -> None:
+    device = SIMULATED.make({}, DEVICE, False)
+    assert device.properties == GimbalProperties()
+    assert device.normal == GimbalBehaviour()

@@ -1,0 +1,131 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Streams on a slow line: the newest in time, the urgent first, the rest dropped and counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import Address, decode_payload, heartbeat, Message
+from illuminator_ros.mavlink.stream_queue import StreamQueue
+from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+from support.simulated_link import SimulatedLink
+
+SOURCE = Address(1, 191)
+# 57,600 baud, bytes/s.
+RATE = 5760.0
+GROUPS = ((GlobalPositionInt,), (Attitude, SystemTime))
+
+
+def position(number: int) -> Message:
+    return GlobalPositionInt(number, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+def pair(number: int) -> tuple[Message, Message]:
+    return Attitude(number, 0, 0, 0, 0, 0, 0), SystemTime(0, number)
+
+
+def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first() -> None:
+    queue = StreamQueue(GROUPS)
+    for message in (*pair(1), *pair(2), position(3)):
+        assert queue.hold(SOURCE, message)
+
+    assert not queue.hold(SOURCE, heartbeat(18))
+    assert queue.replaced == 2
+    assert [[message for _, message in queue.take()] for _ in range(2)] == [
+        [position(3)], [*pair(2)]]
+    assert not queue
+
+
+@dataclass
+class Stream:
+    """Sends a message, or several, again and again."""
+
+    make: Any
+    interval: float
+    number: int = 0
+
+    def due(self, start: float) -> float:
+        return start + self.number * self.interval
+
+
+class Sender(Endpoint):
+    """Makes a pair each 5 ms, which is twice what the line carries, and 10 positions a second."""
+
+    messages = ()
+    streams = GROUPS
+
+    def __init__(self, start: float) -> None:
+        super().__init__()
+        self.start = start
+        self.due = [Stream(pair, 0.005), Stream(lambda number: [position(number)], 0.1)]
+
+    def link_opened(self, now: float) -> None:
+        self.outgoing.append((SOURCE, heartbeat(18)))
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        raise AssertionError(message)
+
+    def poll(self, now: float) -> None:
+        for stream in self.due:
+            if now >= stream.due(self.start):
+                self.outgoing.extend((SOURCE, one) for one in stream.make(stream.number))
+                stream.number += 1
+
+    def next_deadline(self) -> float:
+        return min(stream.due(self.start) for stream in self.due)
+
+
+def run(rate: float, seconds: float) -> tuple[SimulatedLink, list[tuple[float, Message]], int]:
+    """Return what a link of a rate sends, when, and how many bytes."""
+    sent: list[tuple[float, bytes]] = []
+    sender = Sender(1000.0)
+    link = SimulatedLink(sender, lambda data, peer: sent.append((link.now, data)))
+    link.udp.rate = rate
+    link.udp.heard(('127.0.0.1', 14550), link.now)
+    link.run(seconds)
+    classes = {cls.id: cls for group in GROUPS for cls in group}
+    return link, [
+        (at, decode_payload(classes[frame.message_id], frame.payload))
+        for at, data in sent for frame in Decoder().feed(data) if frame.message_id in classes
+    ], sum(len(data) for _, data in sent)
+
+
+def test_on_a_slow_line_nothing_waits_and_whole_pairs_of_the_newest_are_sent() -> None:
+    link, sent, size = run(RATE, 10.0)
+    positions = [(at, one) for at, one in sent if isinstance(one, GlobalPositionInt)]
+    others = [(at, one) for at, one in sent if not isinstance(one, GlobalPositionInt)]
+    # A pair takes 8 ms of the line.
+    late = [at - (1000.0 + one.time_boot_ms * 0.1) for at, one in positions]
+
+    assert len(positions) == 100
+    assert max(late) < 0.012
+    assert 0.9 * RATE < size / 10.0 <= 1.01 * RATE
+    for (at, one), (_, other) in zip(others[::2], others[1::2], strict=True):
+        assert isinstance(one, Attitude)
+        assert (one, other) == pair(one.time_boot_ms)
+        assert at - (1000.0 + one.time_boot_ms * 0.005) < 0.006
+    dropped = link.snapshot(link.now).traffic.frames_dropped
+    assert dropped + len(others) in (2 * 2000, 2 * 2000 + 2, 2 * 2000 - 2)
+
+
+def test_on_a_fast_link_each_message_is_sent() -> None:
+    link, sent, _ = run(float('inf'), 1.0)
+    assert len(sent) >= 2 * 200 + 10
+    assert not link.snapshot(link.now).traffic.frames_dropped

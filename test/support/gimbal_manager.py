@@ -1,0 +1,226 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A gimbal manager with a clock that jumps, a device, and players that say what a test wants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from illuminator_ros.gimbal.manager import GimbalManager, ManagerEvent, ManagerSettings
+from illuminator_ros.gimbal.manager_control import ControlSettings
+from illuminator_ros.gimbal.manager_presence import ManagerState
+from illuminator_ros.gimbal.messages import (
+    Capabilities,
+    GimbalCommand,
+    GimbalDeviceInformation,
+    GimbalDeviceSetAttitude,
+    GimbalManagerSetPitchyaw,
+    MAV_TYPE_GIMBAL,
+)
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    heartbeat,
+    MavCmd,
+    MavResult,
+    MavType,
+    Message,
+)
+from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+
+OURS, DEVICE, AUTOPILOT = Address(1, 194), Address(1, 154), Address(1, 1)
+PILOT, GUEST, OWNER = Address(255, 190), Address(255, 191), Address(1, 191)
+NAN = float('nan')
+FULL = (Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL | Capabilities.HAS_ROLL_AXIS
+        | Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK
+        | Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+T = TypeVar('T')
+
+
+def information(capabilities: Capabilities = FULL, **ranges: Any) -> GimbalDeviceInformation:
+    """Return the information of a device that can turn by half a rad, except as given."""
+    return replace(GimbalDeviceInformation(
+        0, b'maker', b'model', b'', 1, 1, 7, int(capabilities), 0, -0.5, 0.5, -0.5, 0.5, -0.5,
+        0.5), **ranges)
+
+
+def attitude_status(
+    q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0), *,
+    flags: MountFlags = MountFlags.YAW_IN_VEHICLE_FRAME, heading: float = NAN,
+) -> GimbalDeviceAttitudeStatus:
+    """Return an attitude of the device."""
+    return GimbalDeviceAttitudeStatus(0, 0, 0, int(flags), q, 0.0, 0.0, 0.0, 0, heading, NAN, 0)
+
+
+class ManagerRig:
+    """
+    A manager, and what it sends.
+
+    :ivar now: s.
+    :ivar sent: everything that it has sent, with the time.
+    :ivar device_information: what the device answers with; None for no device.
+    :ivar heading: of the vehicle, as the device reports it.
+    """
+
+    def __init__(
+        self, control: ControlSettings | None = None, *, device_id: int = 0,
+        device: GimbalDeviceInformation | None = None, address: Address = OURS,
+        active: bool = True, **settings: Any,
+    ) -> None:
+        self.now = 1000.0
+        self.sent: list[tuple[float, Any]] = []
+        self.events: list[ManagerEvent] = []
+        self.device_information = device or information()
+        self.device_is_there = not 0 < device_id < 7
+        self.heading = NAN
+        self.manager = GimbalManager(CommandSender(address), ManagerSettings(
+            control or ControlSettings(), device_id=device_id, **settings))
+        self.component = Component(self.manager._commands, [self.manager])
+        self.manager.events.subscribe(self.events.append)
+        self.component.link_opened(self.now)
+        self._device_due = self.now
+        if active:
+            self.run(5.0)
+            assert self.manager.state is ManagerState.ACTIVE
+
+    def run(self, seconds: float, *, each: Callable[[], None] = lambda: None) -> None:
+        """Let time pass; ``each`` is called with each heartbeat of the device, twice a second."""
+        until = self.now + seconds
+        while (due := min(self.component.next_deadline(), self._device_due)) <= until:
+            self.now = max(self.now, due)
+            if self.now >= self._device_due:
+                self._device_due = self.now + 0.5
+                if self.device_is_there:
+                    self.component.receive(DEVICE, heartbeat(MAV_TYPE_GIMBAL), self.now)
+                    self.component.receive(
+                        DEVICE, attitude_status(heading=self.heading), self.now)
+                each()
+            self.component.poll(self.now)
+            self._flush()
+        self.now = until
+
+    def give(self, source: Address, *messages: Message) -> list[Any]:
+        """Return what the manager sends when it receives messages."""
+        before = len(self.sent)
+        for message in messages:
+            self.component.receive(source, message, self.now)
+        self.component.poll(self.now)
+        self._flush()
+        return [message for _, message in self.sent[before:]]
+
+    def _flush(self) -> None:
+        outgoing = self.component.outgoing
+        while outgoing:
+            source, message = outgoing.popleft()
+            assert source == self.component.address
+            self.sent.append((self.now, message))
+            if (isinstance(message, CommandLong) and self.device_is_there
+                    and (message.target_system, message.target_component) == DEVICE):
+                self.component.receive(
+                    DEVICE, CommandAck(message.command, 0, 0, 0, *source), self.now)
+                self.component.receive(DEVICE, self.device_information, self.now)
+
+    # Players
+
+    def heartbeats(self, *players: Address) -> Callable[[], None]:
+        """Return what sends a heartbeat of each player."""
+        def send() -> None:
+            for player in players:
+                self.component.receive(player, heartbeat(MavType.GCS), self.now)
+
+        return send
+
+    def result(self, source: Address, command: CommandLong | CommandInt) -> MavResult:
+        """Return the result of a command."""
+        answer = of(CommandAck, self.give(source, command))
+        assert len(answer) == 1
+        return MavResult(answer[0].result)
+
+    def take(self, player: Address) -> MavResult:
+        """Return the result of taking primary control."""
+        return self.result(player, configure(*player))
+
+    def points(self, player: Address, pitch: float = 0.1, yaw: float = 0.0) -> list[Any]:
+        """Return what the device is sent when a player sets angles, rad."""
+        return of(GimbalDeviceSetAttitude, self.give(player, pitch_yaw(pitch, yaw)))
+
+    def messages(self, cls: type[T], since: float = 0.0) -> list[T]:
+        """Return the messages of a class that it has sent."""
+        return of(cls, (message for at, message in self.sent if at >= since))
+
+
+def of(cls: type[T], messages: Iterable[Any]) -> list[T]:
+    """Return those messages or events that are of a class."""
+    return [message for message in messages if isinstance(message, cls)]
+
+
+def long(number: int, *params: float, to: Address = OURS, confirmation: int = 0) -> CommandLong:
+    """Return a command; params that are not given are 0."""
+    return CommandLong(*to, number, confirmation, *params, *(0.0,) * (7 - len(params)))
+
+
+def configure(
+    system: float, component: float, system2: float = -1, component2: float = -1, *,
+    device_id: int = 0, to: Address = OURS, confirmation: int = 0,
+) -> CommandLong:
+    """Return MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE."""
+    return long(GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, system, component, system2, component2,
+                0, 0, device_id, to=to, confirmation=confirmation)
+
+
+def pitch_yaw_command(pitch: float, yaw: float, pitch_rate: float = NAN, yaw_rate: float = NAN,
+                      flags: int = 0, device_id: int = 0) -> CommandLong:
+    """Return MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, deg and deg/s."""
+    return long(GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, pitch, yaw, pitch_rate, yaw_rate, flags,
+                0, device_id)
+
+
+def pitch_yaw(pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN,
+              yaw_rate: float = NAN, flags: int = 0, device_id: int = 0,
+              to: Address = OURS) -> GimbalManagerSetPitchyaw:
+    """Return GIMBAL_MANAGER_SET_PITCHYAW, rad and rad/s."""
+    return GimbalManagerSetPitchyaw(*to, flags, device_id, pitch, yaw, pitch_rate, yaw_rate)
+
+
+def request(message: type[Message], to: Address = OURS) -> CommandLong:
+    """Return a request for a message."""
+    return long(MavCmd.REQUEST_MESSAGE, message.id, to=to)
+
+
+def region(latitude: float, longitude: float, altitude: float, *, frame: int = 0,
+           device_id: int = 0) -> CommandInt:
+    """Return MAV_CMD_DO_SET_ROI_LOCATION, deg and m."""
+    return CommandInt(*OURS, frame, GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, device_id, 0.0, 0.0,
+                      0.0, round(latitude * 1e7), round(longitude * 1e7), altitude)
+
+
+def position(latitude: float, longitude: float, altitude: float, *,
+             home: float = 0.0) -> GlobalPositionInt:
+    """Return a position of the vehicle, deg and m."""
+    return GlobalPositionInt(
+        0, round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3),
+        round((altitude - home) * 1e3), 0, 0, 0, 0)
+
+
+def vehicle_yaw(yaw: float) -> Attitude:
+    """Return an attitude of the vehicle, rad from north."""
+    return Attitude(0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0)
