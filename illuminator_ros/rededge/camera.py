@@ -1,0 +1,352 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The camera on a link: heartbeat, PING, captures and their feedback."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+
+from .messages import (
+    CameraFeedback,
+    CameraFeedbackFlags,
+    CameraStatus,
+    CameraStatusType,
+    DigicamControl,
+    MAV_COMP_ID_CAMERA,
+    Ping,
+    Shot,
+)
+from ..mavlink.command import format_seconds
+from ..mavlink.messages import Address, Message
+
+# s between PINGs, and the wait for a reply; a requested PING is tried twice.
+PING_INTERVAL = 2.0
+PING_TIMEOUT = 1.0
+PING_TRIES = 2
+# PINGs without a reply that show that the camera does not receive.
+UNANSWERED_PINGS = 3
+# s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
+CAPTURE_TIMEOUT = 5.0
+# s in which the answer to a capture that had none may still come.
+LATE_ANSWER = 60.0
+# Image indices that are remembered: an index that was seen is not that of a new request.
+MAX_INDICES = 32
+# Heartbeats in CONFLICT_WINDOW s that one component does not send; it sends one a second.
+CONFLICT_HEARTBEATS = 10
+CONFLICT_WINDOW = 7.0
+
+# Takes success and a message for people, once.
+Done = Callable[[bool, str], None]
+
+
+@dataclass(frozen=True)
+class CameraConnected:
+    """The camera's heartbeat is heard."""
+
+    address: Address
+
+
+@dataclass(frozen=True)
+class CameraLost:
+    """The camera's heartbeat has ended, or the link has."""
+
+    address: Address
+    reason: str
+
+
+@dataclass(frozen=True)
+class ImageTaken:
+    """The camera reported an image, requested by whichever component."""
+
+    feedback: CameraFeedback
+
+
+CameraEvent = CameraConnected | CameraLost | ImageTaken
+
+
+@dataclass(frozen=True)
+class CameraSnapshot:
+    """
+    The camera at one moment, for any thread; times are s on the link's clock.
+
+    :param address: the one that it sent from last, None if it was never heard.
+    :param conflict: whether several components have the camera's component id.
+    :param round_trip: of the last answered PING, s; None if none was.
+    :param unanswered_pings: since the last reply.
+    :param images: reported since the start.
+    """
+
+    address: Address | None
+    connected: bool
+    heard_at: float
+    lost_reason: str
+    conflict: bool
+    round_trip: float | None
+    unanswered_pings: int
+    images: int
+    image_index: int | None
+
+    @property
+    def is_deaf(self) -> bool:
+        """Return whether the camera is heard, and does not answer."""
+        return self.connected and self.unanswered_pings >= UNANSWERED_PINGS
+
+
+@dataclass
+class _PingRequest:
+    since: float
+    done: Done
+    tries: int = 1
+
+    @property
+    def due(self) -> float:
+        return self.since + self.tries * PING_TIMEOUT
+
+
+@dataclass
+class _Capture:
+    sent_at: float
+    done: Done
+    index: int | None = None
+    # Whether an image was seen that an earlier request may have caused.
+    doubtful: bool = False
+
+    @property
+    def due(self) -> float:
+        return self.sent_at + CAPTURE_TIMEOUT
+
+
+class Camera:
+    """
+    The camera, identified by its component id: it adopts the system id of what it receives.
+
+    :param own: our address.
+    :param send: sends a message.
+    :param emit: takes the events.
+    :param sequence: of the first PING.
+    """
+
+    def __init__(
+        self, own: Address, heartbeat_timeout: float, send: Callable[[Message], None],
+        emit: Callable[[CameraEvent], None], *, sequence: int,
+    ) -> None:
+        self._own = own
+        self._timeout = heartbeat_timeout
+        self._send = send
+        self._emit = emit
+        self._link_open = False
+        self._address: Address | None = None
+        self._connected = False
+        self._heard_at = -math.inf
+        self._lost_reason = ''
+        self._heartbeats: deque[float] = deque(maxlen=CONFLICT_HEARTBEATS)
+        self._sequence = sequence
+        # When each unanswered PING was sent, by sequence number, s.
+        self._pings: dict[int, float] = {}
+        self._ping_due = math.inf
+        self._ping_requests: list[_PingRequest] = []
+        self._round_trip: float | None = None
+        self._unanswered_pings = 0
+        self._capture: _Capture | None = None
+        self._indices: deque[int] = deque(maxlen=MAX_INDICES)
+        # Until when answers to captures that had none may come, s.
+        self._late: deque[float] = deque(maxlen=MAX_INDICES)
+        self._images = 0
+
+    @property
+    def target(self) -> Address:
+        """Return where messages to the camera go; its system id is 0 until it is heard."""
+        return self._address or Address(0, MAV_COMP_ID_CAMERA)
+
+    def snapshot(self, now: float) -> CameraSnapshot:
+        """Return the camera at this moment."""
+        return CameraSnapshot(
+            self._address, self._connected, self._heard_at, self._lost_reason,
+            self._is_conflict(now), self._round_trip, self._unanswered_pings, self._images,
+            self._indices[-1] if self._indices else None)
+
+    def _is_conflict(self, now: float) -> bool:
+        return (len(self._heartbeats) == CONFLICT_HEARTBEATS
+                and now - self._heartbeats[0] <= CONFLICT_WINDOW)
+
+    # The link
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Payload.link_opened`."""
+        if not self._link_open:
+            self._link_open = True
+            self._ping_due = now
+
+    def link_closed(self, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
+        self._link_open = False
+        self._ping_due = math.inf
+        self._pings.clear()
+        self._lose(f'link lost: {reason}')
+        requests, self._ping_requests = self._ping_requests, []
+        for request in requests:
+            request.done(False, f'link lost: {reason}')
+        self._end_capture(False, f'link lost: {reason}; the image may have been taken')
+
+    # Liveness
+
+    def take_heartbeat(self, source: Address, now: float) -> None:
+        """Take a heartbeat of the camera's component id, whatever its content."""
+        self._address = source
+        self._heard_at = now
+        self._heartbeats.append(now)
+        if not self._connected:
+            self._connected = True
+            self._emit(CameraConnected(source))
+
+    def _lose(self, reason: str) -> None:
+        if self._connected:
+            self._connected = False
+            self._lost_reason = reason
+            self._heartbeats.clear()
+            # After a restart the camera counts its images from the beginning.
+            self._indices.clear()
+            self._emit(CameraLost(self.target, reason))
+
+    # PING
+
+    def ping(self, now: float, done: Done) -> None:
+        """Measure the round trip through the camera."""
+        if not self._link_open:
+            done(False, 'the link is not open')
+            return
+        self._ping_requests.append(_PingRequest(now, done))
+        self._send_ping(now)
+
+    def _send_ping(self, now: float) -> None:
+        self._ping_due = now + PING_INTERVAL
+        self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+        self._pings[self._sequence] = now
+        self._send(Ping(int(now * 1e6), self._sequence, 0, 0))
+
+    def take_ping(self, message: Ping, now: float) -> None:
+        """Take a PING of the camera, which is a reply if it has our address."""
+        if (message.target_system, message.target_component) != self._own:
+            return
+        sent_at = self._pings.pop(message.seq, None)
+        if sent_at is None:
+            return
+        self._round_trip = now - sent_at
+        self._unanswered_pings = 0
+        answered = [one for one in self._ping_requests if one.since <= sent_at]
+        self._ping_requests = [one for one in self._ping_requests if one.since > sent_at]
+        for request in answered:
+            request.done(True, f'{self._round_trip * 1000:.1f} ms round trip')
+
+    def _poll_pings(self, now: float) -> None:
+        for sequence, sent_at in list(self._pings.items()):
+            if now >= sent_at + PING_TIMEOUT:
+                del self._pings[sequence]
+                self._unanswered_pings += 1
+        for request in [one for one in self._ping_requests if now >= one.due]:
+            if request.tries < PING_TRIES:
+                request.tries += 1
+                self._send_ping(now)
+            else:
+                self._ping_requests.remove(request)
+                request.done(False, f'no reply to {PING_TRIES} PINGs')
+        if now >= self._ping_due:
+            self._send_ping(now)
+
+    # Captures
+
+    def capture(self, shot: Shot, now: float, done: Done) -> None:
+        """Take an image; a success only after its CAMERA_FEEDBACK."""
+        if not self._connected:
+            done(False, f'no camera connected: {self._lost_reason or "none heard yet"}')
+        elif self._capture is not None:
+            done(False, 'another capture is under way')
+        else:
+            self._capture = _Capture(now, done)
+            # The manufacturer recommends 1 for session and zoom_pos.
+            self._send(DigicamControl(*self.target, 1, 1, 0, 0, shot, 0, 0, 0.0))
+
+    def take_status(self, message: CameraStatus, now: float) -> None:
+        """Take CAMERA_STATUS, which says that an image was triggered."""
+        if message.event_id == CameraStatusType.TRIGGER:
+            self._take_index(message.img_idx, now)
+
+    def take_feedback(self, message: CameraFeedback, now: float) -> None:
+        """Take CAMERA_FEEDBACK, which says that an image was taken."""
+        self._images += 1
+        self._take_index(message.img_idx, now)
+        self._emit(ImageTaken(message))
+        capture = self._capture
+        if (capture is not None and capture.index == message.img_idx
+                and message.flags == CameraFeedbackFlags.CLOSEDLOOP):
+            note = ("; several components have the camera's id, so another may have taken it"
+                    if self._is_conflict(now) else '')
+            self._end_capture(
+                True, f'image {capture.index} taken, confirmed after '
+                      f'{format_seconds(now - capture.sent_at)}{note}')
+
+    def _take_index(self, index: int, now: float) -> None:
+        """Note an image; the first one after a request is that of the request."""
+        if index in self._indices:
+            return
+        self._indices.append(index)
+        while self._late and now >= self._late[0]:
+            self._late.popleft()
+        if self._late:
+            # It may be the late answer to an earlier request.
+            self._late.popleft()
+            if self._capture is not None:
+                self._capture.doubtful = True
+        elif self._capture is not None and self._capture.index is None:
+            self._capture.index = index
+
+    def _end_capture(self, success: bool, text: str) -> None:
+        capture, self._capture = self._capture, None
+        if capture is not None:
+            capture.done(success, text)
+
+    def _poll_capture(self, capture: _Capture, now: float) -> None:
+        if now < capture.due:
+            return
+        limit = format_seconds(CAPTURE_TIMEOUT)
+        if capture.index is not None:
+            self._end_capture(False, f'image {capture.index} triggered, not confirmed: no '
+                                     f'CAMERA_FEEDBACK within {limit}')
+            return
+        self._late.append(now + LATE_ANSWER)
+        self._end_capture(False, f'no answer to DIGICAM_CONTROL within {limit}' + (
+            '; an image was reported that an earlier request may have caused'
+            if capture.doubtful else ''))
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        if self._connected and now >= self._heard_at + self._timeout:
+            self._lose(f'no heartbeat for {format_seconds(self._timeout)}')
+        if self._link_open:
+            self._poll_pings(now)
+        if self._capture is not None:
+            self._poll_capture(self._capture, now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return min(
+            self._heard_at + self._timeout if self._connected else math.inf, self._ping_due,
+            min(self._pings.values(), default=math.inf) + PING_TIMEOUT,
+            min((one.due for one in self._ping_requests), default=math.inf),
+            self._capture.due if self._capture is not None else math.inf)

@@ -1,0 +1,128 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The camera as a payload of a component."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import random
+
+from .camera import Camera, CameraEvent, CameraSnapshot
+from .feeder import Feeder, FeederSettings, FeederSnapshot, InputChanged
+from .messages import (
+    CameraFeedback,
+    CameraStatus,
+    DigicamControl,
+    GpsRawInt,
+    GpsStatus,
+    MAV_COMP_ID_CAMERA,
+    MountStatus,
+    Ping,
+)
+from ..mavlink.command import CommandSender
+from ..mavlink.component import Payload
+from ..mavlink.messages import Address, Heartbeat, Message
+from ..payload.events import Listeners
+from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+
+
+@dataclass(frozen=True)
+class Settings:
+    """
+    How the camera is treated.
+
+    :param heartbeat_timeout: silence after which it is lost, s.
+    """
+
+    feeder: FeederSettings = FeederSettings()
+    heartbeat_timeout: float = 3.5
+
+
+@dataclass(frozen=True)
+class ClientSnapshot:
+    """The camera and its inputs at one moment, for any thread."""
+
+    camera: CameraSnapshot
+    feeder: FeederSnapshot
+
+
+class RedEdgeClient(Payload):
+    """
+    Feeds one camera, captures images, and reports its events.
+
+    :param commands: of the component that carries it; the camera itself takes no commands.
+    :param sequence: of the first PING, so that a reply to an earlier run is not taken for ours.
+    :ivar camera: PINGs and captures.
+    :ivar feeder: takes the inputs.
+    """
+
+    messages = (Heartbeat, Ping, CameraStatus, CameraFeedback)
+    sends = (DigicamControl, GpsRawInt, SystemTime, GlobalPositionInt, Attitude, MountStatus,
+             GpsStatus)
+    # A position must not wait behind attitudes.
+    streams = ((GpsRawInt,), (SystemTime, GlobalPositionInt), (Attitude, MountStatus),
+               (GpsStatus,))
+
+    def __init__(
+        self, commands: CommandSender, settings: Settings, *, sequence: int | None = None,
+    ) -> None:
+        self.settings = settings
+        self.events: Listeners[CameraEvent | InputChanged] = Listeners()
+
+        def send(message: Message) -> None:
+            commands.outgoing.append((commands.address, message))
+
+        self.camera = Camera(
+            commands.address, settings.heartbeat_timeout, send, self.events.emit,
+            sequence=random.getrandbits(32) if sequence is None else sequence)
+        self.feeder = Feeder(
+            settings.feeder, send, lambda: self.camera.target, self.events.emit)
+
+    def snapshot(self, now: float) -> ClientSnapshot:
+        """Return camera and inputs at this moment; call it in the link's thread."""
+        return ClientSnapshot(self.camera.snapshot(now), self.feeder.snapshot(now))
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Payload.link_opened`."""
+        self.camera.link_opened(now)
+        self.feeder.link_opened(now)
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
+        self.camera.link_closed(reason)
+        self.feeder.link_closed()
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        """See :meth:`Payload.receive`."""
+        if source.component != MAV_COMP_ID_CAMERA:
+            return
+        if isinstance(message, Heartbeat):
+            self.camera.take_heartbeat(source, now)
+        elif isinstance(message, Ping):
+            self.camera.take_ping(message, now)
+        elif isinstance(message, CameraStatus):
+            self.camera.take_status(message, now)
+        elif isinstance(message, CameraFeedback):
+            self.camera.take_feedback(message, now)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        self.camera.poll(now)
+        self.feeder.poll(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return min(self.camera.next_deadline(), self.feeder.next_deadline())

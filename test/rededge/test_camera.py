@@ -1,0 +1,279 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The client's side of a camera: liveness, PING and captures, message by message."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
+from illuminator_ros.rededge.camera import CameraConnected, CameraLost, ImageTaken
+from illuminator_ros.rededge.client import RedEdgeClient, Settings
+from illuminator_ros.rededge.messages import (
+    CameraFeedback,
+    CameraStatus,
+    DigicamControl,
+    Ping,
+    Shot,
+)
+import pytest
+
+OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
+# As real ones send it: neither a camera's type nor an autopilot of a payload.
+BEAT = Heartbeat(0, 1, 2, 3, 4, 3)
+CLOSED_LOOP, OPEN_LOOP = 3, 4
+
+
+def feedback(index: int, flags: int = CLOSED_LOOP) -> CameraFeedback:
+    return CameraFeedback(0, 1, 0, index, 0, 0, 0, 0, 0, 0, 0, 0, flags)
+
+
+def status(index: int, event: int = 1) -> CameraStatus:
+    return CameraStatus(0, 1, 0, index, event, 0, 0, 0, 0)
+
+
+class Rig:
+    """A client on an open link, and the results of its requests."""
+
+    def __init__(self, *, connected: bool = True) -> None:
+        self.now = 100.0
+        commands = CommandSender(OWN)
+        self.client = RedEdgeClient(commands, Settings(), sequence=0xFFFFFFFE)
+        self.component = Component(commands, [self.client])
+        self.events: list[Any] = []
+        self.sent: list[Message] = []
+        self.results: list[tuple[bool, str]] = []
+        self.client.events.subscribe(self.events.append)
+        self.component.link_opened(self.now)
+        if connected:
+            self.hear(BEAT)
+        self.run(0.0)
+
+    def hear(self, *messages: Message, source: Address = NEW) -> None:
+        for message in messages:
+            self.component.receive(source, message, self.now)
+
+    def run(self, seconds: float, beats: bool = False) -> None:
+        end = round(self.now + seconds, 6)
+        while True:
+            self.component.poll(self.now)
+            while self.component.outgoing:
+                source, message = self.component.outgoing.popleft()
+                assert source == OWN
+                self.sent.append(message)
+            if self.now >= end:
+                return
+            self.now = round(min(self.now + 0.05, end), 6)
+            if beats and not round(self.now * 20) % 20:
+                self.hear(BEAT)
+
+    def all(self, cls: type[Any]) -> list[Any]:  # noqa: A003
+        return [message for message in self.sent if isinstance(message, cls)]
+
+    def take_result(self, success: bool, text: str) -> None:
+        self.results.append((success, text))
+
+    def ping(self) -> Ping:
+        """Request a PING and return it."""
+        self.client.camera.ping(self.now, self.take_result)
+        self.run(0.0)
+        found: Ping = self.all(Ping)[-1]
+        return found
+
+    def capture(self, shot: Shot = Shot.SURVEY) -> None:
+        self.client.camera.capture(shot, self.now, self.take_result)
+        self.run(0.0)
+
+    @property
+    def state(self) -> Any:
+        return self.client.snapshot(self.now).camera
+
+
+def reply(request: Ping, **changes: int) -> Ping:
+    return Ping(**{'time_usec': 0, 'seq': request.seq, 'target_system': OWN.system,
+                   'target_component': OWN.component, **changes})
+
+
+def test_the_camera_is_known_by_its_component_id_alone_re_6_re_7() -> None:
+    rig = Rig(connected=False)
+    rig.hear(BEAT, source=Address(255, 1))
+    rig.hear(heartbeat(30), source=Address(1, 101))
+    assert rig.events == []
+
+    rig.hear(BEAT)
+    assert rig.events == [CameraConnected(NEW)]
+
+
+def test_a_camera_that_adopts_our_system_id_is_the_same_camera_re_8() -> None:
+    rig = Rig()
+    rig.hear(BEAT, source=ADOPTED)
+    rig.run(3.4)
+    assert rig.events == [CameraConnected(NEW)]
+    assert (rig.state.address, rig.state.conflict) == (ADOPTED, False)
+    rig.capture()
+    control = rig.all(DigicamControl)[-1]
+    assert (control.target_system, control.target_component) == ADOPTED
+
+
+def test_a_camera_is_lost_after_3_5_s_and_found_again_re_9() -> None:
+    rig = Rig()
+    rig.run(3.4)
+    assert rig.events == [CameraConnected(NEW)]
+    rig.run(0.2)
+    assert rig.events[1:] == [CameraLost(NEW, 'no heartbeat for 3.50 s')]
+    rig.hear(BEAT)
+    assert rig.events[2:] == [CameraConnected(NEW)]
+
+    rig.component.link_closed(rig.now, 'unplugged')
+    assert rig.events[3:] == [CameraLost(NEW, 'link lost: unplugged')]
+
+
+def test_two_components_with_the_camera_s_id_are_noticed() -> None:
+    rig = Rig()
+    rig.run(8.0, beats=True)
+    assert not rig.state.conflict
+    for _ in range(7):
+        rig.hear(BEAT, source=ADOPTED)
+        rig.run(1.0, beats=True)
+    assert rig.state.conflict
+    rig.run(10.0, beats=True)
+    assert not rig.state.conflict
+
+
+def test_each_ping_is_a_request_with_a_new_sequence_number_that_wraps_re_10() -> None:
+    rig = Rig()
+    rig.run(5.0, beats=True)
+    pings = rig.all(Ping)
+    assert [(one.target_system, one.target_component) for one in pings] == [(0, 0)] * 3
+    assert [one.seq for one in pings] == [0xFFFFFFFF, 0, 1]
+
+
+def test_ping_answers_with_the_round_trip_by_our_clock_re_11() -> None:
+    rig = Rig()
+    request = rig.ping()
+    rig.run(0.25)
+    rig.hear(reply(request, time_usec=1))
+    assert rig.results == [(True, '250.0 ms round trip')]
+    assert rig.state.round_trip == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(('source', 'changes'), [
+    (NEW, {'seq': 5}), (NEW, {'target_system': 0, 'target_component': 0}),
+    (NEW, {'target_component': 190}), (Address(1, 1), {})],
+    ids=['sequence', 'request', 'for another', 'from another'])
+def test_what_is_no_reply_of_the_camera_to_us_is_no_success_re_12(
+        source: Address, changes: dict[str, int]) -> None:
+    rig = Rig()
+    request = rig.ping()
+    rig.hear(reply(request, **changes), source=source)
+    rig.run(2.1, beats=True)
+    assert rig.results == [(False, 'no reply to 2 PINGs')]
+
+
+def test_a_lost_ping_is_sent_again_with_another_number_re_12() -> None:
+    rig = Rig()
+    first = rig.ping()
+    rig.run(1.2)
+    second = rig.all(Ping)[-1]
+    rig.hear(reply(second))
+    assert second.seq != first.seq
+    assert [success for success, _ in rig.results] == [True]
+
+
+def test_a_camera_that_hears_nothing_is_noticed() -> None:
+    rig = Rig()
+    rig.run(4.9, beats=True)
+    assert not rig.state.is_deaf
+    rig.run(3.0, beats=True)
+    assert rig.state.is_deaf
+    rig.hear(reply(rig.ping()))
+    assert not rig.state.is_deaf
+
+
+def test_no_request_waits_without_a_link() -> None:
+    rig = Rig()
+    rig.ping()
+    rig.capture()
+    rig.component.link_closed(rig.now, 'unplugged')
+    rig.client.camera.ping(rig.now, rig.take_result)
+    rig.capture()
+    assert rig.results == [
+        (False, 'link lost: unplugged'),
+        (False, 'link lost: unplugged; the image may have been taken'),
+        (False, 'the link is not open'), (False, 'no camera connected: link lost: unplugged')]
+
+
+@pytest.mark.parametrize('shot', Shot)
+def test_a_capture_is_a_success_after_its_feedback_re_5(shot: Shot) -> None:
+    rig = Rig()
+    rig.capture(shot)
+    assert rig.all(DigicamControl) == [DigicamControl(255, 100, 1, 1, 0, 0, shot, 0, 0, 0.0)]
+    rig.hear(status(1))
+    rig.run(0.5)
+    assert rig.results == []
+    rig.hear(feedback(1))
+    assert rig.results == [(True, 'image 1 taken, confirmed after 500 ms')]
+    assert rig.events[-1] == ImageTaken(feedback(1))
+
+
+TRIGGERED = 'image 7 triggered, not confirmed: no CAMERA_FEEDBACK within 5.00 s'
+NO_ANSWER = 'no answer to DIGICAM_CONTROL within 5.00 s'
+
+
+@pytest.mark.parametrize(('heard', 'text'), [
+    ([status(7)], TRIGGERED), ([status(7), feedback(7, OPEN_LOOP)], TRIGGERED),
+    ([status(7), feedback(8)], TRIGGERED), ([], NO_ANSWER), ([status(7, event=3)], NO_ANSWER)],
+    ids=['status', 'open loop', 'another image', 'nothing', 'error'])
+def test_a_capture_without_its_feedback_is_no_success(heard: list[Message], text: str) -> None:
+    rig = Rig()
+    rig.capture()
+    rig.hear(*heard)
+    rig.run(4.9, beats=True)
+    assert rig.results == []
+    rig.run(0.2, beats=True)
+    assert rig.results == [(False, text)]
+
+
+def test_a_late_answer_does_not_confirm_the_next_capture() -> None:
+    rig = Rig()
+    rig.capture()
+    rig.run(5.0, beats=True)
+    rig.capture()
+    rig.hear(status(1), feedback(1))
+    assert rig.results == [(False, NO_ANSWER)]
+    rig.hear(status(2), feedback(2))
+    assert rig.results[1:] == [(True, 'image 2 taken, confirmed after 0 ms')]
+
+    # Its index was seen in time.
+    rig.capture()
+    rig.hear(status(3))
+    rig.run(5.0, beats=True)
+    rig.capture()
+    rig.hear(feedback(3))
+    assert len(rig.results) == 3
+
+
+def test_a_capture_is_refused_without_a_camera_or_while_another_runs() -> None:
+    rig = Rig(connected=False)
+    rig.capture()
+    rig.hear(BEAT)
+    rig.capture()
+    rig.capture()
+    assert rig.results == [(False, 'no camera connected: none heard yet'),
+                           (False, 'another capture is under way')]
+    assert len(rig.all(DigicamControl)) == 1

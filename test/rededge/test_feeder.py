@@ -1,0 +1,345 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the camera is fed, and above all what it is not fed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+from typing import Any
+
+from illuminator_ros.mavlink.messages import Address, Message
+from illuminator_ros.payload.rotation import Quaternion, Vector
+from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+from illuminator_ros.rededge.conversions import MountFrame, Position
+from illuminator_ros.rededge.feeder import (
+    Feeder,
+    FeederSettings,
+    Input,
+    InputChanged,
+    InputState,
+    PositionSource,
+    Stamp,
+)
+from illuminator_ros.rededge.messages import GpsRawInt, GpsStatus, MountStatus
+import pytest
+
+CAMERA = Address(1, 100)
+HERE = Position(0, 47.0, 8.0, 500.0)
+EPOCH = 1_700_000_000
+LEVEL = Quaternion()
+RATES: Vector = (0.0, 0.0, 0.0)
+# From the frame of base_link to a camera that looks straight down.
+NADIR = Quaternion.from_euler(0, math.pi / 2, 0)
+FUSED = {'position_source': PositionSource.FUSED}
+
+
+class Rig:
+    """A feeder, and a ROS clock that is UTC unless it is set."""
+
+    def __init__(self, **settings: Any) -> None:
+        self.now = 100.0
+        self.clock = EPOCH - self.now
+        self.simulated = False
+        self.sent: list[Message] = []
+        self.events: list[InputChanged] = []
+        self.feeder = Feeder(replace(FeederSettings(), **settings), self.sent.append,
+                             lambda: CAMERA, self.events.append)
+
+    def stamp(self, age: float = 0.0) -> Stamp:
+        return Stamp(round((self.clock + self.now - age) * 1e9), age, self.simulated)
+
+    def fix(self, position: Position = HERE, age: float = 0.0) -> list[Message]:
+        self.feeder.take_fix(position, self.stamp(age), self.now)
+        return self.take()
+
+    def velocity(self, *velocity: float) -> None:
+        self.feeder.take_velocity(
+            (velocity[0], velocity[1], velocity[2]), self.stamp(), self.now)
+
+    def imu(self, orientation: Quaternion | None = LEVEL, age: float = 0.0,
+            name: Input = Input.IMU) -> list[Message]:
+        self.feeder.take_attitude(name, orientation, RATES, self.stamp(age), self.now)
+        return self.take()
+
+    def mount(self, orientation: Quaternion = NADIR, age: float = 0.0) -> list[Message]:
+        self.feeder.take_mount(orientation, self.stamp(age), self.now)
+        return self.take()
+
+    def reference(self, utc: float) -> None:
+        self.feeder.take_time_reference(self.stamp(), round(utc * 1e9), self.now)
+
+    def take(self) -> list[Message]:
+        sent, self.sent[:] = list(self.sent), []
+        return sent
+
+    def run(self, seconds: float) -> list[Message]:
+        """Let time pass; return what is sent by itself."""
+        end = self.now + seconds
+        while (due := self.feeder.next_deadline()) <= end:
+            self.now = max(self.now, due)
+            self.feeder.poll(self.now)
+        self.now = end
+        return self.take()
+
+    def state(self, name: Input) -> tuple[InputState, str]:
+        snapshot = self.feeder.snapshot(self.now).inputs[name]
+        return snapshot.state, snapshot.refusal
+
+
+def classes(messages: list[Message]) -> list[type[Message]]:
+    return [type(message) for message in messages]
+
+
+# Position
+
+def test_each_fix_is_sent_at_once_and_only_once_re_13_re_29() -> None:
+    rig = Rig()
+    assert [(type(one), one.time_usec) for one in rig.fix() if isinstance(one, GpsRawInt)] == [
+        (GpsRawInt, EPOCH * 1_000_000)]
+    assert rig.fix() == []
+    assert rig.state(Input.FIX) == (InputState.OK, 'its stamp is not newer than the last')
+    assert rig.run(10.0) == []
+    assert classes(rig.fix()) == [GpsRawInt]
+
+
+def test_speed_and_satellites_are_sent_while_they_are_fresh_re_15_re_30() -> None:
+    rig = Rig()
+    rig.velocity(3.0, 4.0, 0.0)
+    rig.feeder.take_satellites(9, rig.now)
+    for after, speed, satellites in ((0.9, 500, 9), (0.2, 65535, 255)):
+        rig.run(after)
+        (sent,) = rig.fix()
+        assert isinstance(sent, GpsRawInt)
+        assert (sent.vel, sent.satellites_visible) == (speed, satellites)
+
+
+def test_fused_position_comes_with_its_utc_and_never_with_gps_raw_int_re_17_re_19() -> None:
+    rig = Rig(**FUSED)
+    rig.velocity(1.0, 2.0, 3.0)
+    first, second = rig.fix()
+    assert isinstance(first, SystemTime)
+    assert first.time_unix_usec == EPOCH * 1_000_000
+    assert isinstance(second, GlobalPositionInt)
+    assert (second.vx, second.vy, second.vz) == (200, 100, -300)
+
+
+def test_fused_position_needs_a_velocity_since_none_can_be_left_unknown_re_18() -> None:
+    rig = Rig(**FUSED)
+    assert rig.fix() == []
+    assert rig.state(Input.FIX) == (
+        InputState.REFUSED, 'position_source fused needs ~/velocity, which is missing')
+    assert (Input.VELOCITY,) in rig.feeder.snapshot(rig.now).needed
+
+
+@pytest.mark.parametrize('settings', [{}, FUSED])
+@pytest.mark.parametrize(('position', 'age', 'reason'), [
+    (replace(HERE, status=-1), 0.0, 'no fix (status -1)'),
+    (replace(HERE, latitude=math.nan), 0.0,
+     'latitude of ~/fix: nan deg is outside -90 to 90 deg'),
+    (HERE, 1.1, 'its stamp is 1.10 s old by the ROS clock'),
+    (HERE, -1.1, 'its stamp is 1.10 s ahead of the ROS clock')])
+def test_a_fix_that_cannot_be_trusted_is_refused_with_the_reason_re_16_re_18_re_30(
+        settings: dict[str, Any], position: Position, age: float, reason: str) -> None:
+    rig = Rig(**settings)
+    rig.velocity(0.0, 0.0, 0.0)
+    assert rig.fix(position, age) == []
+    assert rig.state(Input.FIX) == (InputState.REFUSED, reason)
+    assert rig.events[-1] == InputChanged(Input.FIX, InputState.REFUSED, reason)
+
+
+def since_boot(rig: Rig) -> None:
+    rig.clock = 23.4
+
+
+def simulate(rig: Rig) -> None:
+    rig.clock, rig.simulated = EPOCH - rig.now, True
+
+
+@pytest.mark.parametrize(('set_clock', 'reason'), [
+    (since_boot, 'its time, 123.4 s after 1970-01-01, cannot be UTC'),
+    (simulate, 'ROS time is simulated (use_sim_time), which is not UTC')])
+def test_time_that_is_not_utc_is_not_sent_unless_a_reference_tells_it_re_14(
+        set_clock: Callable[[Rig], None], reason: str) -> None:
+    rig = Rig()
+    set_clock(rig)
+    assert rig.fix() == []
+    assert rig.state(Input.FIX)[1].startswith(reason)
+
+    rig.reference(EPOCH + 5.5)
+    rig.run(2.0)
+    (sent,) = rig.fix()
+    assert isinstance(sent, GpsRawInt)
+    assert sent.time_usec == (EPOCH + 7) * 1_000_000 + 500_000
+    assert rig.feeder.ros_time(round((EPOCH + 7.5) * 1e9)) == rig.stamp().time
+
+
+def test_a_reference_that_cannot_be_utc_is_refused_re_14() -> None:
+    rig = Rig()
+    rig.reference(1e9)
+    assert rig.state(Input.TIME_REFERENCE) == (
+        InputState.REFUSED, '1000000000.0 s after 1970-01-01 cannot be UTC')
+
+
+def test_an_old_reference_or_a_jump_of_ros_time_ends_the_position_until_a_new_reference() -> None:
+    rig = Rig()
+    rig.reference(EPOCH)
+    rig.run(61.0)
+    assert rig.fix() == []
+    assert rig.state(Input.FIX)[1] == '~/time_reference is 61.00 s old'
+    rig.reference(EPOCH)
+    rig.clock -= 30.0
+    rig.feeder.clock_jumped()
+    assert rig.fix() == []
+    assert rig.state(Input.FIX)[1] == 'ROS time has jumped: waiting for ~/time_reference'
+    assert rig.feeder.ros_time(EPOCH * 10**9) is None
+    rig.reference(EPOCH)
+    assert classes(rig.fix()) == [GpsRawInt]
+
+
+def test_after_a_step_back_of_the_clock_fixes_are_sent_again() -> None:
+    rig = Rig()
+    rig.fix()
+    rig.clock -= 3600.0
+    assert classes(rig.fix()) == [GpsRawInt]
+
+
+def test_satellites_are_sent_for_the_web_page_if_that_is_asked_for_re_28() -> None:
+    rig = Rig(send_gps_status=True)
+    for _ in range(11):
+        rig.feeder.take_satellites(9, rig.now)
+        rig.run(0.1)
+    assert classes(rig.sent) == []
+    rig = Rig(send_gps_status=True)
+    rig.feeder.take_satellites(9, rig.now)
+    assert classes(rig.take()) == [GpsStatus]
+    rig = Rig()
+    rig.feeder.take_satellites(9, rig.now)
+    assert rig.take() == []
+
+
+# Attitude and mount
+
+def test_attitude_and_mount_are_a_pair_back_to_back_re_21_re_26_re_27() -> None:
+    rig = Rig()
+    sent = rig.imu()
+    assert classes(sent) == [Attitude, MountStatus]
+    assert sent[1] == MountStatus(*CAMERA, 0, 0, 0)
+
+
+@pytest.mark.parametrize(('rate', 'pairs'), [(20.0, 40), (50.0, 100), (5.0, 10)])
+def test_pairs_have_the_given_rate_and_no_attitude_is_sent_twice_re_21_re_29(
+        rate: float, pairs: int) -> None:
+    rig = Rig(attitude_rate=rate)
+    sent = []
+    for _ in range(100):
+        sent += rig.imu()
+        sent += rig.run(0.02)
+    assert abs(len(sent) / 2 - pairs) <= 1
+    assert not any(isinstance(one, Attitude) for one in rig.run(5.0))
+
+
+def test_a_fixed_mount_is_sent_each_second_without_attitude_and_after_a_change_re_23_re_27() -> (
+        None):
+    rig = Rig()
+    rig.feeder.link_opened(rig.now)
+    assert rig.run(3.5) == [MountStatus(*CAMERA, 0, 0, 0)] * 4
+    rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
+    assert rig.run(0.0) == [MountStatus(*CAMERA, -200, 100, 350)]
+    rig.feeder.link_closed()
+    assert rig.run(3.0) == []
+
+
+def test_a_mount_that_moves_is_sent_with_the_attitude_of_the_same_instant_re_26() -> None:
+    """Vehicle and gimbal turn; their messages have different rates and delays."""
+    rig = Rig(mount_frame=MountFrame.CAMERA, attitude_rate=100.0)
+    rig.mount()
+    sent: list[Message] = []
+
+    def turned(at: float) -> Quaternion:
+        return Quaternion.from_euler(0, 0, (at - 100.0) * 0.8)
+
+    for step in range(200):
+        rig.run(0.005)
+        if step % 4 == 0:
+            sent += rig.imu(turned(rig.now - 0.004), 0.004)
+        if step % 11 == 3:
+            # It counter-rotates: together they look to the same direction.
+            sent += rig.mount(turned(rig.now - 0.03).inverse() * NADIR, 0.03)
+    pairs = list(zip(sent[::2], sent[1::2], strict=True))
+    assert len(pairs) > 15
+    for one, other in pairs:
+        assert isinstance(one, Attitude)
+        assert isinstance(other, MountStatus)
+        # Pan of a camera that looks down is its roll; yaw from north is 90 degrees less.
+        assert math.degrees(one.yaw) - 90 + other.pointing_b / 100 == pytest.approx(0, abs=0.02)
+        assert (other.pointing_a, other.pointing_c) == (0, 0)
+
+
+@pytest.mark.parametrize('expected', [Rig.mount, lambda rig: rig.feeder.expect_mount()])
+def test_without_its_moving_mount_no_attitude_is_sent_and_no_fixed_mount_re_29_re_30(
+        expected: Callable[[Rig], Any]) -> None:
+    rig = Rig()
+    expected(rig)
+    rig.feeder.link_opened(rig.now)
+    rig.feeder.set_fixed_mount((0.0, 0.0, 0.0), rig.now)
+    rig.take()
+    rig.run(0.6)
+    assert rig.imu() == []
+    assert rig.run(3.0) == []
+    assert (Input.MOUNT,) in rig.feeder.snapshot(rig.now).needed
+
+
+def test_attitude_is_used_while_no_imu_comes() -> None:
+    rig = Rig()
+    yaw = Quaternion.from_euler(0, 0, 1.0)
+    assert classes(rig.imu(yaw, name=Input.ATTITUDE)) == [Attitude, MountStatus]
+    rig.run(0.1)
+    rig.imu()
+    rig.run(0.1)
+    (attitude, _) = rig.imu() or rig.imu(yaw, name=Input.ATTITUDE)
+    assert isinstance(attitude, Attitude)
+    assert attitude.yaw == pytest.approx(math.pi / 2)
+    rig.run(0.6)
+    assert classes(rig.imu(yaw, name=Input.ATTITUDE)) == [Attitude, MountStatus]
+
+
+@pytest.mark.parametrize(('orientation', 'age', 'reason'), [
+    (None, 0.0, 'it has no orientation: its covariance begins with -1'),
+    (Quaternion(0, 0, 0, 0), 0.0, '(0, 0, 0, 0) is not a rotation'),
+    (Quaternion(1, math.nan, 0, 0), 0.0, '(nan, 0, 0, 1) is not a rotation'),
+    (LEVEL, 0.6, 'its stamp is 600 ms old by the ROS clock')])
+def test_an_attitude_that_cannot_be_trusted_is_refused_with_the_reason_re_30(
+        orientation: Quaternion | None, age: float, reason: str) -> None:
+    rig = Rig()
+    assert rig.imu(orientation, age) == []
+    assert rig.state(Input.IMU) == (InputState.REFUSED, reason)
+
+
+def test_each_input_reports_when_it_comes_and_when_it_is_missing_re_30() -> None:
+    rig = Rig()
+    assert rig.state(Input.FIX) == (InputState.MISSING, '')
+    rig.fix()
+    rig.imu()
+    rig.run(1.5)
+    assert [(one.input, one.state) for one in rig.events] == [
+        (Input.FIX, InputState.OK), (Input.IMU, InputState.OK), (Input.IMU, InputState.STALE),
+        (Input.FIX, InputState.STALE)]
+    snapshot = rig.feeder.snapshot(rig.now)
+    assert snapshot.inputs[Input.FIX].age == pytest.approx(1.5)
+    assert snapshot.inputs[Input.VELOCITY].age is None
+    assert (snapshot.positions, snapshot.attitudes) == (1, 1)
