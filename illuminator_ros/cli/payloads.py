@@ -27,4 +27,6 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         checks='illuminator_ros.illuminator.checks.requirements:CHECKS'),
     PayloadType('rededge', simulated='illuminator_ros.rededge.simulated:SIMULATED'),
     PayloadType('gimbal', simulated='illuminator_ros.gimbal.simulated_device:SIMULATED'),
+    PayloadType(
+        'gimbal_manager', simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED'),
 )}

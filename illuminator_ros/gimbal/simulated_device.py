@@ -77,6 +77,8 @@ class GimbalBehaviour(Behaviour):
     :param accepts_earth_always: whether it claims to accept yaw in the earth frame without a
         heading.
     :param takes_manager_set: whether a device obeys the messages to managers.
+    :param reports_earth: whether it reports yaw relative to north where its setpoint is.
+    :param reports_failures: whether it has failure flags.
     """
 
     heartbeat_type: int = gimbal.MAV_TYPE_GIMBAL
@@ -93,6 +95,8 @@ class GimbalBehaviour(Behaviour):
     stops: bool = True
     accepts_earth_always: bool = False
     takes_manager_set: bool = False
+    reports_earth: bool = True
+    reports_failures: bool = True
 
 
 # The faults of devices and of managers.
@@ -195,7 +199,7 @@ class SimulatedMount:
         motion = self.motion
         motion.advance(now)
         known = motion.heading_known(now)
-        frame = motion.frame if known else YawFrame.VEHICLE
+        frame = motion.frame if known and behaviour.reports_earth else YawFrame.VEHICLE
         flags = self.flags(behaviour)
         if behaviour.names_frame:
             flags |= frame.flag
@@ -206,12 +210,14 @@ class SimulatedMount:
         self._reported += 1
         if behaviour.jump and not self._reported % 10:
             q = Quaternion.from_euler(0.0, 0.0, math.radians(behaviour.jump)) * q
+        if behaviour.reports_failures:
+            failures |= motion.limits()
         turning = motion.vehicle.rate if known else math.nan
         roll_rate, pitch_rate, yaw_rate = motion.rates
         return GimbalDeviceAttitudeStatus(
             0, 0, self.uptime_ms(now), int(flags), (q.w, q.x, q.y, q.z),
             roll_rate, pitch_rate, yaw_rate + (turning if frame is YawFrame.EARTH else 0.0),
-            int(motion.limits()) | failures | behaviour.false_flags,
+            failures | behaviour.false_flags,
             motion.vehicle.yaw if known else math.nan, turning, self._device_id)
 
     def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
@@ -415,8 +421,8 @@ MECHANICS: dict[str, Setting] = {
 }
 SETTINGS: dict[str, Setting] = {
     **MECHANICS,
-    'manager': Setting('ID', 'component id of its manager; without it, the first component that '
-                       'announces itself', integer(1, 255)),
+    'manager_id': Setting('ID', 'component id of its manager; without it, the first '
+                          'component that announces itself', integer(1, 255)),
 }
 
 
@@ -437,7 +443,7 @@ def mechanics(settings: Mapping[str, Any]) -> GimbalMechanics:
 def properties(settings: Mapping[str, Any], address: Address) -> GimbalProperties:
     """Return the gimbal that settings describe."""
     names = ('vendor', 'model', 'custom_name', 'status_interval')
-    manager = settings.get('manager')
+    manager = settings.get('manager_id')
     return GimbalProperties(
         address, mechanics(settings), **{name: settings[name] for name in names
                                          if name in settings},

@@ -76,7 +76,7 @@ NO_STOPS = Range(-math.pi, math.pi)
 @dataclass(frozen=True)
 class GimbalMechanics:
     """
-    What a gimbal can do.
+    The axes of a gimbal, and its capabilities.
 
     :param roll, pitch: relative to the horizon.
     :param yaw: relative to the vehicle's heading; a full turn has no stop.

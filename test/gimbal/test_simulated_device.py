@@ -162,7 +162,7 @@ def test_gm_18_the_manager_stays_until_it_is_silent() -> None:
 
 
 def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() -> None:
-    bench = Bench(announced=False, manager=7)
+    bench = Bench(announced=False, manager_id=7)
     bench.announce()
     bench.now += 2 * MANAGER_TIMEOUT
     bench.point(0.0, -10.0, 0.0)
@@ -287,7 +287,7 @@ def test_faults_of_the_status() -> None:
 
 
 def test_a_person_turns_it_and_reads_its_state() -> None:
-    bench = Bench(announced=False, manager=191)
+    bench = Bench(announced=False, manager_id=191)
     (turn,) = bench.device.commands
     turn.do(bench.device, ['-20', '15'], bench.now)()
     assert bench.angles(1.0) == (0.0, -20.0, 15.0)

@@ -16,6 +16,7 @@
 
 from pathlib import Path
 import sys
+from typing import Any
 
 from illuminator_ros.cli.simulator.components import (
     components,
@@ -26,12 +27,13 @@ from illuminator_ros.cli.simulator.components import (
     SettingError,
 )
 from illuminator_ros.cli.simulator.options import parser
+from illuminator_ros.gimbal.simulated_manager import SIMULATED as MANAGERS
 from illuminator_ros.illuminator.model import Limits, Mode
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
-from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.simulated_settings import SIMULATED
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.simulated import Description
+from illuminator_ros.payload.simulated import Description, SimulatedType
 import pytest
 
 TYPES = [SIMULATED]
@@ -53,8 +55,9 @@ def properties(*arguments: str, file: object = None) -> list[IlluminatorProperti
     return [one.device.properties for one in described(*arguments, file=file)]
 
 
-def faults(light: Description[SimulatedIlluminator]) -> list[str]:
-    return FAULTS.active(light.device.behaviour, light.device.normal)
+def faults(one: Description[Any]) -> list[str]:
+    device = one.device
+    return list(device.faults.active(device.behaviour, device.normal))
 
 
 @pytest.mark.parametrize(('arguments', 'addresses'), [
@@ -104,6 +107,19 @@ def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names() -> None:
         '1/243:drop=0.1,nan', '--fault', 'stern:slow')
     assert (faults(first), faults(second)) == (['drop', 'lie', 'nan'], ['slow', 'lie'])
     assert first.device.behaviour.drop == 0.1
+
+
+def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
+    types: list[SimulatedType[Any]] = [SIMULATED, MANAGERS]
+    light, manager = components(parser(types).parse_args([
+        '--profile', 'px4', '--fault', 'lie,frozen-axis', '--vendor', 'ACME']), scenario(
+            {'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types), types)
+    assert light.device.properties.identity.vendor == 'ACME'
+    assert manager.device.properties.gimbal.vendor == 'ACME'
+    assert [faults(one) for one in (light, manager)] == [['lie'], ['lie', 'frozen-axis']]
+    assert not manager.device.behaviour.takes_pitchyaw
+    with pytest.raises(SettingError, match="'ardusup' is not one of default"):
+        components(parser(types).parse_args(['--profile', 'ardusup']), Scenario(), types)
 
 
 def test_a_file_has_settings_for_all_lights_and_for_each() -> None:

@@ -123,9 +123,27 @@ def _read(
             known = dict.fromkeys(name for one in types for name in one.all_settings)
             raise SettingError(f'{path}: no setting {key!r}; there are '
                                + ', '.join([*others, *known]))
-        for one in having:
-            with _place(f'{path}: {key}'):
-                result[one.noun][name] = one.all_settings[name].read(_as_text(value))
+        with _place(f'{path}: {key}'):
+            for noun, read in _readings(name, _as_text(value), having).items():
+                result[noun][name] = read
+    return result
+
+
+def _readings(name: str, text: str, types: Types) -> dict[str, Any]:
+    """
+    Return the value of a setting for each type that accepts it.
+
+    :raises ValueError: if none does: profiles and faults differ between types.
+    """
+    result: dict[str, Any] = {}
+    refusal: ValueError | None = None
+    for one in types:
+        try:
+            result[one.noun] = one.all_settings[name].read(text)
+        except ValueError as error:
+            refusal = refusal or error
+    if refusal is not None and not result:
+        raise refusal
     return result
 
 
@@ -146,7 +164,7 @@ def components(
 
     :raises SettingError: if they contradict each other, or an option is wrong.
     """
-    given = {one.noun: _given(options, one) for one in types}
+    given = _given(options, types)
     listed = {one.noun: _of_type(options, file, one, given[one.noun]) for one in types}
     everyone = [one for some in listed.values() for one in some]
     if len(everyone) > MAX_COMPONENTS:
@@ -155,16 +173,13 @@ def components(
     if twice := {str(one) for one in addresses if addresses.count(one) > 1}:
         raise SettingError(
             f'two {types[0].plural} have the address {", ".join(sorted(twice))}')
-    faults = _faults(options.fault or (), everyone, types)
+    faults = _faults(options.fault or (), listed, types)
     result = []
     for kind in types:
         for one in listed[kind.noun]:
-            with _place('--fault'):
-                of_options = [{'fault': kind.all_settings['fault'].read(fault)}
-                              for fault in faults[one.address]]
             settings = _merged(
                 kind.all_settings, file.common.get(kind.noun, {}), one.settings,
-                given[kind.noun], *of_options)
+                given[kind.noun], {'fault': faults[one.address]})
             several = len(listed[kind.noun]) > 1 and 'serial_number' not in one.settings
             with _place(f'{kind.noun} {one.address}'):
                 device = kind.make(settings, one.address, several)
@@ -174,13 +189,16 @@ def components(
     return result
 
 
-def _given(options: argparse.Namespace, kind: SimulatedType[Any]) -> dict[str, Any]:
-    """Return the settings that the command line has for all components of a type."""
-    result = {}
-    for name, setting in kind.all_settings.items():
-        if name != 'fault' and (text := getattr(options, name)) is not None:
-            with _place(f'argument --{name.replace("_", "-")}'):
-                result[name] = setting.read(text)
+def _given(options: argparse.Namespace, types: Types) -> dict[str, dict[str, Any]]:
+    """Return the settings that the command line has for all components of each type."""
+    result: dict[str, dict[str, Any]] = {one.noun: {} for one in types}
+    for name in dict.fromkeys(name for one in types for name in one.all_settings):
+        if name == 'fault' or (text := getattr(options, name)) is None:
+            continue
+        with _place(f'argument --{name.replace("_", "-")}'):
+            having = [one for one in types if name in one.all_settings]
+            for noun, value in _readings(name, text, having).items():
+                result[noun][name] = value
     return result
 
 
@@ -216,18 +234,23 @@ def _named(kind: SimulatedType[Any], text: str) -> Listed:
 
 
 def _faults(
-    texts: Sequence[str], listed: Sequence[Listed], types: Types,
+    texts: Sequence[str], listed: Mapping[str, Sequence[Listed]], types: Types,
 ) -> dict[Address, tuple[str, ...]]:
     """Return the faults of each component; ``NAME:`` in front of a fault selects one."""
-    result: dict[Address, tuple[str, ...]] = {one.address: () for one in listed}
+    result: dict[Address, tuple[str, ...]] = {
+        one.address: () for some in listed.values() for one in some}
     for text in texts:
-        selected, colon, fault = text.rpartition(':')
-        found = [one.address for one in listed
+        selected, colon, names = text.rpartition(':')
+        found = [(kind, one.address) for kind in types for one in listed[kind.noun]
                  if not colon or selected in (str(one.address), one.name)]
         if not found:
             raise SettingError(f'--fault {text}: there is no {types[0].noun} {selected!r}')
-        for where in found:
-            result[where] += (fault,)
+        kinds = {kind.noun: kind for kind, _ in found}
+        for name in names.split(','):
+            with _place('--fault'):
+                read = _readings('fault', name, list(kinds.values()))
+            for kind, where in found:
+                result[where] += read.get(kind.noun, ())
     return result
 
 

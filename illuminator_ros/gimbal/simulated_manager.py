@@ -1,0 +1,517 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A simulated gimbal with a gimbal manager of its own: one component, no messages between the two.
+
+https://mavlink.io/en/services/gimbal_v2.html, "Standalone Integrated Camera/Gimbal". Where the
+specification is open: control goes to any component that takes it; a command without control gets
+MAV_RESULT_DENIED; the angles of secondary control are added to those of primary control, up to
+:data:`NUDGE_LIMIT`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+import math
+from typing import Any, NamedTuple
+
+from . import messages as gimbal
+from .messages import Capabilities, GimbalCommand
+from .simulated_device import (
+    COMMANDS,
+    GIMBAL_FAULTS,
+    GimbalBehaviour,
+    GimbalProperties,
+    MECHANICS,
+    properties,
+    SimulatedMount,
+)
+from .simulated_motion import Range, UNSET, wrapped
+from ..mavlink.messages import (
+    Address,
+    CommandInt,
+    MAV_AUTOPILOT_ARDUPILOTMEGA,
+    MAV_COMP_ID_AUTOPILOT1,
+    MavResult,
+    Message,
+)
+from ..payload.faults import Behaviour, Fault, FaultTable
+from ..payload.mount import MountFlags, yaw_frame, YawFrame
+from ..payload.rotation import Quaternion, Vector
+from ..payload.simulated import (
+    AnyCommand,
+    Change,
+    CommandReply,
+    Reply,
+    SimulatedDevice,
+    SimulatedType,
+    Snapshot,
+)
+from ..payload.simulated_settings import integer, number, one_of, Setting
+from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+
+# s between messages with the state of the manager ("Gimbal Manager Status").
+STATUS_INTERVAL = 0.2
+# rad that secondary control may add to an angle.
+NUDGE_LIMIT = math.radians(20.0)
+# rad/s of the full rate of manual control.
+MANUAL_RATE = math.radians(30.0)
+EARTH_RADIUS = 6_371_000.0
+NOBODY = Address(0, 0)
+MAV_TYPE_QUADROTOR = 2
+MAV_AUTOPILOT_PX4 = 12
+# MAV_FRAME_GLOBAL and its _INT, whose altitude is above mean sea level; those relative to home.
+ABSOLUTE_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
+# The flags that ArduPilot reports, whatever is set.
+CONSTANT_FLAGS = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+
+
+@dataclass(frozen=True)
+class ManagerBehaviour(GimbalBehaviour):
+    """
+    How a simulated gimbal manager behaves; the defaults follow the protocol.
+
+    :param enforces_roi: whether a region of interest needs control, too.
+    :param frozen_control: whether its status shows the control of the start.
+    :param has_secondary: whether it knows secondary control.
+    :param own_is_manager: whether -2 in CONFIGURE is the manager itself, not the sender.
+    :param releases_pairs: whether -3 in CONFIGURE needs system and component id of the sender.
+    :param invalid_configure: result of CONFIGURE with values that do not exist.
+    :param rates_in_degrees: whether PITCHYAW has rates in deg/s, else in rad/s.
+    :param checks_device: whether it ignores messages for other gimbal devices.
+    :param takes_pitchyaw: whether it takes GIMBAL_MANAGER_SET_PITCHYAW.
+    :param takes_manual: whether it takes GIMBAL_MANAGER_SET_MANUAL_CONTROL.
+    :param partial_angles: result of PITCHYAW with the angle of one axis, which then changes
+        nothing; None where the axes are independent.
+    :param angles_with_rates: whether messages may have angles and rates.
+    :param frame_is_lock: whether YAW_LOCK alone tells the frame of a yaw.
+    :param shows_flags: whether its status has the flags of the setpoint.
+    """
+
+    enforces_roi: bool = True
+    frozen_control: bool = False
+    has_secondary: bool = True
+    own_is_manager: bool = False
+    releases_pairs: bool = True
+    invalid_configure: MavResult = MavResult.DENIED
+    rates_in_degrees: bool = True
+    checks_device: bool = True
+    takes_pitchyaw: bool = True
+    takes_manual: bool = True
+    partial_angles: MavResult | None = None
+    angles_with_rates: bool = True
+    frame_is_lock: bool = False
+    shows_flags: bool = True
+
+
+FAULTS = FaultTable({
+    **GIMBAL_FAULTS,
+    'stale-control': Fault('frozen_control', 'reports the control of its start'),
+})
+
+
+class Profile(NamedTuple):
+    """A gimbal manager seen in the field."""
+
+    description: str
+    behaviour: ManagerBehaviour = ManagerBehaviour()
+    address: Address = Address(1, gimbal.MAV_COMP_ID_GIMBAL)
+    lacks: Capabilities = Capabilities(0)
+
+
+PROFILES = {
+    'reference': Profile('follows the protocol, and enforces control'),
+    # input_mavlink.cpp and output_rc.cpp of src/modules/gimbal.
+    'px4': Profile(
+        'PX4 with a gimbal on its outputs: enforces primary control, knows no secondary control '
+        'and no device ids, -2 is PX4 itself, -3 compares system and component id separately, '
+        'PITCHYAW takes rates in rad/s, no SET_PITCHYAW, regions of interest from anyone',
+        ManagerBehaviour(
+            heartbeat_type=MAV_TYPE_QUADROTOR, heartbeat_autopilot=MAV_AUTOPILOT_PX4,
+            enforces_roi=False, has_secondary=False, own_is_manager=True, releases_pairs=False,
+            invalid_configure=MavResult.ACCEPTED, rates_in_degrees=False, checks_device=False,
+            takes_pitchyaw=False, partial_angles=MavResult.ACCEPTED, frame_is_lock=True),
+        Address(1, MAV_COMP_ID_AUTOPILOT1), Capabilities.HAS_RETRACT),
+    # AP_Mount.cpp and AP_Mount_Backend.cpp.
+    'ardupilot': Profile(
+        'ArduPilot with a gimbal on its outputs: records control and obeys anyone, no secondary '
+        'control, no SET_MANUAL_CONTROL, ignores angles with rates and the angle of one axis, '
+        'reports constant flags and no failures',
+        ManagerBehaviour(
+            heartbeat_type=MAV_TYPE_QUADROTOR, heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA,
+            enforces_control=False, enforces_roi=False, has_secondary=False,
+            invalid_configure=MavResult.FAILED, takes_manual=False,
+            partial_angles=MavResult.FAILED, angles_with_rates=False, frame_is_lock=True,
+            shows_flags=False, reports_earth=False, reports_failures=False),
+        Address(1, MAV_COMP_ID_AUTOPILOT1)),
+}
+
+
+class Position(NamedTuple):
+    """A place: degrees, and m above mean sea level."""
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+
+@dataclass(frozen=True)
+class ManagerProperties:
+    """
+    The properties of a simulated gimbal with a manager.
+
+    :param gimbal: the gimbal.
+    :param device_id: gimbal_device_id, 1..6 for a gimbal that is not a component of its own.
+    :param position: of the vehicle, until it sends GLOBAL_POSITION_INT.
+    :param heading: of the vehicle, until it sends ATTITUDE, rad.
+    """
+
+    gimbal: GimbalProperties = GimbalProperties(behaviour=ManagerBehaviour())
+    device_id: int = 1
+    position: Position = Position(47.397742, 8.545594, 488.0)
+    heading: float = 0.0
+
+
+class _Setpoint(NamedTuple):
+    """A setpoint of a player: the arguments of :meth:`GimbalMotion.set`."""
+
+    flags: int
+    frame: YawFrame
+    angles: Vector
+    rates: Vector
+
+
+class SimulatedManager(SimulatedDevice):
+    """
+    A simulated gimbal with a manager, without the link: see :class:`SimulatedDevice`.
+
+    :ivar primary: the component with primary control, 0/0 for none.
+    :ivar secondary: the component with secondary control, likewise.
+    """
+
+    messages = (
+        gimbal.GimbalManagerSetAttitude, gimbal.GimbalManagerSetPitchyaw,
+        gimbal.GimbalManagerSetManualControl, Attitude, GlobalPositionInt)
+    sends = (gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus,
+             GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
+    changes = frozenset(GimbalCommand)
+    faults = FAULTS
+    commands = COMMANDS
+    behaviour: ManagerBehaviour
+
+    def __init__(self, properties: ManagerProperties) -> None:
+        super().__init__(properties.gimbal.behaviour)
+        self.properties = properties
+        self._position = properties.position
+        self.restart(0.0)
+
+    def restart(self, now: float) -> None:
+        """See :meth:`SimulatedDevice.restart`; nobody has control."""
+        self.primary = self.secondary = NOBODY
+        self._roi: Position | None = None
+        self._base = UNSET
+        self.mount = SimulatedMount(self.properties.gimbal, self.properties.device_id, now)
+        self.mount.behave(self.behaviour, now)
+        self.mount.motion.take_heading(
+            0.0, 0.0, self.properties.heading, 0.0, now, math.inf)
+
+    def behave(self, behaviour: Behaviour, now: float) -> None:
+        """See :meth:`SimulatedDevice.behave`."""
+        super().behave(behaviour, now)
+        self.mount.behave(self.behaviour, now)
+
+    def streams(self) -> Mapping[int, float]:
+        """See :meth:`SimulatedDevice.streams`."""
+        return {gimbal.GimbalManagerStatus.id: STATUS_INTERVAL,
+                GimbalDeviceAttitudeStatus.id: self.properties.gimbal.status_interval}
+
+    def message(self, message_id: int, now: float) -> Message | None:
+        """See :meth:`SimulatedDevice.message`."""
+        behaviour, mount, device_id = self.behaviour, self.mount, self.properties.device_id
+        if message_id == gimbal.GimbalManagerStatus.id and behaviour.reports:
+            flags = mount.flags(behaviour) if behaviour.shows_flags else CONSTANT_FLAGS
+            control = (NOBODY, NOBODY) if behaviour.frozen_control else (
+                self.primary, self.secondary)
+            return gimbal.GimbalManagerStatus(
+                mount.uptime_ms(now), int(flags), device_id, *control[0], *control[1])
+        if message_id == gimbal.GimbalManagerInformation.id and behaviour.identifies:
+            return gimbal.GimbalManagerInformation(
+                mount.uptime_ms(now), int(mount.motion.mechanics.capabilities), device_id,
+                **mount.limits(behaviour))
+        if message_id == GimbalDeviceAttitudeStatus.id:
+            return mount.status(behaviour, now)
+        if message_id == gimbal.GimbalDeviceInformation.id:
+            return mount.information(behaviour, now)
+        return None
+
+    # Setpoints
+
+    def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
+        """See :meth:`SimulatedDevice.receive`."""
+        if isinstance(message, Attitude | GlobalPositionInt):
+            if source.system == self.properties.gimbal.address.system:
+                self._take_vehicle(message, now)
+        elif self._is_for_device(message.gimbal_device_id):
+            setpoint = self._of_message(message)
+            if setpoint is not None and self._may_control(source):
+                self._obey(source, setpoint, now)
+        return ()
+
+    def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
+        if isinstance(message, Attitude):
+            self.mount.motion.take_heading(
+                message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
+        else:
+            self._position = Position(
+                message.lat / 1e7, message.lon / 1e7, message.alt / 1000.0)
+            self._point_at_roi(now)
+
+    def _is_for_device(self, device_id: float) -> bool:
+        return device_id in (0, self.properties.device_id) or not self.behaviour.checks_device
+
+    def _may_control(self, source: Address) -> bool:
+        return not self.behaviour.enforces_control or source in (self.primary, self.secondary)
+
+    def _frame(self, flags: int) -> YawFrame:
+        frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
+        return yaw_frame(flags & ~frames if self.behaviour.frame_is_lock else flags)
+
+    def _of_message(self, message: Any) -> _Setpoint | None:
+        """Return the setpoint of a message, None if it is ignored."""
+        behaviour = self.behaviour
+        try:
+            frame = self._frame(message.flags)
+            if isinstance(message, gimbal.GimbalManagerSetAttitude):
+                angles = Quaternion(*message.q).normalized().euler() if all(
+                    map(math.isfinite, message.q)) else UNSET
+                rates = (message.angular_velocity_x, message.angular_velocity_y,
+                         message.angular_velocity_z)
+            else:
+                angles = (0.0, message.pitch, message.yaw)
+                rates = (math.nan, message.pitch_rate, message.yaw_rate)
+                if isinstance(message, gimbal.GimbalManagerSetPitchyaw):
+                    if not behaviour.takes_pitchyaw:
+                        return None
+                elif not behaviour.takes_manual:
+                    return None
+                else:
+                    angles = self._manual(message.pitch, message.yaw)
+                    rates = (math.nan, message.pitch_rate * MANUAL_RATE,
+                             message.yaw_rate * MANUAL_RATE)
+        except ValueError:
+            return None
+        if not behaviour.angles_with_rates and all(map(math.isfinite, (*angles, *rates[1:]))):
+            return None
+        return self._complete(_Setpoint(message.flags, frame, angles, rates))
+
+    def _complete(self, setpoint: _Setpoint) -> _Setpoint | None:
+        """Return a setpoint as the profile reads it, None if it is ignored."""
+        _, pitch, yaw = setpoint.angles
+        if math.isnan(pitch) and math.isnan(yaw):
+            # Roll stays level where only rates are set.
+            return setpoint._replace(angles=UNSET)
+        if (math.isnan(pitch) or math.isnan(yaw)) and self.behaviour.partial_angles is not None:
+            return None
+        return setpoint
+
+    def _manual(self, pitch: float, yaw: float) -> Vector:
+        """Return the angles of manual control, which are shares of the ranges."""
+        mechanics = self.mount.motion.mechanics
+        return (0.0, pitch * (mechanics.pitch.high if pitch > 0 else -mechanics.pitch.low),
+                yaw * (mechanics.yaw.high if yaw > 0 else -mechanics.yaw.low))
+
+    def _obey(self, source: Address, setpoint: _Setpoint, now: float) -> None:
+        if self.behaviour.enforces_control and source == self.secondary != self.primary:
+            # Nudging adds angles; a rate would move what primary control holds.
+            nudge = Range(-NUDGE_LIMIT, NUDGE_LIMIT)
+            base = [own if math.isfinite(own) else 0.0 for own in self._base]
+            angles = [own + nudge.clip(added) if math.isfinite(added) else math.nan
+                      for own, added in zip(base, setpoint.angles, strict=True)]
+            setpoint = setpoint._replace(
+                angles=(angles[0], angles[1], angles[2]), rates=UNSET)
+        else:
+            self._base = setpoint.angles
+        self._roi = None
+        self.mount.set(*setpoint, self.behaviour, now)
+
+    # Commands
+
+    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
+        """See :meth:`SimulatedDevice.execute`."""
+        first = (command.param1, command.param2, command.param3, command.param4)
+        last = ((command.x, command.y, command.z) if isinstance(command, CommandInt)
+                else (command.param5, command.param6, command.param7))
+        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
+            if not self._is_for_device(last[2]):
+                return CommandReply(MavResult.DENIED)
+            return self._pitchyaw(source, first, last[0], now)
+        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+            if not self._is_for_device(last[2]):
+                return CommandReply(MavResult.DENIED)
+            return self._configure(source, first)
+        if command.command not in self.changes:
+            return None
+        if not self._is_for_device(command.param1):
+            return CommandReply(MavResult.DENIED)
+        change: Change = partial(self._clear_roi, now)
+        if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
+            place = self._place(command, last)
+            if not isinstance(place, Position):
+                return CommandReply(place)
+            change = partial(self._set_roi, place, now)
+        allowed = not self.behaviour.enforces_roi or source == self.primary
+        return CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, change)
+
+    def _pitchyaw(
+        self, source: Address, values: tuple[float, float, float, float], flags: float,
+        now: float,
+    ) -> CommandReply:
+        pitch, yaw, pitch_rate, yaw_rate = map(math.radians, values)
+        if not self.behaviour.rates_in_degrees:
+            pitch_rate, yaw_rate = values[2:]
+        try:
+            # NaN and infinity cannot be converted: ValueError, OverflowError.
+            bits = int(flags)
+            frame = self._frame(bits)
+        except (ValueError, OverflowError):
+            return CommandReply(MavResult.DENIED)
+        complete = self._complete(_Setpoint(
+            bits, frame, (0.0, pitch, yaw), (math.nan, pitch_rate, yaw_rate)))
+        if complete is None:
+            assert self.behaviour.partial_angles is not None
+            return CommandReply(self.behaviour.partial_angles)
+        return CommandReply(
+            MavResult.ACCEPTED if self._may_control(source) else MavResult.DENIED,
+            partial(self._obey, source, complete, now))
+
+    def _configure(
+        self, source: Address, values: tuple[float, float, float, float],
+    ) -> CommandReply:
+        behaviour = self.behaviour
+        if not all(value % 1 == 0 and -3 <= value <= 255 for value in values):
+            return CommandReply(behaviour.invalid_configure)
+        primary = self._resolved(self.primary, values[:2], source)
+        secondary = self._resolved(self.secondary, values[2:], source)
+        return CommandReply(MavResult.ACCEPTED, partial(
+            self._give_control, primary, secondary if behaviour.has_secondary else NOBODY))
+
+    def _resolved(
+        self, current: Address, values: tuple[float, ...], source: Address,
+    ) -> Address:
+        """Return the component that the values of CONFIGURE give control to."""
+        own = self.properties.gimbal.address if self.behaviour.own_is_manager else source
+        result = []
+        for now_, value, itself, sender in zip(current, values, own, source, strict=True):
+            releases = current == source if self.behaviour.releases_pairs else now_ == sender
+            result.append({-1: now_, -2: itself, -3: 0 if releases else now_}.get(
+                int(value), int(value)))
+        return Address(*result)
+
+    def _give_control(self, primary: Address, secondary: Address) -> None:
+        if primary != self.primary:
+            self._base = UNSET
+        self.primary, self.secondary = primary, secondary
+
+    # Region of interest
+
+    def _place(self, command: AnyCommand, last: tuple[float, ...]) -> Position | MavResult:
+        latitude, longitude, altitude = last
+        if isinstance(command, CommandInt):
+            latitude, longitude = latitude / 1e7, longitude / 1e7
+            if command.frame in RELATIVE_FRAMES:
+                altitude += self.properties.position.altitude
+            elif command.frame not in ABSOLUTE_FRAMES:
+                return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
+        if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
+            return Position(latitude, longitude, altitude)
+        return MavResult.DENIED
+
+    def _set_roi(self, place: Position, now: float) -> None:
+        self._roi = place
+        self._point_at_roi(now)
+
+    def _clear_roi(self, now: float) -> None:
+        # "After this command the gimbal manager should ... assume a neutral position."
+        self._roi = None
+        self.mount.set(MountFlags.NEUTRAL | CONSTANT_FLAGS, YawFrame.VEHICLE, UNSET, UNSET,
+                       self.behaviour, now)
+
+    def _point_at_roi(self, now: float) -> None:
+        if self._roi is None:
+            return
+        own, place = self._position, self._roi
+        north = math.radians(place.latitude - own.latitude) * EARTH_RADIUS
+        east = (wrapped(math.radians(place.longitude - own.longitude))
+                * EARTH_RADIUS * math.cos(math.radians(own.latitude)))
+        pitch = math.atan2(place.altitude - own.altitude, math.hypot(north, east))
+        self.mount.set(CONSTANT_FLAGS | MountFlags.YAW_LOCK, YawFrame.EARTH,
+                       (0.0, pitch, math.atan2(east, north)), UNSET, self.behaviour, now)
+
+    def snapshot(self, now: float) -> Snapshot:
+        """See :meth:`SimulatedDevice.snapshot`."""
+        control = ', '.join(
+            f'{name} {one}' for name, one in (
+                ('primary', self.primary), ('secondary', self.secondary)) if one != NOBODY)
+        return self.mount.describe(
+            now, control or 'no control', 'region of interest' if self._roi else '')
+
+
+def _position(text_: str) -> Position:
+    parts = text_.split(',')
+    if len(parts) != 3:
+        raise ValueError(f'{text_!r} is not LAT,LON,ALT')
+    readers = (number(-90, 90), number(-180, 180), number(-1000, 100_000))
+    return Position(*(read(part) for read, part in zip(readers, parts, strict=True)))
+
+
+SETTINGS: dict[str, Setting] = {
+    'profile': Setting('NAME', 'a kind of manager, see below (default: reference)',
+                       one_of(PROFILES)),
+    **{name: setting for name, setting in MECHANICS.items() if name != 'drift'},
+    'device_id': Setting('ID', 'gimbal_device_id, 1 to 6 (default: 1)', integer(1, 6)),
+    'position': Setting('LAT,LON,ALT', 'of the vehicle until it sends GLOBAL_POSITION_INT, '
+                        'degrees and m above mean sea level (default: '
+                        '47.397742,8.545594,488)', _position),
+    'heading': Setting('DEG', 'of the vehicle until it sends ATTITUDE (default: 0)',
+                       number(-180, 360)),
+}
+
+
+def _profile(settings: Mapping[str, Any]) -> Profile:
+    return PROFILES[settings.get('profile', 'reference')]
+
+
+def manager_properties(settings: Mapping[str, Any], address: Address) -> ManagerProperties:
+    """Return the manager that settings describe."""
+    profile, default = _profile(settings), ManagerProperties()
+    described = properties(settings, address)
+    mechanics = replace(described.mechanics, capabilities=(
+        described.mechanics.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL)
+        & ~profile.lacks & ~settings.get('lacks', 0))
+    return replace(
+        default, gimbal=replace(described, mechanics=mechanics, behaviour=profile.behaviour),
+        device_id=settings.get('device_id', default.device_id),
+        position=settings.get('position', default.position),
+        heading=math.radians(settings.get('heading', 0.0)))
+
+
+SIMULATED = SimulatedType(
+    'manager', 'managers', SimulatedManager,
+    make=lambda settings, address, several: SimulatedManager(
+        manager_properties(settings, address)),
+    address=lambda settings: _profile(settings).address, settings=SETTINGS,
+    profiles={name: profile.description for name, profile in PROFILES.items()})

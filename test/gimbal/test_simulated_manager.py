@@ -1,0 +1,346 @@
+"""The simulated gimbal with a manager of its own, and the profiles of PX4 and ArduPilot."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from illuminator_ros.gimbal import messages as gimbal
+from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags, GimbalCommand
+from illuminator_ros.gimbal.simulated_manager import FAULTS, PROFILES, SIMULATED, SimulatedManager
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    MavCmd,
+    MavResult,
+)
+from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.vehicle import (
+    Attitude,
+    GimbalDeviceAttitudeStatus,
+    GlobalPositionInt,
+)
+import pytest
+
+NAN = math.nan
+UNSET = (NAN, NAN, NAN)
+PLAYER, OTHER, NOBODY = Address(1, 195), Address(255, 190), Address(0, 0)
+ACCEPTED, DENIED, FAILED = MavResult.ACCEPTED, MavResult.DENIED, MavResult.FAILED
+CONFIGURE, PITCHYAW = (GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE,
+                       GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW)
+ROI, ROI_NONE = GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE
+FOLLOW = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+LOCK = FOLLOW | MountFlags.YAW_LOCK
+every_profile = pytest.mark.parametrize('profile', PROFILES)
+
+
+class Bench:
+    """A simulated gimbal with a manager; angles in degrees."""
+
+    def __init__(self, profile: str = 'reference', *faults: str, taken: bool = True,
+                 **settings: object) -> None:
+        settings = {'profile': profile, **settings}
+        self.address = SIMULATED.address(settings)
+        device: SimulatedManager = SIMULATED.make(settings, self.address, False)
+        for fault in faults:
+            device.behave(FAULTS.add(device.behaviour, fault), 0.0)
+        self.now = 1000.0
+        self.endpoint = SimulatedComponents([Description(self.address, device)], self.now)
+        self.device = device
+        if taken:
+            self.take()
+
+    def command(
+        self, command: int, *params: float, source: Address = PLAYER, as_int: bool = False,
+        frame: int = 0,
+    ) -> MavResult:
+        """Send a command, and return its result."""
+        self.endpoint.outgoing.clear()
+        one, two, three, four, five, six, seven = [*params, *[0.0] * (7 - len(params))]
+        self.endpoint.receive(source, CommandInt(
+            *self.address, frame, command, 0, 0, one, two, three, four, int(five), int(six),
+            seven) if as_int else CommandLong(
+            *self.address, command, 0, one, two, three, four, five, six, seven), self.now)
+        return next(MavResult(message.result) for _, message in self.endpoint.outgoing
+                    if isinstance(message, CommandAck))
+
+    def take(self, source: Address = PLAYER, secondary: Address = NOBODY) -> MavResult:
+        return self.command(CONFIGURE, *source, *secondary, source=source)
+
+    def point(
+        self, *degrees: float, flags: int = FOLLOW, rates: tuple[float, float, float] = UNSET,
+        source: Address = PLAYER, device_id: int = 1,
+    ) -> None:
+        q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
+        self.endpoint.receive(source, gimbal.GimbalManagerSetAttitude(
+            *self.address, flags, device_id, (q.w, q.x, q.y, q.z), *rates), self.now)
+
+    def pitchyaw(
+        self, *values: float, kind: Any = gimbal.GimbalManagerSetPitchyaw,
+        source: Address = PLAYER,
+    ) -> None:
+        self.endpoint.receive(source, kind(*self.address, FOLLOW, 1, *values), self.now)
+
+    def vehicle(self, heading: float) -> None:
+        self.endpoint.receive(Address(1, 1), Attitude(
+            0, 0.0, 0.0, math.radians(heading), 0.0, 0.0, 0.0), self.now)
+
+    def message(self, cls: Any) -> Any:
+        return self.device.message(cls.id, self.now)
+
+    @property
+    def control(self) -> tuple[int, ...]:
+        status = self.message(gimbal.GimbalManagerStatus)
+        return (status.primary_control_sysid, status.primary_control_compid,
+                status.secondary_control_sysid, status.secondary_control_compid)
+
+    def angles(self, seconds: float = 5.0) -> tuple[float, ...]:
+        """Let time pass, and return roll, pitch and yaw as they are reported."""
+        self.now += seconds
+        euler = Quaternion(*self.message(GimbalDeviceAttitudeStatus).q).euler()
+        return tuple(round(math.degrees(angle), 3) + 0.0 for angle in euler)
+
+
+@every_profile
+def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: str) -> None:
+    bench = Bench(profile)
+    assert dict(bench.device.streams()) == {281: 0.2, 285: 0.1}
+    information = bench.message(gimbal.GimbalManagerInformation)
+    assert information.gimbal_device_id == 1
+    assert information.cap_flags & Capabilities.CAN_POINT_LOCATION_GLOBAL
+    assert bool(information.cap_flags & Capabilities.HAS_RETRACT) is (profile != 'px4')
+    assert bench.message(GimbalDeviceAttitudeStatus).gimbal_device_id == 1
+    assert bench.message(gimbal.GimbalDeviceInformation).gimbal_device_id == 1
+    assert bench.command(MavCmd.REQUEST_MESSAGE, 280) == ACCEPTED
+
+
+# Control
+
+@pytest.mark.parametrize(('profile', 'values', 'result', 'control'), [
+    ('reference', (255, 190, 1, 195), ACCEPTED, (255, 190, 1, 195)),
+    ('reference', (-1, -1, 255, 190), ACCEPTED, (1, 195, 255, 190)),
+    ('reference', (-3, -3, -3, -3), ACCEPTED, (1, 195, 0, 0)),
+    ('reference', (-2, -2, -1, -1), ACCEPTED, (255, 190, 0, 0)),
+    ('reference', (0, 0, 0, 0), ACCEPTED, (0, 0, 0, 0)),
+    *(('reference', (value, 190, 0, 0), DENIED, (1, 195, 0, 0))
+      for value in (-4, 256, 0.5, NAN, math.inf)),
+    ('px4', (255, 190, 1, 195), ACCEPTED, (255, 190, 0, 0)),
+    ('px4', (-2, -2, -2, -2), ACCEPTED, (1, 1, 0, 0)),
+    ('px4', (-4, 256, 0, 0), ACCEPTED, (1, 195, 0, 0)),
+    ('ardupilot', (255, 190, 1, 195), ACCEPTED, (255, 190, 0, 0)),
+    ('ardupilot', (-2, -2, -2, -2), ACCEPTED, (255, 190, 0, 0)),
+    ('ardupilot', (-4, 256, 0, 0), FAILED, (1, 195, 0, 0))])
+def test_configure_gives_control_as_the_status_shows(
+        profile: str, values: tuple[float, ...], result: MavResult, control: tuple[int, ...],
+) -> None:
+    bench = Bench(profile)
+    assert bench.command(CONFIGURE, *values, source=OTHER) == result
+    assert bench.control == control
+
+
+def test_px4_releases_the_component_id_of_a_sender_in_another_system() -> None:
+    for profile, control in (('px4', (1, 0, 0, 0)), ('reference', (1, 195, 0, 0)),
+                             ('ardupilot', (1, 195, 0, 0))):
+        bench = Bench(profile)
+        bench.command(CONFIGURE, -3, -3, -3, -3, source=Address(9, 195))
+        assert bench.control == control
+
+
+@pytest.mark.parametrize(('profile', 'moved', 'result', 'roi'), [
+    ('reference', False, DENIED, DENIED), ('px4', False, DENIED, ACCEPTED),
+    ('ardupilot', True, ACCEPTED, ACCEPTED)])
+def test_a_component_without_control_moves_it_only_where_the_profile_lets_it(
+        profile: str, moved: bool, result: MavResult, roi: MavResult) -> None:
+    bench = Bench(profile)
+    bench.point(0.0, -20.0, 30.0, source=OTHER)
+    assert bench.angles() == ((0.0, -20.0, 30.0) if moved else (0.0, 0.0, 0.0))
+    assert bench.command(PITCHYAW, -10.0, 10.0, NAN, NAN, FOLLOW, source=OTHER) == result
+    assert bench.angles() == ((0.0, -10.0, 10.0) if moved else (0.0, 0.0, 0.0))
+    assert bench.command(ROI, 0, 0, 0, 0, 47.4, 8.55, 488.0, source=OTHER) == roi
+
+
+@every_profile
+def test_nobody_in_control_means_that_only_ardupilot_obeys(profile: str) -> None:
+    bench = Bench(profile, taken=False)
+    result = bench.command(PITCHYAW, -10.0, 0.0, NAN, NAN, FOLLOW)
+    assert result == (ACCEPTED if profile == 'ardupilot' else DENIED)
+
+
+def test_gm_9_secondary_control_adds_limited_angles() -> None:
+    bench = Bench()
+    bench.take(PLAYER, OTHER)
+    bench.point(0.0, -30.0, 10.0)
+    bench.point(0.0, -5.0, 90.0, source=OTHER)
+    assert bench.angles() == (0.0, -35.0, 30.0)
+    bench.point(0.0, -40.0, 0.0)
+    assert bench.angles() == (0.0, -40.0, 0.0)
+
+
+# Setpoints
+
+@pytest.mark.parametrize(('profile', 'kind', 'values', 'degrees'), [
+    *((profile, PITCHYAW, (-20.0, 30.0, NAN, NAN), (0.0, -20.0, 30.0)) for profile in PROFILES),
+    ('reference', PITCHYAW, (NAN, NAN, -2.0, 1.0), (0.0, -10.0, 5.0)),
+    ('ardupilot', PITCHYAW, (NAN, NAN, -2.0, 1.0), (0.0, -10.0, 5.0)),
+    # PX4 reads 0.1 deg/s as 0.1 rad/s.
+    ('px4', PITCHYAW, (NAN, NAN, -0.1, NAN), (0.0, -28.648, 0.0)),
+    ('reference', PITCHYAW, (NAN, 30.0, NAN, NAN), (0.0, 0.0, 30.0)),
+    ('px4', PITCHYAW, (NAN, 30.0, NAN, NAN), (0.0, 0.0, 0.0)),
+    ('ardupilot', PITCHYAW, (NAN, 30.0, NAN, NAN), (0.0, 0.0, 0.0)),
+    ('reference', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, NAN, NAN), (0.0, -11.459, 5.73)),
+    ('px4', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, NAN, NAN), (0.0, 0.0, 0.0)),
+    ('reference', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, 0.01, 0.01), (0.0, -2.865, 2.865)),
+    ('ardupilot', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, 0.01, 0.01), (0.0, 0.0, 0.0)),
+    ('ardupilot', gimbal.GimbalManagerSetPitchyaw, (NAN, NAN, -0.02, 0.01), (0.0, -5.73, 2.865)),
+    ('reference', gimbal.GimbalManagerSetManualControl, (-0.5, 0.1, NAN, NAN), (0, -60.0, 17.0)),
+    ('reference', gimbal.GimbalManagerSetManualControl, (NAN, NAN, -0.1, 0.0), (0, -15.0, 0.0)),
+    ('ardupilot', gimbal.GimbalManagerSetManualControl, (NAN, NAN, -0.1, 0.0), (0, 0.0, 0.0))])
+def test_a_setpoint_moves_it_as_the_profile_reads_it(
+        profile: str, kind: Any, values: tuple[float, ...], degrees: tuple[float, ...]) -> None:
+    bench = Bench(profile)
+    if kind is PITCHYAW:
+        bench.command(PITCHYAW, *values, float(FOLLOW))
+    else:
+        bench.pitchyaw(*values, kind=kind)
+    assert bench.angles() == degrees
+
+
+@pytest.mark.parametrize(('profile', 'flags', 'yaw'), [
+    ('reference', FOLLOW | YawFrame.EARTH.flag, 30.0), ('reference', LOCK, 30.0),
+    ('reference', FOLLOW, 30.0), ('px4', FOLLOW | YawFrame.EARTH.flag, 30.0),
+    ('px4', LOCK, 30.0), ('ardupilot', LOCK, -10.0)])
+def test_gm_2_the_flags_tell_the_frame_of_a_yaw(profile: str, flags: int, yaw: float) -> None:
+    bench = Bench(profile, heading=40.0)
+    bench.point(0.0, 0.0, 30.0, flags=flags)
+    status = bench.message(GimbalDeviceAttitudeStatus)
+    assert math.degrees(status.delta_yaw) == pytest.approx(40.0)
+    assert bench.angles() == (0.0, 0.0, yaw)
+    frame = bench.message(GimbalDeviceAttitudeStatus).flags & 96
+    earth = profile == 'reference' and flags != FOLLOW or profile == 'px4' and flags == LOCK
+    assert frame == (YawFrame.EARTH if earth else YawFrame.VEHICLE).flag
+
+
+@every_profile
+def test_a_locked_yaw_follows_the_attitude_of_the_vehicle(profile: str) -> None:
+    bench = Bench(profile)
+    bench.point(0.0, 0.0, 30.0, flags=LOCK)
+    bench.angles()
+    bench.vehicle(20.0)
+    assert bench.angles() == (0.0, 0.0, 10.0 if profile == 'ardupilot' else 30.0)
+    assert math.degrees(bench.device.mount.motion.angles[2]) == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(('profile', 'shown'), [
+    ('reference', FOLLOW | MountFlags.NEUTRAL), ('px4', FOLLOW | MountFlags.NEUTRAL),
+    ('ardupilot', FOLLOW)])
+def test_the_status_shows_the_flags_except_of_ardupilot(profile: str, shown: int) -> None:
+    bench = Bench(profile)
+    bench.point(0.0, -30.0, 0.0, flags=FOLLOW | MountFlags.NEUTRAL)
+    assert bench.message(gimbal.GimbalManagerStatus).flags == shown
+    assert bench.angles() == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(('profile', 'flags'), [
+    ('reference', ErrorFlags.AT_PITCH_LIMIT), ('ardupilot', 0)])
+def test_ardupilot_reports_no_failures(profile: str, flags: int) -> None:
+    bench = Bench(profile)
+    bench.point(0.0, 60.0, 0.0)
+    assert bench.angles() == (0.0, 45.0, 0.0)
+    assert bench.message(GimbalDeviceAttitudeStatus).failure_flags == flags
+
+
+@every_profile
+def test_gm_28_a_message_for_another_device_is_ignored_except_by_px4(profile: str) -> None:
+    bench = Bench(profile)
+    bench.point(0.0, -20.0, 0.0, device_id=2)
+    ignored = profile != 'px4'
+    assert bench.angles() == (0.0, 0.0 if ignored else -20.0, 0.0)
+    assert (bench.command(PITCHYAW, -10, 0, NAN, NAN, 0, 0, 2) != ACCEPTED) is ignored
+    assert (bench.command(CONFIGURE, 0, 0, 0, 0, 0, 0, 2) != ACCEPTED) is ignored
+    bench.take()
+    bench.point(0.0, -15.0, 0.0, device_id=0)
+    assert bench.angles() == (0.0, -15.0, 0.0)
+
+
+# Region of interest
+
+@pytest.mark.parametrize(('place', 'frame', 'degrees'), [
+    ((47.397742 + 0.001, 8.545594, 488.0), 0, (0.0, 0.0, 0.0)),
+    ((47.397742, 8.545594 + 0.001, 488.0 - 75.265), 0, (0.0, -45.0, 90.0)),
+    ((47.397742 - 0.001, 8.545594, -111.195), 3, (0.0, -45.0, 180.0))])
+def test_gm_8_the_manager_computes_the_direction_of_a_place(
+        place: tuple[float, float, float], frame: int, degrees: tuple[float, ...]) -> None:
+    bench = Bench(heading=90.0)
+    latitude, longitude, altitude = place
+    assert bench.command(
+        ROI, 1, 0, 0, 0, round(latitude * 1e7), round(longitude * 1e7), altitude, as_int=True,
+        frame=frame) == ACCEPTED
+    assert bench.angles() == pytest.approx(degrees, abs=0.01)
+    assert bench.command(ROI_NONE, 1) == ACCEPTED
+    assert bench.angles() == (0.0, 0.0, 0.0)
+
+
+def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_next_setpoint(
+        ) -> None:
+    bench = Bench()
+    bench.command(ROI, 0, 0, 0, 0, 47.398742, 8.545594, 488.0)
+    moved = GlobalPositionInt(0, 473987420, 85455940 - 10000, 488000, 0, 0, 0, 0, 0)
+    bench.endpoint.receive(Address(2, 1), moved, bench.now)
+    assert bench.angles() == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+    bench.endpoint.receive(Address(1, 1), moved, bench.now)
+    assert bench.angles() == pytest.approx((0.0, 0.0, 90.0), abs=0.01)
+    bench.point(0.0, -10.0, 0.0)
+    bench.endpoint.receive(Address(1, 1), moved, bench.now)
+    assert bench.angles() == (0.0, -10.0, 0.0)
+
+
+@pytest.mark.parametrize(('params', 'frame', 'result'), [
+    ((1, 0, 0, 0, 910000000, 0, 0), 0, DENIED), ((1, 0, 0, 0, 0, 0, NAN), 0, DENIED),
+    ((1, 0, 0, 0, 0, 0, 0), 10, MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
+    ((3, 0, 0, 0, 0, 0, 0), 0, DENIED)])
+def test_a_place_that_does_not_exist_is_refused(
+        params: tuple[float, ...], frame: int, result: MavResult) -> None:
+    assert Bench().command(ROI, *params, as_int=True, frame=frame) == result
+
+
+# Faults and people
+
+@pytest.mark.parametrize(('fault', 'control', 'pitch'), [
+    ('stale-control', (0, 0, 0, 0), -20.0), ('lie', (0, 0, 0, 0), 0.0),
+    ('refuse', (0, 0, 0, 0), 0.0), ('frozen-axis', (1, 195, 0, 0), 0.0)])
+def test_a_fault_changes_what_is_reported_or_done(
+        fault: str, control: tuple[int, ...], pitch: float) -> None:
+    bench = Bench('reference', fault)
+    bench.point(0.0, -20.0, 0.0)
+    assert bench.control == control
+    assert bench.angles()[1] == pitch
+
+
+def test_a_gimbal_without_status_sends_none() -> None:
+    bench = Bench('reference', 'no-status')
+    assert bench.message(gimbal.GimbalManagerStatus) is None
+    assert bench.message(GimbalDeviceAttitudeStatus) is None
+
+
+@pytest.mark.parametrize('flags', [NAN, math.inf, 96.0])
+def test_impossible_flags_are_denied(flags: float) -> None:
+    assert Bench().command(PITCHYAW, -10, 0, NAN, NAN, flags) == DENIED
+
+
+def test_a_person_sees_who_has_control() -> None:
+    bench = Bench()
+    bench.take(PLAYER, OTHER)
+    assert bench.device.snapshot(bench.now).text == (
+        'roll    0.0  pitch    0.0  yaw    0.0 deg  primary 1/195, secondary 255/190')
+    bench.command(ROI, 0, 0, 0, 0, 47.4, 8.545594, 488.0)
+    assert bench.device.snapshot(bench.now).text.endswith('region of interest')
+
+
+@pytest.mark.parametrize('text', ['47,8', '91,0,0', 'a,b,c'])
+def test_a_wrong_position_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r'LAT,LON,ALT|outside|not a number'):
+        SIMULATED.settings['position'].read(text)
