@@ -36,6 +36,7 @@ from .manager_setpoint import (
     direction,
     GeoPoint,
     GimbalModel,
+    in_vehicle_frame,
     mix,
     nudge,
     Range,
@@ -156,13 +157,19 @@ class AddressShared:
 
 
 @dataclass(frozen=True)
-class PositionLost:
-    """The gimbal cannot follow its region of interest: the vehicle's position is unknown."""
+class ReferenceLost:
+    """
+    The gimbal does not follow its region of interest, or north.
+
+    :param unknown: of the vehicle: ``position`` or ``heading``.
+    """
+
+    unknown: str
 
 
 ManagerEvent: TypeAlias = (
     StateChanged | ControlChanged | DemandRefused | SetpointClipped | SetpointSent
-    | AttitudeReceived | InformationReceived | AddressShared | PositionLost)
+    | AttitudeReceived | InformationReceived | AddressShared | ReferenceLost)
 
 
 class GimbalManager(Payload):
@@ -417,8 +424,7 @@ class GimbalManager(Payload):
             return f'the gimbal does not have {lacking.name}'
         current = self._pointing(demand.frame, now)
         if (current is None and not demand.is_complete) or (
-                self._heading(now) is None
-                and not self.model.accepts(demand.frame, demand.flags)):
+                self._heading(now) is None and not self._accepts(demand.frame, now)):
             return 'the heading of the vehicle is unknown'
         self._place = None
         self._setpoint = resolve(
@@ -445,6 +451,10 @@ class GimbalManager(Payload):
             return Quaternion()
         return None if heading is None else turned_by(Quaternion(), heading)
 
+    def _accepts(self, frame: YawFrame, now: float) -> bool:
+        status = self._device_status(now)
+        return self.model.accepts(frame, status.flags if status else None)
+
     def _device_status(self, now: float) -> GimbalDeviceAttitudeStatus | None:
         return self._status if now < self._status_at + ATTITUDE_AGE else None
 
@@ -465,22 +475,29 @@ class GimbalManager(Payload):
         if setpoint is None or self.state is not ManagerState.ACTIVE:
             self._send_due = math.inf
             return
-        attitude, frame, heading = setpoint.at(now), setpoint.frame, self._heading(now)
-        converts = not self.model.accepts(frame, setpoint.flags)
+        converts = not self._accepts(setpoint.frame, now)
+        follows = any(setpoint.turning) or self._place is not None or converts
+        self._send_due = now + (FOLLOW_INTERVAL if follows else HOLD_INTERVAL)
+        attitude, heading = setpoint.at(now), self._heading(now)
         if attitude is not None:
             attitude, clipped = clip(
                 mix(attitude, self._offsets), self.model.ranges,
-                0.0 if frame is YawFrame.VEHICLE else heading)
+                0.0 if setpoint.frame is YawFrame.VEHICLE else heading)
             if clipped and self._limit('clipped').take(now) is not None:
                 self.events.emit(SetpointClipped(tuple(clipped)))
-            if converts and heading is not None:
-                attitude, frame = turned_by(attitude, -heading), YawFrame.VEHICLE
-        sent = replace(setpoint, attitude=attitude, frame=frame, turning=STILL)
+        sent = replace(setpoint, attitude=attitude, turning=STILL)
+        if converts:
+            if heading is None:
+                self._lose('heading', now)
+                return
+            sent = in_vehicle_frame(sent, heading)
         if self.device is not None:
             self._commands.send(_device_message(self.device, sent))
         self.events.emit(SetpointSent(sent))
-        follows = any(setpoint.turning) or self._place is not None or converts
-        self._send_due = now + (FOLLOW_INTERVAL if follows else HOLD_INTERVAL)
+
+    def _lose(self, reference: str, now: float) -> None:
+        if self._limit(reference).take(now) is not None:
+            self.events.emit(ReferenceLost(reference))
 
     # A region of interest
 
@@ -499,7 +516,7 @@ class GimbalManager(Payload):
         above = 0.0 if frame in GLOBAL_FRAMES else self.vehicle.home_altitude
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
-                and not self.model.accepts(YawFrame.EARTH, self._place_flags())):
+                and not self._accepts(YawFrame.EARTH, now)):
             return MavResult.TEMPORARILY_REJECTED
         self._place = GeoPoint(latitude, longitude, altitude + above)
         self._follow(now)
@@ -523,8 +540,7 @@ class GimbalManager(Payload):
         if self._place is not None:
             position = self.vehicle.position(now)
             if position is None:
-                if self._limit('position').take(now) is not None:
-                    self.events.emit(PositionLost())
+                self._lose('position', now)
             elif (angles := direction(position, self._place)) is not None:
                 self._setpoint = Setpoint(
                     self._place_flags(), YawFrame.EARTH, Quaternion.from_euler(0.0, *angles),

@@ -33,7 +33,7 @@ from .messages import (
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
 )
-from ..payload.mount import Components, MountFlags, yaw_frame, YawFrame
+from ..payload.mount import Components, MountFlags, names_frame, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 AXES = ('roll', 'pitch', 'yaw')
@@ -101,7 +101,7 @@ class GimbalModel:
         flags = (Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_LOCK,
                  Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_PITCH_LOCK,
                  Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_FOLLOW
-                 | Capabilities.HAS_YAW_LOCK | Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+                 | Capabilities.HAS_YAW_LOCK)
         capabilities = Capabilities.HAS_NEUTRAL
         for range_, flag in zip(ranges, flags, strict=True):
             capabilities |= Capabilities(0) if range_.is_fixed else flag
@@ -115,11 +115,17 @@ class GimbalModel:
                 lacking |= flag
         return lacking
 
-    def accepts(self, frame: YawFrame, flags: MountFlags) -> bool:
-        """Return whether the gimbal can be given a yaw that is relative to a frame."""
-        return (frame is YawFrame.VEHICLE or not self.capabilities
-                or bool(self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
-                or bool(flags & MountFlags.YAW_LOCK))
+    def accepts(self, frame: YawFrame, reported: int | None) -> bool:
+        """
+        Return whether the gimbal can be given a yaw that is relative to a frame.
+
+        :param reported: the flags that the device reports now, None if it does not.
+        """
+        if frame is YawFrame.VEHICLE or not self.capabilities:
+            return True
+        if reported is not None and names_frame(reported):
+            return bool(reported & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)
+        return bool(self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
 @dataclass(frozen=True)
@@ -351,6 +357,13 @@ def _nearest(angle: float, range_: Range) -> float:
     """Return the angle, or the same direction a turn away, that is nearest to a range."""
     return min((angle, angle + 2 * math.pi, angle - 2 * math.pi),
                key=lambda one: max(range_.low - one, one - range_.high, 0.0))
+
+
+def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:
+    """Return a setpoint with its yaw relative to the vehicle instead of north."""
+    return replace(
+        setpoint, frame=YawFrame.VEHICLE, flags=setpoint.flags & ~MountFlags.YAW_LOCK,
+        attitude=setpoint.attitude and turned_by(setpoint.attitude, -heading))
 
 
 def turned_by(attitude: Quaternion, yaw: float) -> Quaternion:

@@ -226,6 +226,10 @@ class Link:
             status.openings, self._router.peer_count(now), self._traffic.snapshot(now),
             copy.copy(self._receiver.counters), copy.copy(self._signing.counters))
 
+    def way_count(self, source: Address, now: float) -> int:
+        """Return over how many peers a component is heard, which may be several senders."""
+        return self._router.way_count(source, now)
+
     def reset_loss(self, source: Address) -> None:
         """Forget recent losses of a component: its sequence numbers have restarted."""
         if counter := self._traffic.sources.get(source):

@@ -53,6 +53,10 @@ class RoutingTable:
         return len({peer for ways in self._ways.values()
                     for peer, heard in ways.items() if now - heard <= EXPIRY})
 
+    def way_count(self, source: Address, now: float) -> int:
+        """Return over how many peers a component is heard."""
+        return sum(now - heard <= EXPIRY for heard in self._ways.get(source, {}).values())
+
     def heard(self, source: Address, peer: Peer, now: float) -> None:
         """Note that a component was heard over a peer."""
         ways = self._ways.get(source)

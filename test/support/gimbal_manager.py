@@ -111,12 +111,19 @@ class ManagerRig:
                 self._device_due = self.now + 0.5
                 if self.device_is_there:
                     self.component.receive(DEVICE, heartbeat(MAV_TYPE_GIMBAL), self.now)
-                    self.component.receive(
-                        DEVICE, attitude_status(heading=self.heading), self.now)
+                    self.report()
                 each()
             self.component.poll(self.now)
             self._flush()
         self.now = until
+
+    def report(self, q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)) -> None:
+        """Let the device report its attitude, and whether it knows where north is."""
+        north = self.device_information.cap_flags & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
+        flags = MountFlags.YAW_IN_VEHICLE_FRAME | (
+            MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME if north else MountFlags(0))
+        self.component.receive(
+            DEVICE, attitude_status(q, flags=flags, heading=self.heading), self.now)
 
     def give(self, source: Address, *messages: Message) -> list[Any]:
         """Return what the manager sends when it receives messages."""
