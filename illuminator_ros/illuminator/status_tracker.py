@@ -126,11 +126,11 @@ class SendingTimes:
     """
 
     def __init__(self) -> None:
-        self._uptime_ms: int | None = None
+        self._last: Status | None = None
         # Without wraps, from the first status on.
         self._running_ms = 0
-        # The uptimes differ by multiples of this, 0 means no clock; and whether several statuses
-        # had the same: the light counts in such steps, and not only sends at such intervals.
+        # The uptimes differ by multiples of this, 0 means no clock; and whether different
+        # statuses had the same: the light counts in such steps, and not only sends so often.
         self._step_ms = 0
         self._has_repeated = False
         # The least difference between our clock and the uptime, s, in this half of the time for
@@ -138,19 +138,19 @@ class SendingTimes:
         self._least = self._least_before = math.inf
         self._half_ends = -math.inf
 
-    def take(self, uptime_ms: int, now: float) -> tuple[float, bool]:
+    def take(self, status: Status, now: float) -> tuple[float, bool]:
         """
         Return the latest time at which a status that has just come can have been sent, s.
 
         The second value tells whether the uptimes show that. Where the light has no clock, or
         there is nothing to compare with, the status counts as sent when it came.
         """
-        if self._uptime_ms is not None:
-            ahead_ms = uptime_difference(uptime_ms, self._uptime_ms)
+        if self._last is not None:
+            ahead_ms = uptime_difference(status.uptime_ms, self._last.uptime_ms)
             self._running_ms += ahead_ms
-            self._has_repeated |= not ahead_ms
+            self._has_repeated |= not ahead_ms and status != self._last
             self._step_ms = math.gcd(self._step_ms, ahead_ms)
-        self._uptime_ms = uptime_ms
+        self._last = status
         if now >= self._half_ends:
             is_next = now < self._half_ends + COMPARED_TIME / 2
             self._least_before = self._least if is_next else math.inf
@@ -351,7 +351,7 @@ class StatusTracker:
         restarted = meaning is Uptime.RESTARTED or meaning is Uptime.NO_CLOCK and was_lost
         if restarted:
             self._sending_times = SendingTimes()
-        sent_by, is_told = self._sending_times.take(status.uptime_ms, now)
+        sent_by, is_told = self._sending_times.take(status, now)
         sender = conflict.sender
         return Report(status, sent_by, is_told, sender=sender,
                       senders=frozenset((sender,))), restarted

@@ -38,6 +38,11 @@ ON: Fields = {'enable': 1}
 DIM: Fields = {'brightness': 20.0}
 
 
+def status(uptime_ms: int, fields: Fields = {}) -> Status:  # noqa: B006 - it is not changed
+    """Return a status."""
+    return Status.from_message(status_message(uptime_ms, **fields))
+
+
 # Uptimes
 
 def meanings(*statuses: tuple[int, float]) -> list[Uptime]:
@@ -127,13 +132,16 @@ def test_a_clock_that_is_a_little_wrong_shows_no_restart(drift: float, interval:
     ([(5000, 100.0), (6000, 101.0), (7000, 102.9)], 102.001, True),
     # Without a clock the time of arrival counts; with one in seconds, that and the second.
     ([(7, 100.0), (7, 101.0), (7, 107.0)], 107.0, False),
-    ([(5000, 100.2), (5000, 100.9), (6000, 101.3), (7000, 103.8)], 103.2, False),
+    ([(5000, 100.2), (5000, 100.9, ON), (6000, 101.3), (7000, 103.8)], 103.2, False),
+    # A repeated frame does not show that the clock counts in seconds.
+    ([(5000, 100.0), (5000, 100.9), (6000, 101.0), (7000, 102.9)], 102.001, True),
 ])
 def test_the_sending_time_of_a_delayed_status_follows_from_its_uptime(
-    statuses: list[tuple[int, float]], sent_by: float, is_told: bool,
+    statuses: list[tuple[Any, ...]], sent_by: float, is_told: bool,
 ) -> None:
     times = SendingTimes()
-    by, told = [times.take(*one) for one in statuses][-1]
+    by, told = [times.take(status(uptime, *fields), at)
+                for uptime, at, *fields in statuses][-1]
     assert by == pytest.approx(sent_by)
     assert told is is_told
 
@@ -156,7 +164,7 @@ def test_a_status_is_taken_neither_for_newer_than_it_is_nor_for_older_where_the_
         if sent_at >= newest:
             newest = sent_at
             uptime = int((sent_at - boot) * rate * 1000 / step_ms) * step_ms
-            sent_by, is_told = times.take(uptime % WRAP_MS, at)
+            sent_by, is_told = times.take(status(uptime % WRAP_MS), at)
             # At first all may have been delayed.
             if sent_at > 110.0:
                 assert is_told
@@ -181,7 +189,7 @@ class Observed:
             self.now += 1.0
             uptime = int((self.now - starts[number % len(starts)] - late) * 1000) % WRAP_MS
             self.conflict.take(
-                Status.from_message(status_message(uptime * has_clock, **fields)), self.now,
+                status(int(uptime * has_clock), fields), self.now,
                 commanded=commanded)
         return self.conflict
 
