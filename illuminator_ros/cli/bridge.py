@@ -23,7 +23,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-import json
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -76,6 +75,8 @@ def usage(executable: Executable) -> str:
 
     def row(spec: ParameterSpec, default: str) -> str:
         limits = f'{spec.shown_range} {spec.unit}'.strip()
+        if default and spec.unit:
+            default += f' {spec.unit}'
         return (f'  {spec.name:22} {default:27} {spec.description}'
                 + (f' ({limits})' if limits else ''))
 
@@ -96,6 +97,9 @@ examples:
   ros2 run illuminator_ros {name} --ros-args -p connection_url:=udpin://0.0.0.0:14550
 
 {examples}
+
+--ros-args --log-level debug shows each message on the link in the log, and
+--log-level {kind.node_name}:=debug those of one node and its device.
 
 parameters that are fixed at the start, with their defaults:
 {fixed}
@@ -133,7 +137,7 @@ gimbal_manager = partial(main, payload='gimbal_manager')
 
 
 def _run(arguments: list[str], termination: Termination, executable: Executable) -> int:
-    own = arguments
+    own = list(arguments)
     if '--ros-args' in arguments:
         # Slow to import, as all else that is imported in a function here.
         from rclpy.utilities import remove_ros_args
@@ -148,19 +152,18 @@ def _run(arguments: list[str], termination: Termination, executable: Executable)
         from .. import __version__
         print(__version__)
         return 0
-    if own and not own[0].startswith('-'):
-        url = own.pop(0)
-        # In double quotes: the value is YAML.
-        arguments = [*(argument for argument in arguments if argument != url),
-                     '--ros-args', '-p', f'connection_url:={json.dumps(url)}']
+    url = own.pop(0) if own and not own[0].startswith('-') else ''
     if own:
         return executable.refuse(
             f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
             f'{executable.name} --help')
-    return _serve(arguments, termination, executable)
+    arguments = [argument for argument in arguments if argument != url]
+    return _serve(arguments, url, termination, executable)
 
 
-def _serve(arguments: list[str], termination: Termination, executable: Executable) -> int:
+def _serve(
+    arguments: list[str], url: str, termination: Termination, executable: Executable,
+) -> int:
     import gc
 
     import rclpy
@@ -186,7 +189,7 @@ def _serve(arguments: list[str], termination: Termination, executable: Executabl
         node = PayloadNode(executable.load().node_name)
         # Such as two topics with one name.
         failed = 'cannot create the node'
-        bridge = Bridge(node, arguments, executable.payloads, executable.payload)
+        bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
     except ParameterError as error:
         return executable.refuse(f'parameter {error}')
     except Exception as error:

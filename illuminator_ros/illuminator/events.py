@@ -211,7 +211,7 @@ class AutomaticSwitch(LightEvent):
 @dataclass(frozen=True)
 class LightSwitched(LightEvent):
     """
-    A light was switched on or off.
+    A light was switched on or off, which it was not before.
 
     :param detail: how it was asked for, such as ``service``; '' for another sender.
     :param left_out: as for :class:`ConfigurationChanged`.

@@ -430,10 +430,14 @@ class Light:
         if wish.brightness is not None:
             self._configuration.set_brightness(wish.brightness, now)
 
-    def _switch(self, on: bool, now: float, done: Done, detail: str) -> None:
+    def _switch(self, on: bool, now: float, done: Done, detail: str | None) -> None:
+        """Submit a request; ``detail`` is None where its caller reports the change itself."""
         change = Switch(on, self.instance)
+        was_on: bool | None = None
 
         def prepare(now: float) -> Change[Status]:
+            nonlocal was_on
+            was_on = self._enabled
             self._last_switch = on, now
             self._late_until = now + LATE_TIME
             return change
@@ -445,7 +449,7 @@ class Light:
                 self._enabled = on
                 self._late_until = -math.inf
             done(result, now)
-            if result.success:
+            if result.success and was_on is not on and detail is not None:
                 self._emit(events.LightSwitched(self.address, on, events.Origin.REQUEST, detail))
 
         request = Request(
@@ -513,7 +517,7 @@ class Light:
         self.cancel(now)
         self._sources = None
         if self._can_reach(now, done):
-            self._switch(False, now, done, 'shutdown')
+            self._switch(False, now, done, None)
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""

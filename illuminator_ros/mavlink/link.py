@@ -70,7 +70,7 @@ FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
 
 _log = logging.getLogger(__name__)
-# Each frame in a line, at DEBUG.
+# Each frame in a line, at DEBUG, with the ``address`` of the other component.
 _frame_log = logging.getLogger('illuminator_ros')
 
 
@@ -362,7 +362,8 @@ class Link:
             self._work_pending = True
             message = decode_payload(cls, frame.payload)
             if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('received from %s: %s', frame.source, message)
+                _frame_log.debug('received from %s: %s', frame.source, message,
+                                 extra={'address': frame.source})
             self._safe_call(self.endpoint.receive, frame.source, message, now)
 
     def _heard(
@@ -444,7 +445,9 @@ class Link:
             self._log_fault()
         else:
             if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('sent from %s: %s', source, message)
+                to = Address(*(getattr(message, f'target_{part}', 0)
+                               for part in ('system', 'component')))
+                _frame_log.debug('sent from %s: %s', source, message, extra={'address': to})
 
     def _send(self, channel: Channel, frames: list[bytes], peers: Sequence[Peer]) -> None:
         now = self.clock()

@@ -95,6 +95,13 @@ class Message:
     base_size: ClassVar[int]
     codec: ClassVar[_Codec]
 
+    def __str__(self) -> str:
+        """Return the message in a line, for people."""
+        is_command = isinstance(self, CommandLong | CommandInt | CommandAck)
+        return ' '.join((self.name, *(
+            f'{field.name}={_shown(field.name if is_command else "", getattr(self, field.name))}'
+            for field in fields(self))))  # type: ignore[arg-type]
+
 
 M = TypeVar('M', bound=Message)
 # Every message that can be checked, by message id.
@@ -228,6 +235,24 @@ def result_name(result: int) -> str:
         return f'MAV_RESULT_{MavResult(result).name}'
     except ValueError:
         return f'MAV_RESULT {result} (unknown)'
+
+
+def command_name(command: int) -> str:
+    """Return the name of a MAV_CMD that this package knows; any int is accepted."""
+    try:
+        return f'MAV_CMD_{MavCmd(command).name}'
+    except ValueError:
+        return f'MAV_CMD {command}'
+
+
+def _shown(name: str, value: object) -> str:
+    """Return the value of a field for people; the name is that of a field of a command."""
+    if isinstance(value, bytes):
+        return repr(value.partition(b'\0')[0].decode(errors='replace'))
+    if isinstance(value, float):
+        return f'{value:g}'
+    shown = {'command': command_name, 'result': result_name}.get(name)
+    return shown(value) if shown and isinstance(value, int) else str(value)
 
 
 @define(0, 'HEARTBEAT')

@@ -209,16 +209,19 @@ class _Parser:
         """
         Read MAVROS's ``udp://[bind]@[remote]`` or, without ``@``, MAVSDK's ``udp://host:port``.
 
-        MAVROS ignores a remote port without a host. MAVSDK listens if the host means "any" and
-        sends otherwise.
+        MAVROS ignores a remote port without a host, which is refused here. MAVSDK listens if the
+        host means "any" and sends otherwise.
         """
         bind, at, remote = rest.partition('@')
         if not at:
             address = self.address(bind)
             return UdpUrl(address) if _means_any(address.host) else UdpUrl(ANY, self.remote(bind))
         bound = self.address(bind, default_port=MAVROS_UDP_BIND_PORT)
-        if not self.address(remote, default_port=MAVROS_UDP_REMOTE_PORT).host:
+        if not remote:
             return UdpUrl(bound)
+        if remote.startswith(':'):
+            self.fail(f'{at + remote!r} names a port without a host: leave it out, as in '
+                      f'udp://{bind + at}')
         return UdpUrl(bound, self.remote(remote, default_port=MAVROS_UDP_REMOTE_PORT))
 
     def udp_broadcast(self, rest: str, kind: str) -> Url:

@@ -36,6 +36,8 @@ from .parameters import (
     declare_link_parameters,
     declare_payloads,
     declare_read_only,
+    given_parameters,
+    ignored_sections,
     LinkParameters,
     misspelt,
     ParameterError,
@@ -69,18 +71,19 @@ class Bridge:
     :param arguments: the command line, which the nodes of further devices follow too.
     :param types: the kinds of payloads that the parameter ``payloads`` may name.
     :param payload: the default of that parameter.
+    :param url: the connection URL if the command line has one outside of the parameters, else ''.
     :raises ParameterError: if a parameter is wrong.
     """
 
     def __init__(
         self, node: Node, arguments: Sequence[str], types: Mapping[str, PayloadType],
-        payload: str,
+        payload: str, url: str = '',
     ) -> None:
         self.node = node
         self.log = NodeLog(node.get_logger())
-        LogForwarder.install(self.log)
+        frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
-        self.parameters = parameters = _link_parameters(node, kinds)
+        self.parameters = parameters = _link_parameters(node, kinds, url)
         values = [declare_read_only(node, kind.parameters) for kind in kinds]
         commands = CommandSender(
             parameters.address, parameters.command_timeout, parameters.command_retries)
@@ -106,7 +109,7 @@ class Bridge:
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self.component, url=parameters.connection_url,
             period=parameters.diagnostics_period)
-        LoggerServices(node, self.log)
+        LoggerServices(node, frame_log)
         self._executor = NodeExecutor(node.context, self.log)
         self._executor.add_node(node)
         self._own_nodes = [node, *(
@@ -117,11 +120,12 @@ class Bridge:
                 self._own_nodes, kinds, self.clients, values, strict=True):
             log = self.log if own is node else NodeLog(own.get_logger())
             self._payloads.append(kind.serve(client, Host(
-                own, self.link, log, self.pool, self._diagnostics, parameters, value,
+                own, self.link, log, frame_log, self.pool, self._diagnostics, parameters, value,
                 self._wake.set)))
             if own is not node:
                 self._executor.add_node(own)
-        for warning in misspelt(node):
+        names = [one.get_fully_qualified_name() for one in self._own_nodes]
+        for warning in (*misspelt(node), *ignored_sections(arguments, names, self._may_name)):
             self.log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(
@@ -131,6 +135,9 @@ class Bridge:
     def nodes(self) -> list[Node]:
         """Return all nodes of the process."""
         return [*self._own_nodes, *self.pool.nodes]
+
+    def _may_name(self, name: str) -> bool:
+        return any(payload.may_name(name) for payload in self._payloads)
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
@@ -201,16 +208,16 @@ class Bridge:
             self.log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
 
     def _keep_house(self) -> None:
-        names_due = 0.0
+        names_due, shared = 0.0, frozenset[str]()
         while not self._ended.is_set():
             try:
                 more = self.pool.work()
                 self.link.call(self._poll)
                 self._diagnostics.poll(self._tick / 2)
                 self.log.flush()
-                if time.monotonic() >= names_due:
-                    names_due = time.monotonic() + NAMES_INTERVAL
-                    self._check_names()
+                if self.link.clock() >= names_due:
+                    names_due = self.link.clock() + NAMES_INTERVAL
+                    shared = self._check_names(shared)
             except Exception as error:
                 self.log.error(f'internal error: {error!r}', 'housekeeping')
                 more = False
@@ -227,24 +234,33 @@ class Bridge:
         for payload in self._payloads:
             payload.poll(now)
 
-    def _check_names(self) -> None:
+    def _check_names(self, known: frozenset[str]) -> frozenset[str]:
+        """Log the names of our nodes that other nodes have, unless known; and return them."""
         names = [f'{namespace.rstrip("/")}/{name}'
                  for name, namespace in self.node.get_node_names_and_namespaces()]
-        for node in self.nodes:
-            if names.count(node.get_fully_qualified_name()) > 1:
-                self.log.warning(
-                    f'another node is called {node.get_fully_qualified_name()}: services and '
-                    'parameters of either may answer; give one another name with -r __node:=NAME',
-                    f'name {node.get_fully_qualified_name()}')
+        shared = frozenset(name for name in (
+            node.get_fully_qualified_name() for node in self.nodes) if names.count(name) > 1)
+        for name in sorted(shared - known):
+            self.log.warning(
+                f'another node is called {name}: services and parameters of either may answer; '
+                'give one another name with -r __node:=NAME', 'name')
+        for name in sorted(known - shared):
+            self.log.info(f'no other node is called {name} any more', 'name')
+        return shared
 
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event), 'link')
         self._wake.set()
 
 
-def _link_parameters(node: Node, kinds: Sequence[RosPayload]) -> LinkParameters:
+def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkParameters:
     """Declare the parameters of a link that carries these payloads."""
-    parameters = declare_link_parameters(node, kinds[0].all_link_defaults)
+    given = given_parameters(node).get('connection_url')
+    if url and given is not None and given.value != url:
+        raise ParameterError(f'connection_url: {given.value!r}, but the argument is {url!r}: '
+                             'give one of them only')
+    defaults = {**kinds[0].all_link_defaults, **({'connection_url': url} if url else {})}
+    parameters = declare_link_parameters(node, defaults)
     needed = {kind.node_name: kind.mavlink_version for kind in kinds if kind.mavlink_version}
     if set(needed.values()) - {parameters.mavlink_version}:
         needs = ', '.join(f'{name} needs {version}' for name, version in needed.items())

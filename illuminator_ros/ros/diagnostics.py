@@ -167,14 +167,18 @@ def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
         return (f'{signing.replayed} frames refused as replayed: their time stamps are not newer '
                 'than the last; compare the clocks')
     if link.bad_signatures:
-        return f'{link.bad_signatures} frames refused for their signature, made with another key'
+        return (f'{link.bad_signatures} frames refused for their signature, made with another '
+                'key: both sides need the same key')
     if link.unsigned and not link.frames_received:
-        return f'{link.unsigned} frames refused because they are not signed'
+        return (f'{link.unsigned} frames refused because they are not signed: sign them at the '
+                'other side, or set signing_mode to sign')
     if link.frames_received:
-        return f'{link.frames_received} frames received, none from {device}'
+        return (f'{link.frames_received} frames received, none from {device}: check that it is '
+                'on, and that routers forward its frames')
     if link.bytes_received:
         return f'{link.bytes_received} bytes received, no valid frame; check the baud rate'
-    return 'nothing is received'
+    return ('nothing is received: check that the device is on, and that it, or a router, sends '
+            'to this address or line')
 
 
 def link_findings(

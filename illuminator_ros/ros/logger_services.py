@@ -22,7 +22,7 @@ from rclpy.logging import get_logger_level, LoggingSeverity, set_logger_level
 from rclpy.node import Node
 
 from .parameter_services import MAX_NAMES
-from .throttled_log import LogForwarder, NodeLog
+from .throttled_log import LogForwarder
 
 # rcl never forgets a logger whose level was set.
 MAX_LOGGERS = 200
@@ -31,8 +31,8 @@ MAX_LOGGERS = 200
 class LoggerServices:
     """``~/get_logger_levels`` and ``~/set_logger_levels``, for all loggers of the process."""
 
-    def __init__(self, node: Node, log: NodeLog) -> None:
-        self._log = log
+    def __init__(self, node: Node, frame_log: LogForwarder) -> None:
+        self._frame_log = frame_log
         self._names: set[str] = set()
         node.create_service(GetLoggerLevels, '~/get_logger_levels', self._get)
         node.create_service(SetLoggerLevels, '~/set_logger_levels', self._set)
@@ -52,7 +52,7 @@ class LoggerServices:
             reasons = [self._set_one(level.name, level.level) for level in request.levels]
             response.results = [SetLoggerLevelsResult(successful=not reason, reason=reason)
                                 for reason in reasons]
-            LogForwarder.install(self._log)
+            self._frame_log.adjust()
         return response
 
     def _set_one(self, name: str, level: int) -> str:

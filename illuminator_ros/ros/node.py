@@ -206,7 +206,7 @@ class _Newest(Generic[T]):
         try:
             value = self._command.read(message)
         except ValueError as error:
-            self._log.warning(f'~/{self._command.name}: {error}', self._command.name)
+            self._log.warning(f'~/{self._command.name}: ignored: {error}', self._command.name)
             return
         with self._lock:
             called = bool(self._waiting)

@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import difflib
 import math
+from pathlib import Path
+import re
 import time
 from typing import Any
 
@@ -31,6 +33,7 @@ from rcl_interfaces.msg import (
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+import yaml
 
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
@@ -279,6 +282,45 @@ def misspelt(node: Node) -> list[str]:
     return [f'parameter {name!r} is unknown and ignored; did you mean {close[0]!r}?'
             for name in given_parameters(node) if not node.has_parameter(name)
             if (close := difflib.get_close_matches(name, known, 1, 0.75))]
+
+
+def ignored_sections(
+    arguments: Sequence[str], names: Sequence[str], may_name: Callable[[str], bool],
+) -> list[str]:
+    """
+    Return a warning for each section of the given parameter files that matches no node.
+
+    :param names: fully qualified, of the nodes that exist.
+    :param may_name: whether a node that is made later may have a name, without namespace.
+    """
+    files = [path for option, path in zip(arguments, arguments[1:], strict=False)
+             if option == '--params-file']
+    sections = [(path, section) for path in files
+                for section in _sections(yaml.safe_load(Path(path).read_text(encoding='utf-8')))]
+    namespace = names[0].rpartition('/')[0]
+    warnings = []
+    for path, section in sections:
+        *_, last = section
+        later = [f'{namespace}/{last}'] if may_name(last) else []
+        pattern = ''.join(_WILDCARDS.get(part, '/' + re.escape(part)) for part in section)
+        if not any(re.fullmatch(pattern, name) for name in (*names, *later)):
+            warnings.append(f'{path}: the section {"/".join(section)} matches no node and is '
+                            f'ignored; the name here is {", ".join(names)}')
+    return warnings
+
+
+# Of parts of a name in a parameter file (rcl_yaml_param_parser).
+_WILDCARDS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
+
+
+def _sections(content: object) -> Iterator[tuple[str, ...]]:
+    """Return the name of each section, in parts."""
+    for key, below in content.items() if isinstance(content, Mapping) else ():
+        if key == 'ros__parameters':
+            yield ()
+        else:
+            parts = [part for part in str(key).split('/') if part]
+            yield from ((*parts, *rest) for rest in _sections(below))
 
 
 class DeviceParameters:

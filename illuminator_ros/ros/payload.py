@@ -25,7 +25,7 @@ from rclpy.node import Node
 from .diagnostics_publisher import DiagnosticsPublisher
 from .node_manager import NodeManager
 from .parameters import LinkParameters, ParameterSpec, Values
-from .throttled_log import NodeLog
+from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.link import Link
@@ -40,6 +40,7 @@ class Host:
     The services that the bridge offers to the ROS half of one payload.
 
     :param node: the payload's own node.
+    :param frame_log: knows in which node's log the frames of a device are shown.
     :param nodes: makes nodes of further devices.
     :param values: of the payload's read-only parameters.
     :param check_diagnostics: checks the levels at once; callable from any thread.
@@ -48,6 +49,7 @@ class Host:
     node: Node
     link: Link
     log: NodeLog
+    frame_log: LogForwarder
     nodes: NodeManager
     diagnostics: DiagnosticsPublisher
     link_parameters: LinkParameters
@@ -60,6 +62,10 @@ class ServedPayload:
 
     def poll(self, now: float) -> None:
         """Do what is due; called a few times a second."""
+
+    def may_name(self, name: str) -> bool:
+        """Return whether the node of a further device may have this name, without namespace."""
+        return False
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """

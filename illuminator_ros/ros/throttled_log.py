@@ -25,6 +25,8 @@ import time
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.logging import LoggingSeverity
 
+from ..mavlink.messages import Address
+
 # Lines of one kind in PERIOD, s; the last of those left out is written after it.
 BURST = 10
 PERIOD = 10.0
@@ -131,25 +133,41 @@ class NodeLog:
 
 
 class LogForwarder(logging.Handler):
-    """Shows what the modules without ROS log in the log of a node."""
+    """
+    Shows what the modules without ROS log in the logs of nodes.
+
+    It takes the place of an earlier forwarder.
+
+    :param log: for the lines that concern no device with a node.
+    """
 
     def __init__(self, log: NodeLog) -> None:
         super().__init__()
         self._log = log
+        self._logs: dict[Address, NodeLog] = {}
+        self._logger = logging.getLogger('illuminator_ros')
+        for handler in list(self._logger.handlers):
+            self._logger.removeHandler(handler)
+        self._logger.addHandler(self)
+        self._logger.propagate = False
+        self.adjust()
 
-    @classmethod
-    def install(cls, log: NodeLog) -> None:
-        """Forward the logger ``illuminator_ros``, in place of an earlier forwarder."""
-        logger = logging.getLogger('illuminator_ros')
-        for handler in list(logger.handlers):
-            logger.removeHandler(handler)
-        logger.addHandler(cls(log))
-        logger.propagate = False
-        logger.setLevel(logging.DEBUG if log.debugs else logging.INFO)
+    def assign(self, address: Address, log: NodeLog | None) -> None:
+        """Have the node of a device, None for no longer, log what concerns that address."""
+        self._logs.pop(address, None)
+        if log is not None:
+            self._logs[address] = log
+        self.adjust()
+
+    def adjust(self) -> None:
+        """Follow the levels of the nodes' loggers."""
+        debugs = any(log.debugs for log in (self._log, *self._logs.copy().values()))
+        self._logger.setLevel(logging.DEBUG if debugs else logging.INFO)
 
     def emit(self, record: logging.LogRecord) -> None:
         """See :meth:`logging.Handler.emit`."""
-        self._log.write(record.levelno, self.format(record), str(record.msg))
+        log = self._logs.get(getattr(record, 'address', Address(0, 0)), self._log)
+        log.write(record.levelno, self.format(record), str(record.msg))
 
 
 def _note(left_out: int) -> str:

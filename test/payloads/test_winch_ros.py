@@ -84,7 +84,7 @@ def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help() ->
         with (program('bridge', f'udpout://127.0.0.1:{free_port()}', '--ros-args', '--log-level',
                       'debug', domain=domain, options=", payload='winch'") as winch,
               contextlib.closing(Ros(domain)) as ros):
-            winch.wait_for('sent from 1/195: Heartbeat(')
+            winch.wait_for('sent from 1/195: HEARTBEAT ')
             eventually(lambda: ('winch', '/') in ros.node.get_node_names_and_namespaces())
 
     lines = [' '.join(line.split()) for line in shown.lines]

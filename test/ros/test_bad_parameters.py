@@ -21,11 +21,13 @@ import re
 import subprocess
 from typing import Any, cast
 
+from illuminator_ros.ros.parameters import ignored_sections
 import pytest
 from support.embedded import refusal
 from support.ports import free_port
 from support.processes import run
 from support.ros import Ros, running_bridge
+import yaml
 
 # The arguments behind --ros-args, and the content of the line; KEYS is a folder of bad files.
 COMMAND_LINES = {
@@ -106,19 +108,43 @@ def test_invalid_parameter_is_refused_with_its_name_value_and_range(
     assert re.search(reason, refusal(ros.context, **given))
 
 
+@pytest.mark.parametrize(('section', 'is_ignored'), [
+    ('illuminator', False), ('/illuminator', False), ('/**', False), ('/*', False),
+    ('/**/illuminator', False), ('illuminator_1_244', False), ('belly', False),
+    ('illuminatr', True), ('/boat/illuminator', True), ('/boat/**', True), ('/*/*', True)])
+def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
+    tmp_path: Path, section: str, is_ignored: bool,
+) -> None:
+    file = tmp_path / 'boat.yaml'
+    file.write_text(yaml.safe_dump({section: {'ros__parameters': {'brightness': 40.0}}}))
+
+    warnings = ignored_sections(
+        ['--ros-args', '--params-file', str(file)], ['/illuminator'],
+        {'illuminator_1_244', 'belly'}.__contains__)
+
+    assert warnings == [
+        f'{file}: the section {section.strip("/")} matches no node and is ignored; the name here '
+        'is /illuminator'] * is_ignored
+
+
 def test_misspelt_names_are_warned_about_and_parameters_of_other_nodes_are_not(
     ros: Ros, tmp_path: Path,
 ) -> None:
     file = tmp_path / 'shared.yaml'
-    file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false}}')
+    file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false}}\n'
+                    'boat: {illuminator: {ros__parameters: {brightness: 40}}}\n'
+                    'illuminator_1_244: {ros__parameters: {brightness: 40}}\n'
+                    'belly: {ros__parameters: {brightness: 40}}')
     misspelt = {'brightnes': 'brightness', 'conection_url': 'connection_url',
                 'target_sytem': 'target_system', 'strobe_periode': 'strobe_period'}
+    given = {'names': '[1/244=belly]', **dict.fromkeys(misspelt, 1)}
     with running_bridge(ros.domain, free_port(), '--params-file', str(file),
-                        **cast(dict[str, Any], dict.fromkeys(misspelt, 1))) as bridge:
+                        **cast(dict[str, Any], given)) as bridge:
         for wrong, right in misspelt.items():
             bridge.wait_for(
                 f"parameter '{wrong}' is unknown and ignored; did you mean '{right}'?")
-        assert bridge.count('WARN') == len(misspelt)
+        bridge.wait_for('the section boat/illuminator matches no node and is ignored')
+        assert bridge.count('WARN') == len(misspelt) + 1
 
 
 def test_off_as_yaml_reads_it_and_integers_for_doubles_are_accepted(ros: Ros) -> None:

@@ -79,6 +79,6 @@ def test_invalid_or_early_brightness_is_logged_with_its_reason_and_not_sent(
 
             own_ros.publish(Float32, BRIGHTNESS, math.nan, math.inf, 100.5, -1.0, 50.0)
 
-            bridge.wait_for('~/cmd/brightness: brightness nan is not a finite number')
+            bridge.wait_for('~/cmd/brightness: ignored: brightness 100.5 % is out of range')
             light.wait_for(CONFIGURE)
             assert [params(c)[1] for c in light.commands(CONFIGURE)] == [50.0]

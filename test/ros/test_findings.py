@@ -156,13 +156,16 @@ FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
 
 
 @pytest.mark.parametrize(('mode', 'received', 'reason'), [
-    (SigningMode.OFF, [], 'nothing is received'),
+    (SigningMode.OFF, [], 'nothing is received: check that the device is on, and that it, or a '
+     'router, sends to this address or line'),
     (SigningMode.OFF, [bytes(range(90)), spoilt(FOREIGN)],
      '111 bytes received, no valid frame; check the baud rate'),
-    (SigningMode.OFF, [FOREIGN], '1 frames received, none from an illuminator'),
-    (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed'),
+    (SigningMode.OFF, [FOREIGN], '1 frames received, none from an illuminator: check that it is '
+     'on, and that routers forward its frames'),
+    (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed: sign '
+     'them at the other side, or set signing_mode to sign'),
     (SigningMode.REQUIRE, [signed_frame(1, key=WRONG_KEY)],
-     '1 frames refused for their signature, made with another key'),
+     '1 frames refused for their signature, made with another key: both sides need the same key'),
     (SigningMode.REQUIRE, [signed_frame(1)],
      '1 frames refused as replayed: their time stamps are not newer than the last; compare the '
      'clocks'),
@@ -197,7 +200,8 @@ def test_silent_light_that_signs_while_signing_is_off_is_a_warning_with_the_reme
 def test_lights_that_are_not_the_target_or_too_many_are_named() -> None:
     link = Reported().statuses(LightsHeard(100, (LIGHT, AUTOPILOT), True))['link']
     assert link.message == (
-        'no light connected for 0 ms: 1/243, 1/1 heard, none of which is the target; '
+        'no light connected for 0 ms: 1/243, 1/1 heard, none of which is the target: set '
+        'target_system and target_component; '
         'more than 100 lights, some ignored')
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat
 import pytest
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 from support.fake_light import status_message
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.ros import Parameters, Ros, running_bridge
@@ -85,6 +85,42 @@ def test_light_that_is_missed_found_changed_by_others_lost_and_restarted_is_logg
             [line] = [line for line in bridge.lines if text in line]
             assert line.startswith(f'[{severity}]')
         assert (bridge.count('light 1/243 connected'), bridge.count('1/1 ')) == (2, 0)
+
+
+def test_switch_is_logged_with_its_way_if_it_changes_the_light(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        Parameters(own_ros).wait(brightness=100.0)
+        for _ in range(2):
+            assert own_ros.enable().success
+        for number, on in enumerate((True, True, False, False), 3):
+            own_ros.publish(Bool, '/illuminator/cmd/enable', on)
+            light.wait_for(ON_OFF, count=number)
+            own_ros.catch_up()
+
+        bridge.wait_for('light 1/243 was switched off by topic')
+        assert bridge.count('was switched') == 2
+        assert bridge.count('light 1/243 was switched on by service') == 1
+
+
+def test_frames_at_debug_level_are_logged_by_the_node_of_their_light_and_no_other(
+    own_ros: Ros, port: int,
+) -> None:
+    level = ('--log-level', 'illuminator_1_244:=debug')
+    with (running_bridge(own_ros.domain, port, *level) as bridge,
+          ServedLight(port), ServedLight(port, Address(1, 244))):
+        Parameters(own_ros, '/illuminator_1_244').wait(brightness=100.0)
+        Parameters(own_ros).wait(brightness=100.0)
+        assert Parameters(own_ros, '/illuminator_1_244').set(brightness=40.0)[0].successful
+        assert Parameters(own_ros).set(brightness=30.0)[0].successful
+        bridge.wait_for(
+            'illuminator_1_244]: sent from 1/194: COMMAND_LONG target_system=1 '
+            'target_component=244 command=MAV_CMD_DO_ILLUMINATOR_CONFIGURE confirmation=0 '
+            'param1=1 param2=40 ')
+        bridge.wait_for('illuminator_1_244]: received from 1/244: ILLUMINATOR_STATUS uptime_ms=')
+
+    frames = [line for line in bridge.lines if '[DEBUG]' in line]
+    assert all('[illuminator_1_244]' in line for line in frames)
+    assert not any('1/243' in line or 'target_component=243' in line for line in frames)
 
 
 def another_identity(light: ServedLight, now: float, step: int) -> Any:

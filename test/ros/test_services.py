@@ -99,7 +99,9 @@ def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
 ) -> None:
     with running_bridge(own_ros.domain, port):
         assert no_light_messages(own_ros) == {
-            f'no light connected: none heard yet on udp 127.0.0.1:{port}: nothing is received'}
+            f'no light connected: none heard yet on udp 127.0.0.1:{port}: nothing is received: '
+            'check that the device is on, and that it, or a router, sends to this address or '
+            'line'}
         assert Parameters(own_ros).get('brightness') == [None]
 
 

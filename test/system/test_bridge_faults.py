@@ -18,6 +18,7 @@ from collections.abc import Iterator
 import signal
 import sys
 
+from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetParameters, SetLoggerLevels
@@ -26,8 +27,15 @@ from std_srvs.srv import SetBool, Trigger
 from support.light import Address, eventually, ServedLight
 from support.processes import ended, Program, python
 from support.recording import Call
-from support.ros import bridge_arguments, Parameters, Ros, running_bridge, start_bridge
-from support.slow import pass_time_until
+from support.ros import (
+    bridge_arguments,
+    Parameters,
+    Ros,
+    running_bridge,
+    start_bridge,
+    STREAM,
+)
+from support.slow import CLOCK, pass_time_until
 
 BRIDGE = 'illuminator_ros.bridge'
 
@@ -93,10 +101,22 @@ def test_long_list_of_names_gets_an_empty_answer(
     assert own_ros.enable().success
 
 
-def test_second_bridge_of_the_same_name_is_noticed(own_ros: Ros, port: int) -> None:
-    with (running_bridge(own_ros.domain, port) as bridge,
-          ended(start_bridge(own_ros.domain, port + 1))):
-        bridge.wait_for('another node is called /illuminator')
+def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it_goes(
+    own_ros: Ros, port: int,
+) -> None:
+    came, went = (f'{text} /illuminator' for text in (
+        'another node is called', 'no other node is called'))
+    with running_bridge(own_ros.domain, port) as bridge:
+        with ended(start_bridge(own_ros.domain, port + 1)):
+            pass_time_until(lambda: bridge.count(came), step=5.0)
+            for _ in range(3):
+                diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+                CLOCK.forward(5.0)
+                # The names are checked in the same turn.
+                diagnostics.wait(lambda array: str(port) in array.status[0].hardware_id)
+        pass_time_until(lambda: bridge.count(went), step=5.0)
+
+        assert (bridge.count(came), bridge.count(went)) == (1, 1)
 
 
 @pytest.mark.parametrize(('arguments', 'line'), [

@@ -52,8 +52,11 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     assert max(map(len, bridge.splitlines())) < 132
     for spec in (*LINK_PARAMETERS, *LIGHT_PARAMETERS, *DEVICE_PARAMETERS):
         assert re.search(rf'^  {spec.name} .*{re.escape(spec.description)}', bridge, re.M)
+        if isinstance(spec.default, float) and spec not in DEVICE_PARAMETERS:
+            assert re.search(rf'^  {spec.name} +{spec.default} {spec.unit} ', bridge, re.M)
     for form in ('udp://', 'udpin://', 'udpout://', 'tcp://', 'tcp-l://', 'serial://',
-                 '/dev/ttyUSB0,57600', 'udpin:', 'ros2 service call', 'ros2 param set'):
+                 '/dev/ttyUSB0,57600', 'udpin:', 'ros2 service call', 'ros2 param set',
+                 '--log-level debug', '--log-level illuminator:=debug'):
         assert form in bridge
     for action in parser()._actions:
         assert (action.option_strings or [action.dest])[-1] in simulator
@@ -63,6 +66,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('bridge', '--banana', "unknown argument '--banana'; parameters go behind --ros-args"),
     ('bridge', '--ros-args -p brightness:=60 -- udpin://127.0.0.1:1 more', "argument 'more'"),
     ('bridge', 'http://x', "unknown scheme 'http'"),
+    ('bridge', 'udpin://127.0.0.1:1 --ros-args -p connection_url:=udpin://127.0.0.1:2',
+     "'udpin://127.0.0.1:2', but the argument is 'udpin://127.0.0.1:1': give one of them only"),
     ('simulator', '--banana', 'unrecognized arguments: --banana'),
     ('simulator', 'udpin://127.0.0.1:0', 'port 0 is outside 1..65535'),
     ('simulator', '--count 0', 'argument --count: 0 is outside 1 to 200'),

@@ -60,6 +60,7 @@ def test_every_light_is_switched_off_and_named(own_ros: Ros, port: int, number: 
         for one in (light, other):
             assert_goes_off(one)
             assert program.count(f'light {one.fake.source} is off: off, confirmed') == 1
+        assert program.count('was switched') == 0
 
 
 def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, port: int) -> None:

@@ -52,7 +52,7 @@ from ...mavlink.signing_files import KeyFileError, TimestampStore
 from ...mavlink.url import parse_url, Url, UrlError
 from ...payload.checks.coroutine import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
-from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, Result
+from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
 from ...payload.simulated_settings import integer, number
 
@@ -191,8 +191,7 @@ class Conformance:
         self._write_line(f'checking the {checks.device} on {options.url} ...')
         self._finish(self._find())
         missing = self._missing
-        if missing.startswith(NOT_OPEN) and not any(
-                os.strerror(number) in missing for number in PEER_ERRORS):
+        if missing.startswith(NOT_OPEN) and not _is_peer_error(missing):
             self._link.stop()
             _complain(f'{missing}; nothing was checked')
             return 2
@@ -208,7 +207,9 @@ class Conformance:
         report = Report(
             checks.payload, checks.device, options.url, self._describe_device(),
             tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
-        self._write_line('', report.device, report.summary)
+        # A failure has told why there is no device.
+        told = missing and any(one.verdict is Verdict.FAIL for one in report.results)
+        self._write_line('', *(() if told else (report.device,)), report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
             try:
                 if path is not None:
@@ -238,7 +239,8 @@ class Conformance:
                 self._write_line(self._texts.get(timeout=0.1))
 
     def _link_event(self, event: LinkEvent) -> None:
-        if not event.is_open:
+        # A problem of this computer ends the run with its reason.
+        if not event.is_open and (event.was_open or _is_peer_error(event.reason)):
             self._texts.put(str(event))
 
     def _show(self, result: Result) -> None:
@@ -304,6 +306,10 @@ class Conformance:
         name, detail = (f'{device} {session.found}', session.identity) if session.found else (
             f'no {device}', self._missing)
         return f'{name}: {detail}' if detail else name
+
+
+def _is_peer_error(reason: str) -> bool:
+    return any(os.strerror(number) in reason for number in PEER_ERRORS)
 
 
 def _complain(text: str) -> None:

@@ -100,7 +100,8 @@ def why_no_light(link: diagnostics.LinkSnapshot, heard: LightsHeard) -> str:
     if link.state.failure:
         return link.state.failure
     if heard.some:
-        return f'{", ".join(map(str, heard.some))} heard, none of which is the target'
+        return (f'{", ".join(map(str, heard.some))} heard, none of which is the target: set '
+                'target_system and target_component')
     return (f'none heard yet on {link.state.name}: '
             + diagnostics.why_nothing_is_heard(link, 'an illuminator'))
 

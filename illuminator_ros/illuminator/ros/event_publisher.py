@@ -78,8 +78,7 @@ class EventPublisher:
         self._check_diagnostics = check_diagnostics
         self._identity: object = None
         self._max_brightness = limits.max_brightness
-        # The last switch, and the source of setpoints as a part of its topics.
-        self._last_switch: events.LightSwitched | None = None
+        # The source of setpoints as a part of its topics.
         self._source = ''
         self._limits = model.Limits()
         self._condition: tuple[object, ...] = ()
@@ -150,7 +149,6 @@ class EventPublisher:
         self._check_diagnostics()
 
     def _restarted(self, event: events.LightRestarted) -> None:
-        self._last_switch = None
         self._log.info(f'light {event.address} has restarted', 'restart')
         if event.was_on and event.is_on is False:
             self._log.warning(f'light {event.address} was on before it restarted, and is off now',
@@ -167,10 +165,7 @@ class EventPublisher:
             self._check_diagnostics()
 
     def _switched(self, event: events.LightSwitched) -> None:
-        # Programs repeat a message to keep a light on, or to hold it.
-        is_repeated = event == self._last_switch and event.detail.endswith('topic')
-        self._last_switch = event
-        if event.left_out is not None and not is_repeated:
+        if event.left_out is not None:
             way = event.detail if event.origin is events.Origin.REQUEST else event.origin.value
             self._log.info(f'light {event.address} was switched {"on" if event.on else "off"} by '
                            f'{way or "a request"}{_left_out(event.left_out)}', 'switched')

@@ -109,6 +109,7 @@ class LightNode:
     def bind(self, address: Address, now: float) -> None:
         """Serve a light from now on, and publish what is known of it."""
         self.address = address
+        self._host.frame_log.assign(address, self._log)
         light = self._client.lights.get(address)
         if light is not None:
             for event in light.snapshot(now).events():
@@ -118,6 +119,8 @@ class LightNode:
 
     def release(self) -> None:
         """Serve no light: it was forgotten."""
+        if self.address:
+            self._host.frame_log.assign(self.address, None)
         self.address = None
 
     def take(self, event: AnyLightEvent) -> None:

@@ -122,9 +122,9 @@ class Lights(ServedPayload):
     def _forget(self, address: Address) -> None:
         self._wanted.discard(address)
         node = self._nodes.pop(address, None)
-        if node is self._first:
+        if node is not None:
             node.release()
-        else:
+        if node is not self._first:
             if node is not None:
                 self._host.diagnostics.remove(node.source)
                 self._host.log.info(f'light {address} was silent for long: {node.full_name} '
@@ -168,6 +168,10 @@ class Lights(ServedPayload):
                 self._host.log.warning(warning)
         for node in self._nodes.values():
             node.poll()
+
+    def may_name(self, name: str) -> bool:
+        """See :meth:`ServedPayload.may_name`."""
+        return self._selection.may_name(name)
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""

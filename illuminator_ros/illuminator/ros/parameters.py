@@ -194,6 +194,11 @@ class Selection:
         return (self.names.get(address)
                 or f'{self._first}_{address.system}_{address.component}')
 
+    def may_name(self, name: str) -> bool:
+        """Return whether the node of a further light may have a name."""
+        return (name in self.names.values()
+                or re.fullmatch(rf'{self._first}_[0-9]+_[0-9]+', name) is not None)
+
     def unused_name(self, served: Address) -> str:
         """Return the warning for a name of the light that the first node serves, '' for none."""
         name = self.names.get(served)

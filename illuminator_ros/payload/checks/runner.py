@@ -147,8 +147,7 @@ class CheckRunner(Generic[T]):
         """Raise where the check cannot be made, or the device could not be restored after it."""
         device = self._checks.device
         if self._missing:
-            raise Failed(self._missing) if one.presence else _Unreached(
-                self._missing.partition(';')[0])
+            raise Failed(self._missing) if one.presence else _Unreached(f'no {device} was found')
         if self._lost and not one.whole_run:
             raise _Unreached(self._lost)
         if one.needs_consent and not self._tester.conditions.consent:

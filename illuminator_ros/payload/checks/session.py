@@ -26,7 +26,15 @@ from .coroutine import CoroutineRunner
 from ..identity import Identity
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
-from ...mavlink.messages import Address, CommandAck, MavCmd, MavResult, Message, result_name
+from ...mavlink.messages import (
+    Address,
+    command_name,
+    CommandAck,
+    MavCmd,
+    MavResult,
+    Message,
+    result_name,
+)
 
 T = TypeVar('T')
 M = TypeVar('M', bound=Message)
@@ -142,7 +150,7 @@ class Transaction:
     @property
     def text(self) -> str:
         """Return the command and its parameters."""
-        return ' '.join([_command_name(self.command), *(f'{param:g}' for param in self.params)])
+        return ' '.join([command_name(self.command), *(f'{param:g}' for param in self.params)])
 
     @property
     def finals(self) -> list[Ack]:
@@ -169,18 +177,11 @@ class Transaction:
         return Failed(f'{self.text}: {reason or self.answer}', self.lines)
 
 
-def _command_name(command: int) -> str:
-    try:
-        return f'MAV_CMD_{MavCmd(command).name}'
-    except ValueError:
-        return f'MAV_CMD {command}'
-
-
 def _protocol_text(message: Message) -> str:
     if isinstance(message, CommandAck):
         target = Address(message.target_system, message.target_component)
         progress = message.result == MavResult.IN_PROGRESS
-        return (f'COMMAND_ACK {_command_name(message.command)}: {result_name(message.result)}'
+        return (f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
                 + (f', progress {message.progress}' if progress else '')
                 + (f' to {target}' if any(target) else ''))
     if isinstance(message, messages.Heartbeat):
