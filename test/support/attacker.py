@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import random
 import struct
@@ -49,6 +50,14 @@ TELLING = {'command': (405, 406, 511, 512, 80, 0, 65535), 'result': (*range(11),
 # Every length that is of interest: too short, right, extended, the longest.
 LENGTHS = (0, 1, 2, 3, 9, 10, 30, 33, 34, 35, 36, 38, 160, 161, 200, 254, 255)
 Datagrams = list[tuple[bytes, Any]]
+
+
+@functools.cache
+def field_codes(cls: type[Message]) -> list[tuple[str, str]]:
+    """Return the fields of a message, each with its code in :mod:`struct`."""
+    hints = get_type_hints(cls, include_extras=True)
+    return [(field.name, get_args(hints[field.name])[1])
+            for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
 
 
 class Attacker:
@@ -150,13 +159,11 @@ class Attacker:
         return frame + (signature(self._key, frame) if genuine else self._draw.randbytes(6))
 
     def _message(self, cls: type[Message]) -> Message:
-        hints = get_type_hints(cls, include_extras=True)
         target = self._draw.choice([(0, 0), *self._sources, self._any_source()])
         telling = {**TELLING, 'target_system': target[:1], 'target_component': target[1:]}
         return cls(*(
-            self._draw.choice(telling[field.name]) if field.name in telling
-            else self._value(get_args(hints[field.name])[1])
-            for field in dataclasses.fields(cls)))  # type: ignore[arg-type]
+            self._draw.choice(telling[name]) if name in telling else self._value(code)
+            for name, code in field_codes(cls)))
 
     def _value(self, code: str) -> Any:
         draw, size = self._draw, struct.calcsize(f'<{code}')
