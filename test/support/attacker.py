@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 import random
 import struct
@@ -52,12 +51,14 @@ LENGTHS = (0, 1, 2, 3, 9, 10, 30, 33, 34, 35, 36, 38, 160, 161, 200, 254, 255)
 Datagrams = list[tuple[bytes, Any]]
 
 
-@functools.cache
 def field_codes(cls: type[Message]) -> list[tuple[str, str]]:
     """Return the fields of a message, each with its code in :mod:`struct`."""
     hints = get_type_hints(cls, include_extras=True)
     return [(field.name, get_args(hints[field.name])[1])
             for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
+
+
+FIELDS = {cls.name: field_codes(cls) for cls in MESSAGES}
 
 
 class Attacker:
@@ -163,7 +164,7 @@ class Attacker:
         telling = {**TELLING, 'target_system': target[:1], 'target_component': target[1:]}
         return cls(*(
             self._draw.choice(telling[name]) if name in telling else self._value(code)
-            for name, code in field_codes(cls)))
+            for name, code in FIELDS[cls.name]))
 
     def _value(self, code: str) -> Any:
         draw, size = self._draw, struct.calcsize(f'<{code}')
