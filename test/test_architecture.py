@@ -50,7 +50,8 @@ SHARED_NAMES = {'GimbalDeviceAttitudeStatus', 'gimbal_device_id'}
 def folder(module: str) -> tuple[str, ...]:
     """Return the folder that decides what a module may import, such as ('illuminator', 'ros')."""
     parts = module.split('.')[1:]
-    if not parts or (len(parts) == 1 and parts[0] not in SHARED | PAYLOADS):
+    if not parts or parts[-1] == '__main__' or (
+            len(parts) == 1 and parts[0] not in SHARED | PAYLOADS):
         return ()
     return ('ros',) if parts[0] == 'ros' else tuple(
         parts[:2] if parts[0] in PAYLOADS and parts[1:2] == ['ros'] else parts[:1])
