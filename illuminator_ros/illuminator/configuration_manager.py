@@ -16,15 +16,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 import math
-from typing import Any
 
 from . import events
 from .commands import Configure
 from .model import (
+    Changes,
     checked,
     Configuration,
     FIELDS,
@@ -166,7 +166,7 @@ class ConfigurationManager:
 
     # Requests
 
-    def configure(self, changes: Mapping[str, object], now: float, done: Done) -> None:
+    def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
         Change some fields with one command; the light is connected.
 
@@ -177,17 +177,10 @@ class ConfigurationManager:
             values = self._checked(changes)
             for name, value in values.items():
                 self._safety.check(name, value)
-            self._goal(values)
         except InvalidValue as error:
             done(Result(False, str(error), permanent=True), now)
             return
-
-        def finished(result: Result, now: float) -> None:
-            if result.success:
-                self._drop_pending(values)
-            done(result, now)
-
-        self._submit(values, now, finished)
+        self._submit(values, now, done)
 
     def set_brightness(self, brightness: float, now: float) -> None:
         """Take a setpoint of a stream, %, checked; the light is connected."""
@@ -207,25 +200,26 @@ class ConfigurationManager:
         self._setpoint = brightness
         self.poll(now, connected=True)
 
-    def set_desired(self, values: Mapping[str, object], now: float) -> None:
+    def set_desired(self, values: Changes, now: float) -> None:
         """
         Have values sent as soon as the light has reported its configuration.
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._want({**(self._pending.values if self._pending else {}), **values},
-                   self._pending.origin if self._pending else Origin.OVERRIDE, now)
+        self._want({**self._wanted, **values}, Origin.OVERRIDE, self._without_status(now))
 
-    def _undo(self, values: Mapping[str, object], origin: Origin, due: float) -> None:
-        """Have values sent that another sender has changed, after those that already wait."""
-        pending = self._pending
+    def _want(self, values: Changes, origin: Origin, due: float) -> None:
+        """Have values sent; those that already wait keep their origin."""
         self._pending = Pending(
-            {**values, **(pending.values if pending else {})},
-            pending.origin if pending else origin, due)
+            dict(values), self._pending.origin if self._pending else origin, due)
 
-    def _want(self, values: dict[str, object], origin: Origin, now: float) -> None:
-        wait = 0.0 if self.confirmed else STATUS_TIMEOUT
-        self._pending = Pending(values, origin, now + wait)
+    def _without_status(self, now: float) -> float:
+        """Return when values are sent though no status has come, s."""
+        return now if self.confirmed else now + STATUS_TIMEOUT
+
+    @property
+    def _wanted(self) -> Changes:
+        return self._pending.values if self._pending else {}
 
     def cancel(self, now: float) -> None:
         """End all changes, and drop the values that were not sent."""
@@ -245,10 +239,10 @@ class ConfigurationManager:
             if not self._pending.values:
                 self._pending = None
 
-    def _checked(self, changes: Mapping[str, object]) -> dict[str, object]:
+    def _checked(self, changes: Changes) -> dict[str, float]:
         return {name: checked(name, value, self._limits) for name, value in changes.items()}
 
-    def _goal(self, values: Mapping[str, Any]) -> Configure:
+    def _goal(self, values: Changes) -> Configure:
         """
         Return the change that sets some fields.
 
@@ -274,9 +268,7 @@ class ConfigurationManager:
         return Configure(limited, list(dict.fromkeys((*values, *goal.differences(limited)))),
                          self._instance, note)
 
-    def _sendable(
-        self, confirmed: Configuration, changes: Mapping[str, Any],
-    ) -> Configuration:
+    def _sendable(self, confirmed: Configuration, changes: Changes) -> Configuration:
         """
         Return the confirmed configuration without values that the light's limits rule out.
 
@@ -295,8 +287,14 @@ class ConfigurationManager:
         return confirmed.with_changes(ruled_out)
 
     def _submit(
-        self, values: Mapping[str, Any], now: float, done: Done, *, is_stream: bool = False,
+        self, values: Changes, now: float, done: Done, *, is_stream: bool = False,
     ) -> None:
+        try:
+            self._goal(values)
+        except InvalidValue as error:
+            done(Result(False, str(error), permanent=True), now)
+            return
+
         def prepare(now: float) -> Configure:
             # Requests before it in the queue may have changed the other fields.
             change = self._goal(values)
@@ -311,6 +309,7 @@ class ConfigurationManager:
                 if self._sent:
                     self._sent.accepted = result.success or result.contradicted
                 if result.success:
+                    self._drop_pending(values)
                     self._accept(change.configuration, status)
                 elif result.contradicted:
                     self._unapplied = change.configuration
@@ -327,11 +326,10 @@ class ConfigurationManager:
         """Note that the light has restarted, so that its configuration may be gone."""
         if self._restore and self.confirmed is not None:
             confirmed = self.confirmed
+            values = {name: getattr(confirmed, name) for name in FIELDS
+                      if name != 'mode' or confirmed.mode}
             # Overrides that have not been sent yet replace the values from before.
-            pending = self._pending.values if self._pending else {}
-            self._want({**{name: getattr(confirmed, name) for name in FIELDS
-                           if name != 'mode' or confirmed.mode}, **pending},
-                       Origin.RESTART, now)
+            self._pending = Pending({**values, **self._wanted}, Origin.RESTART, now)
 
     def lost(self, message: str, now: float) -> None:
         """Note that the light is lost; a setpoint must not take effect when it is heard again."""
@@ -368,7 +366,7 @@ class ConfigurationManager:
         status = report.status
         if self._unapplied and not unexpected_differences(
                 self._unapplied, reported, status.error_flags, step=True):
-            self._applied()
+            self._unapplied, self.discrepancy = None, ''
         if self.confirmed is None:
             self._adopt(reported, events.Cause.FIRST_STATUS, now)
             if self._pending:
@@ -394,12 +392,8 @@ class ConfigurationManager:
             goal = goal.with_changes({
                 name: getattr(reported, name)
                 for name in goal.differences(reported, step=False) if name not in far})
-        self._applied()
+        self._unapplied, self.discrepancy = None, ''
         self._adopt(goal, events.Cause.REQUEST, 0.0)
-
-    def _applied(self) -> None:
-        self._unapplied = None
-        self.discrepancy = ''
 
     def _adopt(self, configuration: Configuration, cause: events.Cause, now: float) -> None:
         old, self.confirmed = self.confirmed, configuration
@@ -443,7 +437,7 @@ class ConfigurationManager:
             return False
         due = self._undoing.take(now)
         if due is not None:
-            self._undo({name: getattr(confirmed, name) for name in names},
+            self._want({**{name: getattr(confirmed, name) for name in names}, **self._wanted},
                        Origin.OTHER_SENDER, due)
         left_out = self._rate.take(now) if due is not None else 0
         self._emit(events.ChangedByOther(
@@ -460,7 +454,7 @@ class ConfigurationManager:
         if exceeded.excess and self._pending is None and (
                 due := self._limiting.take(now)) is not None:
             limited = self._safety.clipped(reported, self._limits)
-            self._undo({name: getattr(limited, name) for name in reported.differences(limited)},
+            self._want({name: getattr(limited, name) for name in reported.differences(limited)},
                        Origin.LIMIT, due)
 
     def _is_own(
@@ -480,8 +474,9 @@ class ConfigurationManager:
 
     def poll(self, now: float, *, connected: bool) -> None:
         """Send pending values, one command at a time."""
-        if self._setpoint is not None and (replaceable := self._replaceable):
-            replaceable.supersede(now)
+        if self._setpoint is not None and (accepted := self._accepted_setpoint):
+            # A newer one need not wait for the status.
+            accepted.supersede(now)
         self._queue.poll(now)
         if self._queue.current is not None or not connected:
             return
@@ -493,8 +488,8 @@ class ConfigurationManager:
             self._send_setpoint(value, now)
 
     @property
-    def _replaceable(self) -> Request[Status] | None:
-        """Return the setpoint that is accepted but not confirmed: a newer one need not wait."""
+    def _accepted_setpoint(self) -> Request[Status] | None:
+        """Return the setpoint that is accepted but not confirmed."""
         current = self._queue.current
         return current if current and current.is_stream and current.is_accepted else None
 
@@ -504,17 +499,10 @@ class ConfigurationManager:
             return
 
         def finished(result: Result, now: float) -> None:
-            if result.success:
-                self._drop_pending(['brightness'])
-            else:
+            if not result.success:
                 self._setpoint_failed(result.message)
 
-        try:
-            self._goal({'brightness': value})
-        except InvalidValue as error:
-            self._setpoint_failed(str(error))
-        else:
-            self._submit({'brightness': value}, now, finished, is_stream=True)
+        self._submit({'brightness': value}, now, finished, is_stream=True)
 
     def _setpoint_failed(self, message: str) -> None:
         self._emit(events.SetpointFailed(self._address, message))
@@ -559,7 +547,7 @@ class ConfigurationManager:
         """Return when :meth:`poll` has something to do."""
         if not connected:
             return self._queue.next_deadline()
-        if self._setpoint is not None and (not self.is_changing or self._replaceable):
+        if self._setpoint is not None and (not self.is_changing or self._accepted_setpoint):
             return -math.inf
         if self.is_changing:
             return self._queue.next_deadline()

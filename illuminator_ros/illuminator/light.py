@@ -16,10 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
-from typing import Any
 
 from . import events
 from .commands import Switch
@@ -32,7 +31,7 @@ from .configuration_manager import (
     REPORT_INTERVAL,
 )
 from .messages import STATUS_ID
-from .model import DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
+from .model import Changes, DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
 from .sources import DEFAULT, Sources, SourceSettings
 from .status_tracker import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
@@ -462,7 +461,7 @@ class Light:
         self._changed(self, now)
 
     def configure(
-        self, changes: Mapping[str, Any], now: float, done: Done, *, source: str = DEFAULT,
+        self, changes: Changes, now: float, done: Done, *, source: str = DEFAULT,
     ) -> None:
         """
         Change some fields with one command; ``done`` is called once with the result.
@@ -495,7 +494,7 @@ class Light:
             self._configuration.set_brightness(brightness, now)
             self._changed(self, now)
 
-    def set_desired(self, values: Mapping[str, Any], now: float) -> None:
+    def set_desired(self, values: Changes, now: float) -> None:
         """
         Have values sent as soon as the light has reported its configuration.
 

@@ -29,6 +29,11 @@ import reprlib
 import struct
 from typing import Any
 
+from .messages import IlluminatorStatus
+
+# Values of configuration fields by name. Any: the mode is a Mode, the others are numbers.
+Changes = Mapping[str, Any]
+
 ABSOLUTE_ZERO_C = -273.15
 MAX_TEMPERATURE_C = 1000.0
 # Longest plausible strobe period, s; larger reports are invalid.
@@ -145,7 +150,7 @@ class Configuration:
     strobe_period: float
     strobe_duty_cycle: float
 
-    def with_changes(self, changes: Mapping[str, Any]) -> Configuration:
+    def with_changes(self, changes: Changes) -> Configuration:
         """Return this configuration with some of its fields, already checked, replaced."""
         return replace(self, **changes)
 
@@ -235,7 +240,7 @@ class SafetyLimits:
     max_brightness: float = 100.0
     min_strobe_period: float = 0.0
 
-    def check(self, name: str, value: object) -> None:
+    def check(self, name: str, value: float) -> None:
         """
         Check the value of a field that :func:`checked` has returned.
 
@@ -244,7 +249,7 @@ class SafetyLimits:
         if excess := self._excess(name, value):
             raise InvalidValue(excess)
 
-    def _excess(self, name: str, value: Any) -> str:
+    def _excess(self, name: str, value: float) -> str:
         if name == 'brightness' and value > self.max_brightness:
             return f'brightness {value:g} % is above max_brightness {self.max_brightness:g} %'
         if name == 'strobe_period' and 0 < float32(value) < float32(self.min_strobe_period):
@@ -304,7 +309,7 @@ class Status:
     invalid: tuple[str, ...] = ()
 
     @classmethod
-    def from_message(cls, message: Any) -> Status:
+    def from_message(cls, message: IlluminatorStatus) -> Status:
         """Read a message. Any content is accepted: a wrong field is marked, not raised."""
         brightness, duty = message.brightness, message.strobe_duty_cycle
         limits = _limits(message.min_strobe_period, message.max_strobe_period)

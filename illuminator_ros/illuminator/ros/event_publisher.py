@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import logging
-from typing import Any
 
 from rclpy.node import Node
 from sensor_msgs.msg import Temperature
@@ -35,7 +34,7 @@ from ...ros.parameters import DeviceParameters
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
-STATUS_TOPICS: dict[str, tuple[Any, Callable[[model.Status], object]]] = {
+STATUS_TOPICS: dict[str, tuple[type[object], Callable[[model.Status], object]]] = {
     'enabled': (Bool, lambda status: status.enabled),
     'brightness': (Float32, lambda status: status.brightness),
     'mode': (String, lambda status: status.mode.label),
@@ -55,6 +54,9 @@ _REASONS = {
     HolderCause.RELEASE: ': {} has released it',
     HolderCause.SILENCE: ': {} was silent for source_timeout',
 }
+# Events that may change a level.
+_DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
+              events.ConfigurationChanged, events.ConfigurationRestored, events.LimitExceeded)
 _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 
@@ -84,31 +86,70 @@ class EventPublisher:
         self._condition: tuple[object, ...] = ()
         self._shared = False
         self._flags = FlagLog()
-        # Events have no common content.
-        self._handlers: dict[type, Callable[[Any], None]] = {
-            events.StatusReceived: self._status_received,
-            events.LightConnected: self._connected,
-            events.LightLost: self._lost,
-            events.LightRestarted: self._restarted,
-            events.LightIdentified: self._identified,
-            events.LightSwitched: self._switched,
-            events.ConfigurationChanged: self._configuration_changed,
-            events.ConfigurationRestored: self._configuration_restored,
-            events.SetpointFailed: self._setpoint_failed,
-            events.SetpointClipped: self._setpoint_clipped,
-            events.LimitExceeded: self._limit_exceeded,
-            events.AutomaticSwitch: self._automatic_switch,
-            events.ChangedByOther: self._changed_by_other,
-            events.LightHeld: self._held,
-            events.WishFailed: self._wish_failed,
-        }
         interface.publish('connected', False)
 
     def take(self, event: events.AnyLightEvent) -> None:
         """Publish an event."""
-        handler = self._handlers.get(type(event))
-        if handler is not None:
-            handler(event)
+        log, light = self._log, f'light {event.address}'
+        match event:
+            case events.StatusReceived():
+                self._status_received(event)
+            case events.LightConnected():
+                log.info(f'{light} connected', 'connection')
+                self._interface.publish('connected', True)
+            case events.LightLost(reason=reason):
+                log.warning(f'{light} lost: {reason}', 'connection')
+                self._interface.publish('connected', False)
+            case events.LightRestarted(was_on=was_on, is_on=is_on):
+                log.info(f'{light} has restarted', 'restart')
+                if was_on and is_on is False:
+                    log.warning(f'{light} was on before it restarted, and is off now',
+                                'restart off')
+            case events.LightIdentified(identity=identity) if identity != self._identity:
+                self._identity = identity
+                known = ' '.join(filter(None, (identity.vendor, identity.model)))
+                serial = identity.serial_number and f', serial number {identity.serial_number}'
+                log.info(f'{light} is {known or "nameless"}{serial}', 'identity')
+            case events.LightSwitched(on=on, origin=origin, left_out=int(left_out)):
+                way = event.detail if origin is events.Origin.REQUEST else origin.value
+                log.info(f'{light} was switched {_state(on)} by {way or "a request"}'
+                         f'{_left_out(left_out)}', 'switched')
+            case events.LightHeld(change=change):
+                reason = _REASONS[change.cause].format(change.before) if change.before else ''
+                log.info(f'{light} is held by {change.after or "no source"}{reason}', 'holder')
+                self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
+                self._interface.publish('source', change.after or '')
+            case events.WishFailed(source=source, message=message):
+                log.warning(f'{light} is not as {source} has asked for before: {message}', 'wish')
+            case events.AutomaticSwitch(on=on, reason=reason, failure=''):
+                log.warning(f'{light} is switched {_state(on)} by {reason}', 'automatic')
+            case events.AutomaticSwitch(on=on, failure=failure):
+                log.error(f'{light} is not confirmed to be {_state(on)}, which is repeated: '
+                          f'{failure}', 'automatic')
+            case events.ChangedByOther(change=new, undone=False):
+                log.error(f'{light}: another sender insists on {new}, which stays from now on: '
+                          'only one of the two programs must control the light', 'insists')
+            case events.ChangedByOther(change=new, left_out=int(left_out)):
+                log.warning(f'{light} was changed by another sender, which is undone: '
+                            f'{new}{_left_out(left_out)}', 'changed')
+            case events.ConfigurationChanged():
+                self._configuration_changed(event)
+            case events.ConfigurationRestored(success=True, message=message):
+                log.info(f'{light} configured: {message}', 'configured')
+            case events.ConfigurationRestored(message=message):
+                log.error(f'{light} not configured: {message}', 'not configured')
+            case events.SetpointFailed(message=message):
+                log.warning(f'~/{self._source}cmd/brightness: {message}', 'setpoint')
+            case events.SetpointClipped(message=message, left_out=left_out):
+                log.warning(f'~/{self._source}cmd/brightness: {message}: the limit is sent'
+                            f'{_left_out(left_out)}', 'clipped')
+            case events.LimitExceeded(excess=excess, impossible=impossible):
+                if impossible:
+                    log.error(f'{light}: {impossible}', 'impossible limit')
+                if excess:
+                    log.warning(f'{light}: {", ".join(excess)}', 'limit exceeded')
+        if isinstance(event, _DIAGNOSED):
+            self._check_diagnostics()
 
     def _status_received(self, event: events.StatusReceived) -> None:
         status = event.status
@@ -138,70 +179,6 @@ class EventPublisher:
                             'flags')
         self._check_diagnostics()
 
-    def _connected(self, event: events.LightConnected) -> None:
-        self._log.info(f'light {event.address} connected', 'connection')
-        self._interface.publish('connected', True)
-        self._check_diagnostics()
-
-    def _lost(self, event: events.LightLost) -> None:
-        self._log.warning(f'light {event.address} lost: {event.reason}', 'connection')
-        self._interface.publish('connected', False)
-        self._check_diagnostics()
-
-    def _restarted(self, event: events.LightRestarted) -> None:
-        self._log.info(f'light {event.address} has restarted', 'restart')
-        if event.was_on and event.is_on is False:
-            self._log.warning(f'light {event.address} was on before it restarted, and is off now',
-                              'restart off')
-
-    def _identified(self, event: events.LightIdentified) -> None:
-        identity = event.identity
-        if identity != self._identity:
-            self._identity = identity
-            known = ' '.join(filter(None, (identity.vendor, identity.model)))
-            serial = (f', serial number {identity.serial_number}' if identity.serial_number
-                      else '')
-            self._log.info(f'light {event.address} is {known or "nameless"}{serial}', 'identity')
-            self._check_diagnostics()
-
-    def _switched(self, event: events.LightSwitched) -> None:
-        if event.left_out is not None:
-            way = event.detail if event.origin is events.Origin.REQUEST else event.origin.value
-            self._log.info(f'light {event.address} was switched {"on" if event.on else "off"} by '
-                           f'{way or "a request"}{_left_out(event.left_out)}', 'switched')
-
-    def _held(self, event: events.LightHeld) -> None:
-        change = event.change
-        reason = _REASONS[change.cause] if change.before else ''
-        self._log.info(f'light {event.address} is held by {change.after or "no source"}'
-                       f'{reason.format(change.before)}', 'holder')
-        self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
-        self._interface.publish('source', change.after or '')
-        self._check_diagnostics()
-
-    def _wish_failed(self, event: events.WishFailed) -> None:
-        self._log.warning(f'light {event.address} is not as {event.source} has asked for before: '
-                          f'{event.message}', 'wish')
-
-    def _automatic_switch(self, event: events.AutomaticSwitch) -> None:
-        on = 'on' if event.on else 'off'
-        if event.failure:
-            self._log.error(f'light {event.address} is not confirmed to be {on}, which is '
-                            f'repeated: {event.failure}', 'automatic')
-        else:
-            self._log.warning(f'light {event.address} is switched {on} by {event.reason}',
-                              'automatic')
-
-    def _changed_by_other(self, event: events.ChangedByOther) -> None:
-        if not event.undone:
-            self._log.error(
-                f'light {event.address}: another sender insists on {event.change}, which stays '
-                'from now on: only one of the two programs must control the light', 'insists')
-        elif event.left_out is not None:
-            self._log.warning(
-                f'light {event.address} was changed by another sender, which is undone: '
-                f'{event.change}{_left_out(event.left_out)}', 'changed')
-
     def _configuration_changed(self, event: events.ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names
         if event.cause is events.Cause.LIGHT and event.left_out is not None:
@@ -219,30 +196,6 @@ class EventPublisher:
             self._fit(0.0)
         if 'brightness' in names:
             self._fit_brightness(0.0)
-        self._check_diagnostics()
-
-    def _configuration_restored(self, event: events.ConfigurationRestored) -> None:
-        if event.success:
-            self._log.info(f'light {event.address} configured: {event.message}', 'configured')
-        else:
-            self._log.error(f'light {event.address} not configured: {event.message}',
-                            'not configured')
-        self._check_diagnostics()
-
-    def _setpoint_failed(self, event: events.SetpointFailed) -> None:
-        self._log.warning(f'~/{self._source}cmd/brightness: {event.message}', 'setpoint')
-
-    def _setpoint_clipped(self, event: events.SetpointClipped) -> None:
-        self._log.warning(f'~/{self._source}cmd/brightness: {event.message}: the limit is sent'
-                          f'{_left_out(event.left_out)}', 'clipped')
-
-    def _limit_exceeded(self, event: events.LimitExceeded) -> None:
-        if event.impossible:
-            self._log.error(f'light {event.address}: {event.impossible}', 'impossible limit')
-        if event.excess:
-            self._log.warning(f'light {event.address}: {", ".join(event.excess)}',
-                              'limit exceeded')
-        self._check_diagnostics()
 
     def _fit_brightness(self, brightness: float) -> None:
         """Show the limit of the brightness, or more where the light shines brighter."""
@@ -263,6 +216,10 @@ class EventPublisher:
 def _value(configuration: model.Configuration, name: str) -> object:
     value = getattr(configuration, name)
     return value.label if isinstance(value, model.Mode) else value
+
+
+def _state(on: bool) -> str:
+    return 'on' if on else 'off'
 
 
 def _left_out(changes: int) -> str:

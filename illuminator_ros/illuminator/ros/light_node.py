@@ -164,10 +164,7 @@ class LightNode:
 
     def _release_service(self, source: str) -> AnyService:
         def release(request: Trigger.Request, now: float, answer: Answer) -> None:
-            light = self._light()
-            if light is None:
-                answer(False, self.absence(now))
-            else:
+            if light := self._light_or_refusal(now, answer):
                 light.release(source, now)
                 answer(True, f'held by {light.snapshot(now).holder or "no source"}')
 
@@ -191,13 +188,17 @@ class LightNode:
 
     # Requests
 
-    def _request_enable(
-        self, source: str, on: bool, now: float, way: str, answer: Answer,
-    ) -> None:
+    def _light_or_refusal(self, now: float, answer: Answer) -> Light | None:
+        """Return the light; refuse the request if there is none."""
         light = self._light()
         if light is None:
             answer(False, self.absence(now))
-        else:
+        return light
+
+    def _request_enable(
+        self, source: str, on: bool, now: float, way: str, answer: Answer,
+    ) -> None:
+        if light := self._light_or_refusal(now, answer):
             light.enable(on, now, lambda result, now: answer(result.success, result.message),
                          detail=way, source=source)
 
@@ -215,18 +216,13 @@ class LightNode:
         self._request_enable(source, on, now, f'{prefix}topic', answer)
 
     def _refresh(self, request: Trigger.Request, now: float, answer: Answer) -> None:
-        light = self._light()
-        if light is None:
-            answer(False, self.absence(now))
-        else:
+        if light := self._light_or_refusal(now, answer):
             light.refresh(now, lambda result, now: answer(result.success, result.message))
 
     def _set_brightness(self, source: str, prefix: str, brightness: float, now: float) -> None:
-        light = self._light()
-        if light is None:
-            topic = f'{prefix}cmd/brightness'
-            self._log.warning(f'~/{topic}: {self.absence(now)}', topic)
-        else:
+        topic = f'{prefix}cmd/brightness'
+        if light := self._light_or_refusal(now, lambda success, message: self._log.warning(
+                f'~/{topic}: {message}', topic)):
             light.set_brightness(brightness, now, source=source)
 
     # The value of a parameter is of any type.
@@ -243,10 +239,7 @@ class LightNode:
                 self._log.info(f'light {self.address}: {result.note}', 'note')
             answer('' if result.success else result.message)
 
-        light = self._light()
-        if light is None:
-            answer(self.absence(now))
-        else:
+        if light := self._light_or_refusal(now, lambda success, message: answer(message)):
             light.configure(changes, now, done)
 
     # Diagnostics
@@ -267,9 +260,9 @@ class LightNode:
         return LightsHeard(len(client.lights), tuple(some), client.limit_reached)
 
 
-def _checked(overrides: Mapping[str, object], limits: SafetyLimits) -> dict[str, object]:
+def _checked(overrides: Mapping[str, object], limits: SafetyLimits) -> dict[str, float]:
     try:
-        values: dict[str, object] = {
+        values: dict[str, float] = {
             name: checked(name, value) for name, value in overrides.items()}
         for name, value in values.items():
             limits.check(name, value)
