@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields, replace
 from typing import Any
 
@@ -27,7 +27,7 @@ from .thermal import ThermalProperties
 from ..mavlink.messages import Address
 from ..payload.identity import Identity
 from ..payload.simulated import SimulatedType
-from ..payload.simulated_settings import integer, number, one_of, Setting, text
+from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 
 THERMAL = {field.name: field.default for field in fields(ThermalProperties)}
 
@@ -78,12 +78,12 @@ SETTINGS: dict[str, Setting] = {
 }
 
 
-def _profile(settings: Mapping[str, Any]) -> IlluminatorProperties:
+def _profile(settings: Values) -> IlluminatorProperties:
     return PROFILES[settings.get('profile', 'default')].properties
 
 
 def properties(
-    settings: Mapping[str, Any], address: Address, several: bool = False,
+    settings: Values, address: Address, several: bool = False,
 ) -> IlluminatorProperties:
     """
     Return the light that settings describe.

@@ -34,6 +34,7 @@ from ..mavlink.messages import (
     MAV_STATE_ACTIVE,
     MavResult,
     MavType,
+    Message,
 )
 
 
@@ -272,14 +273,14 @@ class FaultInjector:
     def __init__(self, seed: str) -> None:
         self._random = random.Random(seed)
 
-    def inject(self, message: Any, behaviour: Behaviour) -> list[tuple[float, Any]]:
+    def inject(self, message: Message, behaviour: Behaviour) -> list[tuple[float, Message]]:
         """Return the messages to send in place of one, each with its delay, s."""
         if self._occurs(behaviour.drop):
             return []
         if self._occurs(behaviour.corrupt):
             message = copy.copy(message)
             # A receiver cannot tell which byte of a frame with a wrong checksum was changed.
-            message.crc_extra = type(message).crc_extra ^ 0xFF
+            setattr(message, 'crc_extra', message.crc_extra ^ 0xFF)  # noqa: B010 - a class variable
         count = 2 if self._occurs(behaviour.duplicate) else 1
         return [(self._random.uniform(0.0, behaviour.delay) if behaviour.delay else 0.0, message)
                 for _ in range(count)]

@@ -29,7 +29,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .events import Listeners
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
-from .simulated_settings import integer, Setting
+from .simulated_settings import integer, Setting, Values
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import (
@@ -147,7 +147,7 @@ class SimulatedDevice(ABC):
     def message(self, message_id: int, now: float) -> Message | None:
         """Return a message of this moment, None if the device does not have it."""
 
-    def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
+    def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """Take a message of one of the classes of ``messages``; return the messages to send."""
         return ()
 
@@ -172,7 +172,7 @@ class SimulatedDevice(ABC):
         """Return the actual state, whatever the device reports."""
 
 
-D = TypeVar('D', bound=SimulatedDevice)
+D = TypeVar('D', bound=SimulatedDevice, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -211,8 +211,8 @@ class SimulatedType(Generic[D]):
     noun: str
     plural: str
     device: type[D]
-    make: Callable[[Mapping[str, Any], Address, bool], D]
-    address: Callable[[Mapping[str, Any]], Address]
+    make: Callable[[Values, Address, bool], D]
+    address: Callable[[Values], Address]
     settings: Mapping[str, Setting] = field(default_factory=dict)
     profiles: Mapping[str, str] = field(default_factory=dict)
     examples: Sequence[str] = ()
@@ -299,7 +299,7 @@ class SimulatedComponent(Generic[D]):
 
     def __init__(
         self, described: Description[D], now: float,
-        outgoing: deque[tuple[Address, Any]] | None = None,
+        outgoing: deque[tuple[Address, Message]] | None = None,
         changed: Callable[[], None] = lambda: None,
     ) -> None:
         self.address = self._first_address = described.address
@@ -311,8 +311,8 @@ class SimulatedComponent(Generic[D]):
         self.power_on(now)
 
     @property
-    def behaviour(self) -> Any:
-        """Return the behaviour of the device, of the payload's type."""
+    def behaviour(self) -> Behaviour:
+        """Return the behaviour of the device."""
         return self.device.behaviour
 
     def power_on(self, now: float) -> None:
@@ -362,10 +362,10 @@ class SimulatedComponent(Generic[D]):
                     self._send(self.device.message(message_id, now), now)
         self._changed()
 
-    def addressed(self, message: Any) -> bool:
+    def _is_addressed(self, message: Message) -> bool:
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
         behaviour = self.behaviour
-        system, component = message.target_system, message.target_component
+        system, component = (getattr(message, f'target_{part}') for part in Address._fields)
         if behaviour.adopts_system_id:
             system = self.address.system
         if (system, component) == self.address or not behaviour.filters_target:
@@ -373,14 +373,14 @@ class SimulatedComponent(Generic[D]):
         return bool(behaviour.answers_broadcast and (
             system == 0 or system == self.address.system and component == 0))
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Message, now: float) -> None:
         """Take a command or a message for this component, or for no one in particular."""
         behaviour = self.behaviour
         if self.silent(now):
             return
         if behaviour.adopts_system_id and source.system:
             self.address = Address(source.system, self.address.component)
-        if hasattr(message, 'target_system') and not self.addressed(message):
+        if hasattr(message, 'target_system') and not self._is_addressed(message):
             return
         if isinstance(message, self.device.messages):
             for sent in self.device.receive(source, message, now):
@@ -399,7 +399,7 @@ class SimulatedComponent(Generic[D]):
             self._consider(source, message, now)
         self._changed()
 
-    def _consider(self, source: Address, message: Any, now: float) -> None:
+    def _consider(self, source: Address, message: AnyCommand, now: float) -> None:
         """Answer a command at once, or report its progress first."""
         behaviour = self.behaviour
         if message.command not in self.device.changes:
@@ -423,7 +423,9 @@ class SimulatedComponent(Generic[D]):
             target = Address(source.system, source.component ^ 1)
         self._send(CommandAck(command, result, progress, 0, *target), now)
 
-    def _progress(self, source: Address, message: Any, begun: float, now: float) -> None:
+    def _progress(
+        self, source: Address, message: AnyCommand, begun: float, now: float,
+    ) -> None:
         """Report progress until its time is over, then finish the command."""
         duration = self.behaviour.progress
         if now >= begun + duration:
@@ -436,7 +438,7 @@ class SimulatedComponent(Generic[D]):
         self._schedule.add(min(now + PROGRESS_INTERVAL, begun + duration),
                            functools.partial(self._progress, source, message, begun))
 
-    def _finish(self, source: Address, message: Any, now: float) -> None:
+    def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
         """Acknowledge a command and do what it asks for."""
         behaviour = self.behaviour
         if message.command == MavCmd.REQUEST_MESSAGE:
@@ -463,7 +465,7 @@ class SimulatedComponent(Generic[D]):
         else:
             self.apply(change, now)
 
-    def _requested(self, message_id: float, now: float) -> Any:
+    def _requested(self, message_id: float, now: float) -> Message | None:
         if not math.isfinite(message_id) or (
                 message_id in self._streams and not self.behaviour.on_request):
             return None
@@ -472,10 +474,10 @@ class SimulatedComponent(Generic[D]):
     def _unknown(self, result: MavResult) -> MavResult:
         return MavResult.ACCEPTED if self.behaviour.accepts_unknown else result
 
-    def _set_interval(self, message: Any, now: float) -> MavResult:
+    def _set_interval(self, message: AnyCommand, now: float) -> MavResult:
         """MAV_CMD_SET_MESSAGE_INTERVAL: param2 is µs, -1 stops, 0 is the default rate."""
         behaviour, microseconds = self.behaviour, message.param2
-        stream = self._streams.get(message.param1)
+        stream = next((one for id_, one in self._streams.items() if id_ == message.param1), None)
         if stream is None or not math.isfinite(microseconds):
             return MavResult.DENIED
         default = stream.default or 1.0
@@ -571,7 +573,7 @@ class SimulatedComponents(Endpoint, Generic[D]):
         for component in self.components:
             component.link_opened(now)
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
+    def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         if source not in self._peers and len(self._peers) < MAX_PEERS:
             self._peers.add(source)

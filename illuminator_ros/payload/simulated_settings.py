@@ -16,9 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
+
+# The values of settings by name. Any: each is what its Setting.read returns.
+Values = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ def text(value: str) -> str:
     return value
 
 
-def one_of(names: Any) -> Callable[[str], str]:
+def one_of(names: Iterable[str]) -> Callable[[str], str]:
     """Return a reader of one name of several."""
     def read(text: str) -> str:
         if text not in names:

@@ -14,7 +14,7 @@ from illuminator_ros.gimbal.simulated_device import (
     SIMULATED,
     SimulatedGimbal,
 )
-from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, MavResult
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, MavResult, Message
 from illuminator_ros.payload.mount import MountFlags, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
@@ -40,7 +40,7 @@ class Bench:
         self.device = device
         self._announced = announced
 
-    def give(self, message: object, source: Address = MANAGER) -> None:
+    def give(self, message: Message, source: Address = MANAGER) -> None:
         self.endpoint.receive(source, message, self.now)
 
     def announce(self, source: Address = MANAGER, device_id: int = 154) -> None:

@@ -23,7 +23,7 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
-from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.model import (
     checked,
     Configuration,
@@ -183,8 +183,9 @@ def test_error_flags_have_readable_names(flags: int, names: list[str]) -> None:
 
 def read(**fields: Any) -> Status:
     """Return a status as it comes from the wire."""
-    return Status.from_message(
-        decode_payload(STATUS_ID, encode_payload(status_message(**fields))))
+    message = decode_payload(STATUS_ID, encode_payload(status_message(**fields)))
+    assert isinstance(message, IlluminatorStatus)
+    return Status.from_message(message)
 
 
 def test_a_plausible_status_is_read_as_sent() -> None:

@@ -16,7 +16,7 @@
 
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, cast
 
 from illuminator_ros.cli.simulator.components import (
     components,
@@ -47,8 +47,9 @@ FILE = {
 
 
 def described(*arguments: str, file: object = None) -> list[Description[SimulatedIlluminator]]:
-    return components(parser().parse_args(list(arguments)),
-                      scenario(file, 'f.yaml', TYPES) if file else Scenario(), TYPES)
+    return cast('list[Description[SimulatedIlluminator]]', components(
+        parser().parse_args(list(arguments)),
+        scenario(file, 'f.yaml', TYPES) if file else Scenario(), TYPES))
 
 
 def properties(*arguments: str, file: object = None) -> list[IlluminatorProperties]:
@@ -111,9 +112,9 @@ def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names() -> None:
 
 def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
     types: list[SimulatedType[Any]] = [SIMULATED, MANAGERS]
-    light, manager = components(parser(types).parse_args([
-        '--profile', 'px4', '--fault', 'lie,frozen-axis', '--vendor', 'ACME']), scenario(
-            {'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types), types)
+    file = scenario({'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types)
+    light, manager = cast('list[Any]', components(parser(types).parse_args([
+        '--profile', 'px4', '--fault', 'lie,frozen-axis', '--vendor', 'ACME']), file, types))
     assert light.device.properties.identity.vendor == 'ACME'
     assert manager.device.properties.gimbal.vendor == 'ACME'
     assert [faults(one) for one in (light, manager)] == [['lie'], ['lie', 'frozen-axis']]

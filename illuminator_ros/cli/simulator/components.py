@@ -25,12 +25,13 @@ from typing import Any
 
 from ..options import address
 from ...mavlink.messages import Address
-from ...payload.simulated import Description, SimulatedType
-from ...payload.simulated_settings import Setting
+from ...payload.simulated import Description, SimulatedDevice, SimulatedType
+from ...payload.simulated_settings import Setting, Values
 
 MAX_COMPONENTS = 200
 
-Types = Sequence[SimulatedType[Any]]
+Type = SimulatedType[SimulatedDevice]
+Types = Sequence[Type]
 
 
 class SettingError(ValueError):
@@ -52,7 +53,7 @@ class Listed:
 
     address: Address
     name: str = ''
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Values = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Scenario:
     """
 
     url: str = ''
-    common: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    common: Mapping[str, Values] = field(default_factory=dict)
     listed: Mapping[str, list[Listed]] = field(default_factory=dict)
 
 
@@ -90,7 +91,7 @@ def load(path: str, types: Types) -> Scenario:
     return scenario(content, path, types)
 
 
-def scenario(content: Any, path: str, types: Types) -> Scenario:
+def scenario(content: object, path: str, types: Types) -> Scenario:
     """Return the content of a file, checked; SettingError if a setting in it is wrong."""
     if not isinstance(content, Mapping):
         raise SettingError(f'{path}: it has no keys such as {types[0].plural}')
@@ -100,7 +101,7 @@ def scenario(content: Any, path: str, types: Types) -> Scenario:
     return Scenario(str(content.get('url') or ''), common, listed)
 
 
-def _listed(entries: Any, path: str, kind: SimulatedType[Any]) -> Iterator[Listed]:
+def _listed(entries: object, path: str, kind: Type) -> Iterator[Listed]:
     if not isinstance(entries, list) or not all(isinstance(one, Mapping) for one in entries):
         raise SettingError(f'{path}: {kind.plural} is not a list of {kind.plural}')
     for number, one in enumerate(entries, 1):
@@ -112,7 +113,7 @@ def _listed(entries: Any, path: str, kind: SimulatedType[Any]) -> Iterator[Liste
 
 
 def _read(
-    content: Mapping[Any, Any], others: tuple[str, ...], path: str, types: Types,
+    content: Mapping[str, object], others: tuple[str, ...], path: str, types: Types,
 ) -> dict[str, dict[str, object]]:
     """Return the settings for each type that has them; the key ``faults`` is a setting, too."""
     result: dict[str, dict[str, object]] = {one.noun: {} for one in types}
@@ -129,13 +130,13 @@ def _read(
     return result
 
 
-def _readings(name: str, text: str, types: Types) -> dict[str, Any]:
+def _readings(name: str, text: str, types: Types) -> Values:
     """
     Return the value of a setting for each type that accepts it.
 
     :raises ValueError: if none does: profiles and faults differ between types.
     """
-    result: dict[str, Any] = {}
+    result: dict[str, object] = {}
     refusal: ValueError | None = None
     for one in types:
         try:
@@ -158,7 +159,7 @@ def _as_text(value: object) -> str:
 
 def components(
     options: argparse.Namespace, file: Scenario, types: Types,
-) -> list[Description[Any]]:
+) -> list[Description[SimulatedDevice]]:
     """
     Return the components that command line and file describe.
 
@@ -189,9 +190,9 @@ def components(
     return result
 
 
-def _given(options: argparse.Namespace, types: Types) -> dict[str, dict[str, Any]]:
+def _given(options: argparse.Namespace, types: Types) -> Mapping[str, Values]:
     """Return the settings that the command line has for all components of each type."""
-    result: dict[str, dict[str, Any]] = {one.noun: {} for one in types}
+    result: dict[str, dict[str, object]] = {one.noun: {} for one in types}
     for name in dict.fromkeys(name for one in types for name in one.all_settings):
         if name == 'fault' or (text := getattr(options, name)) is None:
             continue
@@ -203,7 +204,7 @@ def _given(options: argparse.Namespace, types: Types) -> dict[str, dict[str, Any
 
 
 def _of_type(
-    options: argparse.Namespace, file: Scenario, kind: SimulatedType[Any],
+    options: argparse.Namespace, file: Scenario, kind: Type,
     given: Mapping[str, object],
 ) -> list[Listed]:
     listed = file.listed.get(kind.noun, [])
@@ -227,7 +228,7 @@ def _of_type(
     return [Listed(Address(system, component)) for component in range(first, last + 1)]
 
 
-def _named(kind: SimulatedType[Any], text: str) -> Listed:
+def _named(kind: Type, text: str) -> Listed:
     where, _, name = text.partition('=')
     with _place(f'--{kind.noun} {text}'):
         return Listed(address(where), name)
@@ -254,7 +255,7 @@ def _faults(
     return result
 
 
-def _merged(settings: Mapping[str, Setting], *layers: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(settings: Mapping[str, Setting], *layers: Values) -> Values:
     """Return the values of several layers; later layers take precedence."""
     result: dict[str, Any] = {}
     for layer in layers:

@@ -23,7 +23,7 @@ from typing import Any
 from .view import look
 from ...payload.simulated import Change, ConsoleCommand, SimulatedComponent, SimulatedDevice
 
-Component = SimulatedComponent[Any]
+Component = SimulatedComponent[SimulatedDevice]
 # Executes a command with its arguments at a time, and returns the answer.
 Execute = Callable[[list[str], float], str | None]
 

@@ -20,10 +20,9 @@ import argparse
 from collections.abc import Iterable, Sequence
 import csv
 import logging
-from typing import Any
 
 from .components import SettingError, Types
-from ...payload.simulated import Description
+from ...payload.simulated import Description, SimulatedDevice
 
 _log = logging.getLogger(__name__)
 
@@ -59,7 +58,7 @@ class RecordFile:
 
 
 def write_records(
-    options: argparse.Namespace, types: Types, described: Iterable[Description[Any]],
+    options: argparse.Namespace, types: Types, described: Iterable[Description[SimulatedDevice]],
 ) -> None:
     """
     Write the records of devices to the files that the options name.

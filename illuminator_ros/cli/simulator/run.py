@@ -27,7 +27,6 @@ import signal
 import sys
 import threading
 import time
-from typing import Any
 
 from .components import components, load, Scenario, SettingError, Types
 from .console import execute
@@ -41,7 +40,7 @@ from ...mavlink.messages import Address
 from ...mavlink.signing_files import KeyFileError
 from ...mavlink.url import parse_url, Url, UrlError
 from ...payload.registry import PayloadType
-from ...payload.simulated import Description, SimulatedComponents
+from ...payload.simulated import Description, SimulatedComponents, SimulatedDevice
 
 # s between updates of the view.
 VIEW_INTERVAL = 0.2
@@ -54,7 +53,7 @@ class _Simulation:
 
     def __init__(
         self, options: argparse.Namespace, url: Url, label: str,
-        described: list[Description[Any]], types: Types,
+        described: list[Description[SimulatedDevice]], types: Types,
     ) -> None:
         names = [str(one.address) for one in described]
         counts = Counter(type(one.device) for one in described)
@@ -68,7 +67,7 @@ class _Simulation:
         self._looks: list[Look] = []
         live = sys.stdout is not None and sys.stdout.isatty() and not options.plain
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
-        self._endpoint: SimulatedComponents[Any] = SimulatedComponents(described, 0.0)
+        self._endpoint: SimulatedComponents[SimulatedDevice] = SimulatedComponents(described, 0.0)
         self._endpoint.new_peers.subscribe(self._found)
         self._link = Link(url, self._endpoint, label=label, on_event=self._say,
                           signing=signs, store=store,

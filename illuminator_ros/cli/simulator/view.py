@@ -20,9 +20,9 @@ from collections.abc import Sequence
 import contextlib
 from dataclasses import dataclass
 import shutil
-from typing import Any, TextIO
+from typing import TextIO
 
-from ...payload.simulated import SimulatedComponent, Snapshot
+from ...payload.simulated import SimulatedComponent, SimulatedDevice, Snapshot
 
 # Lines of a terminal that are left for the console.
 SPARE_LINES = 4
@@ -47,7 +47,7 @@ class Look:
             or abs(self.snapshot.drift - other.snapshot.drift) >= 1)
 
 
-def look(component: SimulatedComponent[Any], now: float) -> Look:
+def look(component: SimulatedComponent[SimulatedDevice], now: float) -> Look:
     """Return the actual state of a component, whatever it reports."""
     device = component.device
     faults = device.faults.active(device.behaviour, device.normal)
