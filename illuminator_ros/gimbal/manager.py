@@ -203,7 +203,7 @@ class GimbalManager(Payload):
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
         self._status: GimbalDeviceAttitudeStatus | None = None
-        self._status_at = -math.inf
+        self._status_at = self._measured_at = -math.inf
         self._setpoint: Setpoint | None = None
         self._offsets = STILL
         self._place: GeoPoint | None = None
@@ -321,6 +321,8 @@ class GimbalManager(Payload):
         if now >= self._status_due:
             self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._commands.send(self.status(now))
+            if not self.has_mavlink and now >= self._measured_at + ATTITUDE_AGE:
+                self._report_commanded(now)
         if now >= self._send_due:
             self._follow(now)
 
@@ -331,12 +333,25 @@ class GimbalManager(Payload):
 
     # The device and the vehicle, as ROS knows them
 
-    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take the attitude of the device, from the link or of a device without MAVLink."""
+    def _report(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         self._status, self._status_at = status, now
         if not self.has_mavlink and self.state is ManagerState.ACTIVE:
             self._commands.send(replace(status, gimbal_device_id=self.device_id))
         self.events.emit(AttitudeReceived(status))
+
+    def _report_commanded(self, now: float) -> None:
+        """Report the setpoint as attitude of a device that reports none."""
+        attitude = self._pointing(YawFrame.VEHICLE, now) or Quaternion()
+        heading = self.vehicle.heading(now)
+        self._report(GimbalDeviceAttitudeStatus(
+            0, 0, _boot_time(now), int(MountFlags.YAW_IN_VEHICLE_FRAME),
+            (attitude.w, attitude.x, attitude.y, attitude.z), math.nan, math.nan, math.nan, 0,
+            math.nan if heading is None else heading, math.nan), now)
+
+    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Take the attitude of the device, from the link or of a device without MAVLink."""
+        self._measured_at = now
+        self._report(status, now)
 
     def vehicle_changed(self, now: float) -> None:
         """Tell the device what ROS knows of the vehicle, unless an autopilot does."""

@@ -54,6 +54,7 @@ from support.gimbal_manager import (
     AUTOPILOT,
     configure,
     DEVICE,
+    euler,
     FULL,
     GUEST,
     information,
@@ -79,12 +80,6 @@ def in_control(player: Address = PILOT, **settings: Any) -> ManagerRig:
     rig = ManagerRig(**settings)
     assert rig.take(player) is MavResult.ACCEPTED
     return rig
-
-
-def euler(message: GimbalDeviceSetAttitude) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw of a setpoint, rounded, rad."""
-    roll, pitch, yaw = (round(angle, 4) for angle in Quaternion(*message.q).euler())
-    return roll, pitch, yaw
 
 
 def last(rig: ManagerRig) -> GimbalDeviceSetAttitude:
@@ -512,14 +507,15 @@ def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:
     [ack, device], [_, manager] = (
         rig.give(PILOT, request(cls)) for cls in (GimbalDeviceInformation,
                                                   GimbalManagerInformation))
-    rig.manager.take_attitude(attitude_status(), rig.now)
+    rig.manager.take_attitude(attitude_status(HALF), rig.now)
     rig.give(PILOT)
 
     assert (device.gimbal_device_id, manager.gimbal_device_id) == (1, 1)
     assert (manager.roll_max, manager.pitch_min, manager.yaw_max) == (0.0, -1.5, 2.0)
     assert not manager.cap_flags & Capabilities.HAS_ROLL_AXIS
     assert manager.cap_flags & Capabilities.HAS_PITCH_AXIS
-    assert [one.gimbal_device_id for one in rig.messages(GimbalDeviceAttitudeStatus)] == [1]
+    status = rig.messages(GimbalDeviceAttitudeStatus)[-1]
+    assert (status.gimbal_device_id, status.q) == (1, HALF)
 
 
 # GM-20, GM-23: the device and the vehicle

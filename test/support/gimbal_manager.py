@@ -45,6 +45,7 @@ from illuminator_ros.mavlink.messages import (
     Message,
 )
 from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 
 OURS, DEVICE, AUTOPILOT = Address(1, 194), Address(1, 154), Address(1, 1)
@@ -92,15 +93,21 @@ class ManagerRig:
         self.device_information = device or information()
         self.device_is_there = not 0 < device_id < 7
         self.heading = NAN
-        self.manager = GimbalManager(CommandSender(address), ManagerSettings(
+        self.manager, self.component = self.make(CommandSender(address), ManagerSettings(
             control or ControlSettings(), device_id=device_id, **settings))
-        self.component = Component(self.manager._commands, [self.manager])
         self.manager.events.subscribe(self.events.append)
         self.component.link_opened(self.now)
         self._device_due = self.now
         if active:
             self.run(5.0)
             assert self.manager.state is ManagerState.ACTIVE
+
+    def make(
+        self, commands: CommandSender, settings: ManagerSettings,
+    ) -> tuple[GimbalManager, Component]:
+        """Return a manager and its component."""
+        manager = GimbalManager(commands, settings)
+        return manager, Component(commands, [manager])
 
     def run(self, seconds: float, *, each: Callable[[], None] = lambda: None) -> None:
         """Let time pass; ``each`` is called with each heartbeat of the device, twice a second."""
@@ -178,6 +185,12 @@ class ManagerRig:
 def of(cls: type[T], messages: Iterable[Any]) -> list[T]:
     """Return those messages or events that are of a class."""
     return [message for message in messages if isinstance(message, cls)]
+
+
+def euler(message: GimbalDeviceSetAttitude) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw of a setpoint, rounded, rad."""
+    roll, pitch, yaw = (round(angle, 4) for angle in Quaternion(*message.q).euler())
+    return roll, pitch, yaw
 
 
 def long(number: int, *params: float, to: Address = OURS, confirmation: int = 0) -> CommandLong:

@@ -1,0 +1,153 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A gimbal manager with a client in its own process, by which ROS is one of the players.
+
+The two exchange the messages of the gimbal protocol as over a link, with one address for both. So
+the manager has the same interface for ROS as a gimbal that another component manages, and ROS is
+subject to the same rules as all other players.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import islice
+import math
+from typing import Any, TypeVar
+
+from .client import GimbalClient
+from .gimbal import GimbalSettings
+from .manager import GimbalManager, ManagerSettings
+from ..mavlink.command import CommandSender, CommandStatus
+from ..mavlink.command_receiver import AnyCommand, CommandReceiver
+from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
+from ..mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    heartbeat,
+    MavResult,
+    MavType,
+    Message,
+)
+from ..payload.vehicle import GimbalDeviceAttitudeStatus
+
+T = TypeVar('T')
+
+
+class ManagerWithClient(Payload):
+    """
+    A manager, and the client that ROS uses.
+
+    :ivar client: knows the gimbal of the manager, and no other.
+    """
+
+    messages = (*GimbalManager.messages, CommandAck)
+    sends = (*GimbalManager.sends, *GimbalClient.sends)
+
+    def __init__(
+        self, commands: CommandSender, settings: ManagerSettings, client: GimbalSettings,
+    ) -> None:
+        self.manager = GimbalManager(commands, settings)
+        self._commands = commands
+        self._own = CommandSender(commands.address, commands.timeout, commands.retries)
+        self.client = GimbalClient(self._own, client)
+        self._received = CommandReceiver(commands.address)
+        self._heartbeat_due = math.inf
+
+    def link_opened(self, now: float) -> None:
+        """See :meth:`Payload.link_opened`."""
+        self._heartbeat_due = min(self._heartbeat_due, now)
+        self._manage(self.manager.link_opened, now)
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """See :meth:`Payload.link_closed`."""
+        self._heartbeat_due = math.inf
+        self._own.end_all(now, CommandStatus.LINK_LOST)
+        self.manager.link_closed(now, reason)
+        self.client.link_closed(now, reason)
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        """See :meth:`Payload.receive`."""
+        if isinstance(message, CommandAck):
+            self._own.acknowledge(source, message, now)
+        else:
+            self._manage(self.manager.receive, source, message, now)
+            if source == self.manager.device and isinstance(message, GimbalClient.messages):
+                self.client.receive(source, message, now)
+        self._serve_client(now)
+
+    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+        """See :meth:`Payload.execute`."""
+        result = self._manage(self.manager.execute, source, command, now)
+        self._serve_client(now)
+        return result
+
+    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """See :meth:`GimbalManager.take_attitude`."""
+        self._manage(self.manager.take_attitude, status, now)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        if now >= self._heartbeat_due:
+            self._heartbeat_due = now + HEARTBEAT_INTERVAL
+            alive = heartbeat(MavType.ONBOARD_CONTROLLER)
+            self.client.receive(self._commands.address, alive, now)
+            self.manager.receive(self._commands.address, alive, now)
+        self._manage(self.manager.poll, now)
+        self._own.poll(now)
+        self.client.poll(now)
+        # ROS may have used the client since the last call.
+        self._serve_client(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        if self._own.outgoing:
+            return -math.inf
+        return min(self._heartbeat_due, self.manager.next_deadline(), self.client.next_deadline(),
+                   self._own.next_deadline())
+
+    def _manage(self, call: Callable[..., T], *arguments: Any) -> T:
+        """
+        Call the manager, and let the client receive the messages that it broadcasts.
+
+        :param arguments: of the call; the last one is the time.
+        """
+        outgoing = self._commands.outgoing
+        before = len(outgoing)
+        result = call(*arguments)
+        for _, message in list(islice(outgoing, before, None)):
+            if isinstance(message, GimbalClient.messages):
+                self.client.receive(self._commands.address, message, arguments[-1])
+        return result
+
+    def _serve_client(self, now: float) -> None:
+        """Give the client's messages to the manager, or send those to the device."""
+        while self._own.outgoing:
+            source, message = self._own.outgoing.popleft()
+            target = (getattr(message, 'target_system', 0),
+                      getattr(message, 'target_component', 0))
+            if target != self._commands.address:
+                self._commands.send(message)
+            elif isinstance(message, CommandLong | CommandInt):
+                ack = self._received.take(source, message, now, self._execute)
+                if ack is not None:
+                    self._own.acknowledge(source, ack, now)
+            else:
+                self._manage(self.manager.receive, source, message, now)
+
+    def _execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+        return self._manage(self.manager.execute, source, command, now)

@@ -1,0 +1,150 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""ROS as a player: a manager with a client in its own process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected
+from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
+from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
+from illuminator_ros.gimbal.manager_client import ManagerWithClient
+from illuminator_ros.gimbal.manager_control import ControlSettings, Role
+from illuminator_ros.gimbal.manager_setpoint import Range
+from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.payload.arbitration import Policy
+from illuminator_ros.payload.mount import YawFrame
+from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.rotation import Quaternion
+import pytest
+from support.gimbal_manager import (
+    AUTOPILOT,
+    euler,
+    GUEST,
+    ManagerRig,
+    of,
+    OURS,
+    PILOT,
+    position,
+)
+
+
+class Rig(ManagerRig):
+    """A manager that is used by ROS, too."""
+
+    def __init__(self, **settings: Any) -> None:
+        self.results: list[Result] = []
+        super().__init__(**settings)
+
+    def make(
+        self, commands: CommandSender, settings: ManagerSettings,
+    ) -> tuple[GimbalManager, Component]:
+        self.both = ManagerWithClient(commands, settings, GimbalSettings())
+        self.told: list[Any] = []
+        self.both.client.events.subscribe(self.told.append)
+        return self.both.manager, Component(commands, [self.both])
+
+    @property
+    def gimbal(self) -> Gimbal:
+        [gimbal] = self.both.client.gimbals.values()
+        return gimbal
+
+    def ask(self, request: Callable[..., None], *arguments: Any) -> str:
+        """Return '' if a request of ROS succeeds, else why not."""
+        before = len(self.results)
+        request(*arguments, self.now, lambda result, now: self.results.append(result))
+        self.run(2.0, each=self.heartbeats(PILOT))
+        [result] = self.results[before:]
+        return '' if result.success else result.message
+
+
+def test_ros_takes_control_sets_the_attitude_and_releases() -> None:
+    rig = Rig()
+
+    assert rig.ask(rig.gimbal.take_control) == ''
+    assert rig.manager.control.holder(Role.PRIMARY) == OURS
+    assert rig.gimbal.set_attitude(
+        Quaternion.from_euler(0.0, 0.2, 0.3), YawFrame.VEHICLE, rig.now) == ''
+    [message] = of(GimbalDeviceSetAttitude, rig.give(PILOT))
+    # ROS: pitch down and yaw left are positive.
+    assert euler(message) == (0.0, -0.2, -0.3)
+
+    assert rig.ask(rig.gimbal.release_control) == ''
+    assert rig.manager.control.holder(Role.PRIMARY) is None
+
+
+@pytest.mark.parametrize(('policy', 'overrules', 'refused'), [
+    (Policy.HOLD, False, True), (Policy.HOLD, True, False), (Policy.TAKEOVER, False, False)])
+def test_ros_is_subject_to_the_policy(policy: Policy, overrules: bool, refused: bool) -> None:
+    rig = Rig(control=ControlSettings(
+        policy, overruling=frozenset({OURS} if overrules else ())))
+    assert rig.take(PILOT) is MavResult.ACCEPTED
+
+    message = rig.ask(rig.gimbal.take_control)
+
+    assert bool(message) == refused
+    assert ('DENIED' in message) == refused
+    assert rig.manager.control.holder(Role.PRIMARY) == (PILOT if refused else OURS)
+
+
+def test_ros_keeps_control_without_heartbeats_on_the_link_and_others_are_denied() -> None:
+    rig = Rig()
+    rig.ask(rig.gimbal.take_control)
+
+    rig.run(30.0)
+
+    assert rig.manager.control.holder(Role.PRIMARY) == OURS
+    assert rig.take(GUEST) is MavResult.DENIED
+
+
+def test_ros_gets_the_attitude_of_the_device_and_a_region_of_interest() -> None:
+    rig = Rig()
+    assert len(of(GimbalConnected, rig.told)) == 1
+    assert of(AttitudeReceived, rig.told)
+    rig.ask(rig.gimbal.take_control)
+    rig.give(AUTOPILOT, position(47.0, 8.0, 500.0))
+
+    assert rig.ask(rig.gimbal.set_roi, 47.001, 8.0, 500.0) == ''
+
+    assert math.isclose(euler(rig.messages(GimbalDeviceSetAttitude)[-1])[2], 0.0, abs_tol=1e-3)
+
+
+def test_gm_22_ros_turns_a_device_without_mavlink_that_reports_no_attitude() -> None:
+    rig = Rig(device_id=1, ranges=(Range(0.0, 0.0), Range(-1.0, 1.0), Range(-2.0, 2.0)))
+
+    assert rig.ask(rig.gimbal.take_control) == ''
+    rig.gimbal.set_attitude(Quaternion.from_euler(0.0, 0.2, 0.3), YawFrame.VEHICLE, rig.now)
+    rig.run(1.0)
+
+    attitude = of(AttitudeReceived, rig.told)[-1].attitude
+    assert attitude is not None
+    assert attitude.rotation.euler() == pytest.approx((0.0, 0.2, 0.3))
+    assert rig.messages(GimbalDeviceSetAttitude) == []
+
+
+def test_the_client_ends_its_requests_when_the_link_is_lost() -> None:
+    rig = Rig()
+    rig.ask(rig.gimbal.take_control)
+
+    rig.component.link_closed(rig.now, 'cut')
+
+    assert rig.gimbal.set_rates((0.0, 0.1, 0.0), rig.now) != ''
+    assert len(rig.both._own) == 0
