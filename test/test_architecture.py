@@ -50,6 +50,7 @@ SHARED_NAMES = {'GimbalDeviceAttitudeStatus', 'gimbal_device_id'}
 def folder(module: str) -> tuple[str, ...]:
     """Return the folder that decides what a module may import, such as ('illuminator', 'ros')."""
     parts = module.split('.')[1:]
+    # A program of its own, such as "python3 -m illuminator_ros.gimbal".
     if not parts or parts[-1] == '__main__' or (
             len(parts) == 1 and parts[0] not in SHARED | PAYLOADS):
         return ()

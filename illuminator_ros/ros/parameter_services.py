@@ -62,16 +62,17 @@ class ParameterServices:
     """
     The six parameter services of a node made with ``start_parameter_services=False``.
 
-    :param device: the parameters that the device accepts or refuses.
+    :param device: the parameters that the device accepts or refuses, None if it has none.
     """
 
     def __init__(
-        self, node: Node, link: Link, log: NodeLog, device: DeviceParameters, check: Check,
-        configure: Configure,
+        self, node: Node, link: Link, log: NodeLog, device: DeviceParameters | None = None,
+        check: Check = lambda name, value: None,
+        configure: Configure = lambda changes, now, answer: answer(''),
     ) -> None:
         self._node = node
         self._log = log
-        self._device = device
+        self._device = device or DeviceParameters(node, ())
         self._check_value = check
         self._configure = configure
         self._calls = LinkCalls(link, log)

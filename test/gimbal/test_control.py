@@ -226,3 +226,19 @@ def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(ask: Ask
     assert not success
     assert message == 'no control of gimbal 1/154: primary 1/195, secondary none'
     assert not {one.command for one in rig.managers[0].commands} & set(GimbalCommand)
+
+
+@pytest.mark.parametrize('second', [2, 171])
+def test_gm_28_requests_and_setpoints_name_one_of_the_gimbals_of_a_manager(second: int) -> None:
+    first, other = FakeManager(), FakeManager(device_id=second)
+    rig = Rig(first, other).run(5.0)
+    gimbal = next(one for one in rig.client.gimbals.values() if one.key.device_id == second)
+
+    gimbal.take_control(rig.now, rig.done)
+    rig.run(3.0)
+    gimbal.set_rates((0.0, 0.1, 0.0), rig.now)
+    rig.run(1.0)
+
+    assert rig.results[0].success
+    assert [one.key.device_id for one in rig.client.gimbals.values() if one.in_control] == [second]
+    assert (len(first.received), len(other.received)) == (0, 2)

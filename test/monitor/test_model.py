@@ -84,9 +84,29 @@ def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
     assert len(fleet.lights) == MAX_LIGHTS
 
 
+def test_values_of_unknown_lights_are_ignored() -> None:
+    fleet = fleet_with()
+
+    fleet.take('/other', 'enabled', True, 100.0)
+    fleet.diagnosed('', 'lamp', Diagnosis(2, 'broken', {}), 100.0)
+    fleet.agreed('/other', 1.0)
+
+    assert [(light.name, light.lamp) for light in fleet.lights] == [(BOW, None)]
+
+
 def test_error_flags_have_texts() -> None:
     assert fleet_with(error_flags=0x15).lights[0].flags == [
         'thermal throttling', 'thermistor failure', 'unknown flags 0x10']
+
+
+@pytest.mark.parametrize(('text', 'number'), [
+    ('12.5', 12.5), ('0', 0.0), ('n/a', None), ('nan', None), ('inf', None), (None, None)])
+def test_number_of_a_diagnosis_is_finite_or_none(
+    text: str | None, number: float | None,
+) -> None:
+    values = {} if text is None else {'loss_percent': text}
+
+    assert Diagnosis(0, '', values).number('loss_percent') == number
 
 
 def test_control_characters_of_others_never_reach_the_terminal() -> None:

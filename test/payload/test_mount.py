@@ -27,15 +27,14 @@ from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
 import pytest
 from pytest import approx
 
-np = pytest.importorskip('numpy')
 Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
 
 EARTH, VEHICLE = MountFlags.YAW_IN_EARTH_FRAME, MountFlags.YAW_IN_VEHICLE_FRAME
 LOCK = MountFlags.YAW_LOCK
 NAN = math.nan
 # The change of axes between ENU and NED, and between FLU and FRD.
-ENU_NED = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
-FLU_FRD = np.diag([1, -1, -1])
+ENU_NED = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]]).as_matrix()
+FLU_FRD = Rotation.from_matrix([[1, 0, 0], [0, -1, 0], [0, 0, -1]]).as_matrix()
 AXES = {YawFrame.EARTH: ENU_NED, YawFrame.VEHICLE: FLU_FRD}
 
 angles = st.floats(-math.pi, math.pi)

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+import contextlib
 from dataclasses import dataclass, field
 import math
 from typing import Any, TypeVar
@@ -26,7 +27,8 @@ from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.events import GimbalEvent, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.mavlink.command import CommandSender
-from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.component import Component, Endpoint
+from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -39,6 +41,7 @@ from illuminator_ros.mavlink.messages import (
     MavResult,
     Message,
 )
+from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.mount import MountFlags
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
@@ -125,10 +128,15 @@ class FakeManager:
         if not self.alive or getattr(message, 'target_system', None) is None:
             return []
         target = Address(message.target_system, message.target_component)  # type: ignore
-        if isinstance(message, gm.GimbalManagerSetAttitude) and target == self.address:
+        if (isinstance(message, gm.GimbalManagerSetAttitude) and target == self.address
+                and message.gimbal_device_id == self.device_id):
             self.received.append(message)
         if not isinstance(message, CommandLong | CommandInt) or (
                 target not in (self.address, self.device)):
+            return []
+        device_id = message.param1 if message.command in (195, 197) else getattr(
+            message, 'param7', 0)
+        if message.command in set(gm.GimbalCommand) and device_id not in (0, self.device_id):
             return []
         self.commands.append(message)
         if not self.answers:
@@ -234,6 +242,46 @@ class Rig:
             for manager in self.managers:
                 for one in manager.take(source, message):
                     self.receive(*one)
+
+
+class GimbalEndpoint(Endpoint):
+    """Fake managers as the endpoint of a link."""
+
+    messages = (CommandLong, CommandInt, gm.GimbalManagerSetAttitude)
+    sends = (gm.GimbalManagerStatus,)
+
+    def __init__(self, managers: Sequence[FakeManager]) -> None:
+        super().__init__()
+        self.managers = managers
+        self._tenth, self._due = 0, 0.0
+
+    def link_opened(self, now: float) -> None:
+        self._due = now
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        for manager in self.managers:
+            self.outgoing += manager.take(source, message)
+
+    def poll(self, now: float) -> None:
+        if now >= self._due:
+            for manager in self.managers:
+                self.outgoing += manager.sent_each(self._tenth)
+            self._tenth, self._due = self._tenth + 1, now + 0.1
+
+    def next_deadline(self) -> float:
+        return self._due
+
+
+@contextlib.contextmanager
+def served_gimbals(port: int, *managers: FakeManager) -> Iterator[None]:
+    """Serve fake managers over UDP, by the clock of this machine."""
+    url = f'udpout://127.0.0.1:{port}'
+    link = Link(parse_url(url), GimbalEndpoint(managers), label=url)
+    link.start()
+    try:
+        yield
+    finally:
+        link.stop()
 
 
 def keys(rig: Rig) -> Sequence[GimbalKey]:

@@ -12,12 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""``python3 -m illuminator_ros.rededge``."""
-
-import sys
-
-from ..cli.bridge import rededge
-
-if __name__ == '__main__':
-    sys.exit(rededge())
+"""The nodes of gimbals."""

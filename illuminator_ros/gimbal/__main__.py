@@ -12,5 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""``python3 -m illuminator_ros.gimbal``."""
 
-"""The ROS half of the camera."""
+import sys
+
+from ..cli.bridge import gimbal
+
+if __name__ == '__main__':
+    sys.exit(gimbal())

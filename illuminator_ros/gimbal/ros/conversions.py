@@ -1,0 +1,136 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages of ROS from and to attitudes, rates and places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from geometry_msgs.msg import Quaternion as QuaternionMessage
+from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
+from sensor_msgs.msg import NavSatFix
+from std_msgs.msg import Header
+
+from ...payload.mount import YawFrame
+from ...payload.rotation import Quaternion, Vector
+from ...ros.parameters import ParameterError, ParameterSpec, Values
+
+FRAME_PARAMETERS = (
+    ParameterSpec('earth_frame', 'map', 'frame_id of attitudes with a yaw relative to the earth'),
+    ParameterSpec('vehicle_frame', 'base_link_stabilized',
+                  'frame_id of attitudes with a yaw relative to the vehicle'),
+)
+GEOID_SEPARATION = ParameterSpec(
+    'geoid_separation', 0.0, 'height of the geoid above the ellipsoid, where the vehicle is', 'm',
+    -150.0, 150.0)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The names of the two yaw frames."""
+
+    earth: str
+    vehicle: str
+
+    @classmethod
+    def of(cls, values: Values) -> Frames:
+        """
+        Return those that parameters give.
+
+        :raises ParameterError: if they are equal or empty.
+        """
+        frames = cls(values['earth_frame'], values['vehicle_frame'])
+        if frames.earth == frames.vehicle or not (frames.earth and frames.vehicle):
+            raise ParameterError('earth_frame and vehicle_frame must be two different names')
+        return frames
+
+    def name(self, frame: YawFrame) -> str:
+        """Return the ``frame_id`` of a yaw frame."""
+        return self.earth if frame is YawFrame.EARTH else self.vehicle
+
+    def frame(self, header: Header) -> YawFrame:
+        """
+        Return the yaw frame that a header names.
+
+        :raises ValueError: if it names neither.
+        """
+        for frame in YawFrame:
+            if header.frame_id == self.name(frame):
+                return frame
+        raise ValueError(
+            f'frame_id {header.frame_id!r} is neither {self.earth!r} nor {self.vehicle!r}')
+
+    def read_attitude(self, message: QuaternionStamped) -> tuple[Quaternion, YawFrame]:
+        """
+        Return a rotation with norm 1 and its frame.
+
+        :raises ValueError: if the message has no known frame, or is not a rotation.
+        """
+        q = message.quaternion
+        return Quaternion(q.w, q.x, q.y, q.z).normalized(), self.frame(message.header)
+
+    def read_angles(self, message: Vector3Stamped) -> tuple[Vector, YawFrame]:
+        """
+        Return roll, pitch and yaw, rad or NaN, and their frame.
+
+        :raises ValueError: if the message has no known frame, or an angle is infinite.
+        """
+        angles = _vector(message)
+        if any(map(math.isinf, angles)):
+            raise ValueError(f'{angles} is not finite')
+        return angles, self.frame(message.header)
+
+
+def _vector(message: Vector3Stamped) -> Vector:
+    return message.vector.x, message.vector.y, message.vector.z
+
+
+def read_rates(message: Vector3Stamped) -> Vector:
+    """
+    Return rates of roll, pitch and yaw, rad/s; the frame is not read.
+
+    :raises ValueError: if one is not finite.
+    """
+    rates = _vector(message)
+    if not all(map(math.isfinite, rates)):
+        raise ValueError(f'{rates} is not finite')
+    return rates
+
+
+def read_place(message: NavSatFix, geoid_separation: float) -> Vector:
+    """
+    Return latitude and longitude, deg, and the altitude above mean sea level, m.
+
+    :param geoid_separation: m; the altitude of a NavSatFix is above the ellipsoid.
+    :raises ValueError: if the message does not have a place.
+    """
+    place = message.latitude, message.longitude, message.altitude
+    if not (abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0 and math.isfinite(place[2])):
+        raise ValueError('latitude {:g}, longitude {:g}, altitude {:g} is not a place'.format(
+            *place))
+    return place[0], place[1], place[2] - geoid_separation
+
+
+def quaternion_message(header: Header, rotation: Quaternion) -> QuaternionStamped:
+    """Return the message of a rotation."""
+    return QuaternionStamped(header=header, quaternion=QuaternionMessage(
+        x=rotation.x, y=rotation.y, z=rotation.z, w=rotation.w))
+
+
+def vector_message(header: Header, vector: Vector) -> Vector3Stamped:
+    """Return the message of angles or rates."""
+    x, y, z = vector
+    return Vector3Stamped(header=header, vector=Vector3(x=x, y=y, z=z))

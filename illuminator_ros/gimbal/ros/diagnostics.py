@@ -1,0 +1,159 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The values and findings of a gimbal in /diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from ..commands import Control
+from ..events import GimbalKey, GimbalSnapshot
+from ..messages import ErrorFlags, flag_names
+from ...mavlink.command import format_seconds
+from ...payload.mount import MountFlags
+from ...ros.diagnostics import (
+    ERROR,
+    Finding,
+    link_findings,
+    link_report,
+    LinkSnapshot,
+    OK,
+    Report,
+    Value,
+    WARN,
+    why_nothing_is_heard,
+)
+
+# s of silence that are reported: statuses and attitudes come about five times a second.
+SILENCE = 2.0
+# Error flags that do not say that the gimbal is defective.
+_CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags.AT_YAW_LIMIT
+               | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER)
+
+
+def why_no_gimbal(link: LinkSnapshot, heard: Sequence[GimbalKey]) -> str:
+    """
+    Return why a node has no gimbal, for people.
+
+    :param heard: the gimbals that other nodes serve, or that are not connected.
+    """
+    if link.state.failure:
+        return link.state.failure
+    if heard:
+        return f'gimbals {", ".join(map(str, heard))} are announced, none is connected or selected'
+    return ('no component announces a gimbal: '
+            f'{why_nothing_is_heard(link, "a gimbal manager")}')
+
+
+def reports(
+    link: LinkSnapshot, *, gimbal: GimbalSnapshot | None, heard: Sequence[GimbalKey],
+    limit_reached: bool, interval: float, started: float,
+) -> list[Report]:
+    """
+    Return the reports of a node.
+
+    :param gimbal: the node's gimbal, None if there is none yet.
+    :param interval: s between attitudes as it was requested, 0 for the device's own.
+    :param started: when the node was started, s on the link's clock.
+    """
+    manager = gimbal.managers[0] if gimbal else None
+    findings = link_findings(
+        link, manager, what='gimbal', absence=why_no_gimbal(link, heard), started=started)
+    if limit_reached:
+        findings.append((WARN, f'more than {len(heard)} gimbals, some ignored'))
+    made = [link_report(link, manager, findings, {'gimbals': len(heard)})]
+    if gimbal is not None:
+        fine = 'in control' if gimbal.in_control else 'connected'
+        hardware_id = (f'{gimbal.identity.uid:x}' if gimbal.identity and gimbal.identity.uid else
+                       f'mavlink:{gimbal.key.address.system}/{gimbal.key.device_id}')
+        made.append(Report(
+            'device', hardware_id, device_findings(gimbal, link.taken_at, interval), fine,
+            lambda: _values(gimbal, link.taken_at)))
+    return made
+
+
+def device_findings(gimbal: GimbalSnapshot, now: float, interval: float) -> list[Finding]:
+    """Return the findings on a gimbal."""
+    if gimbal.unreachable:
+        return [(ERROR, gimbal.unreachable)]
+    findings: list[Finding] = [
+        (WARN if flag in _CONDITIONS else ERROR, name)
+        for flag in _single(gimbal.errors) for name in flag_names(flag)]
+    if others := gimbal.managers[1:]:
+        findings.append((WARN, f'managers {", ".join(map(str, others))} announce the gimbal too: '
+                               f'only {gimbal.managers[0]} is used'))
+    for name, at, limit in (
+            ('GIMBAL_DEVICE_ATTITUDE_STATUS', gimbal.attitude_at, max(SILENCE, 3 * interval)),
+            ('GIMBAL_MANAGER_STATUS', gimbal.status_at, SILENCE)):
+        if now - at > limit:
+            since = f' for {format_seconds(now - at)}' if math.isfinite(at) else ''
+            findings.append((WARN, f'no {name}{since}'))
+    if gimbal.attitude_problem:
+        findings.append((WARN, f'attitude unknown: {gimbal.attitude_problem}'))
+    if not gimbal.enforces_control:
+        findings.append((OK, 'ArduPilot records who has control and obeys others too: exclusive '
+                             'control is not guaranteed'))
+    return findings
+
+
+def _single(errors: ErrorFlags) -> list[ErrorFlags]:
+    known = [flag for flag in ErrorFlags if flag & errors]
+    unknown = ErrorFlags(int(errors) & ~sum(ErrorFlags))
+    return [*known, unknown] if unknown else known
+
+
+def controller(control: Control | None) -> str:
+    """Return the components in control for people, ``unknown`` where they are not known."""
+    return 'unknown' if control is None else str(control)
+
+
+def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, Value]:
+    values: dict[str, Value] = {
+        'address': str(gimbal.key.address),
+        'gimbal_device_id': gimbal.key.device_id,
+        'manager': str(gimbal.managers[0]),
+        'connected': not gimbal.unreachable,
+        'in_control': gimbal.in_control,
+        'controller': controller(gimbal.control),
+        'control_enforced': None if gimbal.enforces_control else False,
+        'setpoints_sent': gimbal.setpoints_sent,
+        'failure_flags': int(gimbal.errors),
+        'flags': ', '.join(flag_names(gimbal.flags)),
+        'accepts_yaw_in_earth_frame': bool(gimbal.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME),
+    }
+    if math.isfinite(gimbal.attitude_at):
+        values['attitude_s_ago'] = now - gimbal.attitude_at
+    if math.isfinite(gimbal.status_at):
+        values['status_s_ago'] = now - gimbal.status_at
+    if gimbal.attitude is not None:
+        values['yaw_frame'] = gimbal.attitude.frame.value
+        # 0 is added to have no negative zero.
+        values |= {f'{axis}_rad': angle + 0.0 for axis, angle in zip(
+            ('roll', 'pitch', 'yaw'), gimbal.attitude.rotation.euler(), strict=True)}
+        values['vehicle_heading_rad'] = gimbal.attitude.heading
+    if gimbal.capabilities is not None:
+        values['capabilities'] = ', '.join(flag_names(gimbal.capabilities))
+    if gimbal.ranges is not None:
+        (roll_min, roll_max), pitch, yaw = (
+            gimbal.ranges.roll, gimbal.ranges.pitch, gimbal.ranges.yaw)
+        # With the signs of ROS: pitch down and yaw left are positive.
+        limits = {'roll_min_rad': roll_min, 'roll_max_rad': roll_max,
+                  'pitch_min_rad': -pitch[1], 'pitch_max_rad': -pitch[0],
+                  'yaw_min_rad': -yaw[1], 'yaw_max_rad': -yaw[0]}
+        values |= {name: value for name, value in limits.items() if math.isfinite(value)}
+    if gimbal.identity is not None:
+        values |= vars(gimbal.identity)
+    return values

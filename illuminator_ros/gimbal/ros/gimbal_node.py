@@ -1,0 +1,266 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The interface of the node of one gimbal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import functools
+
+from geometry_msgs.msg import QuaternionStamped, Vector3Stamped
+from rclpy.node import Node
+from sensor_msgs.msg import NavSatFix
+from std_msgs.msg import Bool, Header, String
+from std_srvs.srv import SetBool, Trigger
+
+from .conversions import (
+    Frames,
+    quaternion_message,
+    read_place,
+    read_rates,
+    vector_message,
+)
+from .diagnostics import controller, reports, why_no_gimbal
+from ..client import GimbalClient
+from ..commands import Control
+from ..events import (
+    AttitudeReceived,
+    AutomaticTakeFailed,
+    ControlChanged,
+    GimbalConnected,
+    GimbalEvent,
+    GimbalKey,
+    GimbalLost,
+    ManagerChanged,
+    SecondManager,
+)
+from ..gimbal import Gimbal, GimbalSettings
+from ..messages import ErrorFlags, flag_names
+from ...payload import request
+from ...payload.mount import MountFlags, YawFrame
+from ...payload.rotation import Quaternion, Vector
+from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
+from ...ros.link_call import LatestOnly
+from ...ros.node import (
+    Answer,
+    CommandTopic,
+    NodeInterface,
+    Publication,
+    RequestService,
+    STREAM_QOS,
+)
+from ...ros.parameter_services import ParameterServices
+from ...ros.payload import Host
+from ...ros.throttled_log import NodeLog
+
+PUBLICATIONS = (
+    Publication('connected', Bool),
+    Publication('attitude', QuaternionStamped, STREAM_QOS),
+    Publication('angular_velocity', Vector3Stamped, STREAM_QOS),
+    Publication('angles', Vector3Stamped, STREAM_QOS),
+    Publication('yaw_lock', Bool),
+    Publication('in_control', Bool),
+    Publication('controller', String),
+)
+# Requests without an argument, by service.
+REQUESTS: dict[str, Callable[[Gimbal, float, request.Done], None]] = {
+    'take_control': Gimbal.take_control,
+    'release_control': Gimbal.release_control,
+    'neutral': Gimbal.set_neutral,
+    'retract': Gimbal.retract,
+    'clear_roi': Gimbal.clear_roi,
+}
+
+
+class GimbalNode:
+    """
+    Serves one gimbal with a node; all methods are for the link's thread.
+
+    :ivar key: of the gimbal, None while there is none.
+    """
+
+    def __init__(
+        self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
+        settings: GimbalSettings,
+    ) -> None:
+        self.full_name = node.get_fully_qualified_name()
+        self.key: GimbalKey | None = None
+        self._host = host
+        self._log = log
+        self._client = client
+        self._settings = settings
+        self._frames = Frames.of(host.values)
+        self._clock = node.get_clock()
+        self._started = host.link.clock()
+        self._yaw_lock: bool | None = None
+        self._errors = ErrorFlags(0)
+        self._pointing = LatestOnly[Vector](self._point)
+        separation: float = host.values['geoid_separation']
+        self._interface = NodeInterface(
+            node, host.link, log, publications=PUBLICATIONS,
+            services=(
+                *(RequestService(name, Trigger, functools.partial(self._request, ask))
+                  for name, ask in REQUESTS.items()),
+                RequestService('set_yaw_lock', SetBool, self._set_yaw_lock)),
+            commands=(
+                CommandTopic('cmd/attitude', QuaternionStamped, self._set_attitude,
+                             self._frames.read_attitude),
+                CommandTopic('cmd/angles', Vector3Stamped, self._set_angles,
+                             self._frames.read_angles),
+                CommandTopic('cmd/rate', Vector3Stamped, self._set_rates, read_rates),
+                CommandTopic('cmd/roi', NavSatFix, self._pointing.offer,
+                             lambda message: read_place(message, separation))))
+        ParameterServices(node, host.link, log)
+        self._interface.publish('connected', False)
+        self._publish_control(None, False)
+        self.source = DiagnosticsSource(node.get_name(), self.full_name, self._look)
+
+    def bind(self, key: GimbalKey, now: float) -> None:
+        """Serve a gimbal from now on, and publish what is known of it."""
+        self.key = key
+        if (gimbal := self._gimbal()) is not None:
+            snapshot = gimbal.snapshot(now)
+            self._interface.publish('connected', not snapshot.unreachable)
+            self._publish_control(snapshot.control, snapshot.in_control)
+            for other in snapshot.managers[1:]:
+                self.take(SecondManager(key, snapshot.managers[0], other))
+
+    def release(self) -> None:
+        """Serve no gimbal: it was forgotten."""
+        self.key = None
+
+    def absence(self, now: float) -> str:
+        """Return why there is no gimbal, for people."""
+        link = self._host.diagnostics.look(now)
+        return f'no gimbal connected: {why_no_gimbal(link, tuple(self._client.gimbals))}'
+
+    def _gimbal(self) -> Gimbal | None:
+        return self._client.gimbals.get(self.key) if self.key else None
+
+    # Events
+
+    def take(self, event: GimbalEvent) -> None:
+        """Publish an event of the gimbal."""
+        if isinstance(event, AttitudeReceived):
+            self._publish_attitude(event)
+            return
+        name = f'gimbal {event.key}'
+        if isinstance(event, GimbalConnected):
+            self._log.info(f'{name} connected, manager {event.manager}', 'connection')
+            self._interface.publish('connected', True)
+        elif isinstance(event, GimbalLost):
+            self._log.warning(f'{name} lost: {event.reason}', 'connection')
+            self._interface.publish('connected', False)
+        elif isinstance(event, ControlChanged):
+            self._control_changed(name, event)
+        elif isinstance(event, SecondManager):
+            self._log.warning(
+                f'manager {event.other} announces {name} too: only {event.manager} is used, but '
+                'both may move it; disable one', 'manager')
+        elif isinstance(event, ManagerChanged):
+            self._log.warning(f'{name} is used through manager {event.after} from now on: '
+                              f'{event.before} is lost', 'manager')
+        elif isinstance(event, AutomaticTakeFailed):
+            self._log.warning(f'auto_take_control: {event.message}', 'control')
+        self._host.check_diagnostics()
+
+    def _control_changed(self, name: str, event: ControlChanged) -> None:
+        if event.was_lost:
+            self._log.warning(f'control of {name} lost: {event.after}; setpoints have stopped, '
+                              '~/take_control takes it back', 'control')
+        elif event.after is not None:
+            self._log.info(f'control of {name}: {event.after}', 'control')
+        self._publish_control(event.after, event.ours)
+
+    def _publish_control(self, control: Control | None, ours: bool) -> None:
+        self._interface.publish('in_control', ours)
+        self._interface.publish('controller', controller(control))
+
+    def _publish_attitude(self, event: AttitudeReceived) -> None:
+        publish, attitude = self._interface.publish, event.attitude
+        if attitude is not None:
+            header = Header(stamp=self._clock.now().to_msg(),
+                            frame_id=self._frames.name(attitude.frame))
+            publish('attitude', quaternion_message(header, attitude.rotation))
+            publish('angles', vector_message(header, attitude.rotation.euler()))
+            if attitude.rates is not None:
+                publish('angular_velocity', vector_message(header, attitude.rates))
+        lock = bool(event.flags & MountFlags.YAW_LOCK)
+        if lock is not self._yaw_lock:
+            self._yaw_lock = lock
+            publish('yaw_lock', lock)
+        if event.errors != self._errors:
+            self._errors = event.errors
+            names = ', '.join(flag_names(event.errors)) or 'none'
+            self._log.warning(f'gimbal {event.key}: failure flags: {names}', 'flags')
+            self._host.check_diagnostics()
+
+    # Requests
+
+    def _request(
+        self, ask: Callable[[Gimbal, float, request.Done], None], message: Trigger.Request,
+        now: float, answer: Answer,
+    ) -> None:
+        if gimbal := self._gimbal():
+            ask(gimbal, now, lambda result, now: answer(result.success, result.message))
+        else:
+            answer(False, self.absence(now))
+
+    def _set_yaw_lock(self, message: SetBool.Request, now: float, answer: Answer) -> None:
+        if gimbal := self._gimbal():
+            gimbal.set_yaw_lock(message.data, now, lambda result, now: answer(
+                result.success, result.message))
+        else:
+            answer(False, self.absence(now))
+
+    def _point(self, place: Vector, now: float, ended: Callable[[float], None]) -> None:
+        def done(result: request.Result, now: float) -> None:
+            if not result.success:
+                self._refused('cmd/roi', result.message)
+            ended(now)
+
+        if gimbal := self._gimbal():
+            gimbal.set_roi(*place, now, done)
+        else:
+            done(request.Result(False, self.absence(now)), now)
+
+    # Setpoints
+
+    def _set_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
+        gimbal = self._gimbal()
+        self._refused('cmd/attitude', gimbal.set_attitude(*value, now) if gimbal else
+                      self.absence(now))
+
+    def _set_angles(self, value: tuple[Vector, YawFrame], now: float) -> None:
+        gimbal = self._gimbal()
+        self._refused('cmd/angles', gimbal.set_angles(*value, now) if gimbal else
+                      self.absence(now))
+
+    def _set_rates(self, rates: Vector, now: float) -> None:
+        gimbal = self._gimbal()
+        self._refused('cmd/rate', gimbal.set_rates(rates, now) if gimbal else self.absence(now))
+
+    def _refused(self, topic: str, reason: str) -> None:
+        if reason:
+            self._log.warning(f'~/{topic} is not sent: {reason}', topic)
+
+    # Diagnostics
+
+    def _look(self, now: float) -> MakeReports:
+        gimbal = self._gimbal()
+        return functools.partial(
+            reports, gimbal=gimbal.snapshot(now) if gimbal else None,
+            heard=tuple(self._client.gimbals), limit_reached=self._client.limit_reached,
+            interval=self._settings.attitude_interval, started=self._started)

@@ -1,0 +1,413 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node of a gimbal: every topic, service and parameter of its interface, over real UDP."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import math
+from typing import Any
+
+from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags, GimbalCommand
+from illuminator_ros.mavlink.messages import Address, CommandInt, MavResult
+from illuminator_ros.payload.mount import from_mavlink, MountFlags, to_mavlink, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
+from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped  # noqa: E402
+from rclpy.qos import DurabilityPolicy  # noqa: E402
+from sensor_msgs.msg import NavSatFix  # noqa: E402
+from std_msgs.msg import Bool, Header, String  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+from support.fixtures import domain, own_ros, private_home, ros  # noqa: E402, F401
+from support.gimbals import ALL, FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
+from support.ports import free_port  # noqa: E402
+from support.processes import ended, Program, python, run  # noqa: E402
+from support.ros import bridge_arguments, Parameters, Ros, STREAM  # noqa: E402
+from support.waiting import eventually  # noqa: E402
+
+NOBODY = Address(0, 0)
+EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
+# 45 degrees down and 30 to the left of the vehicle, in ROS and in MAVLink.
+ROS_ANGLES = (0.0, math.radians(45), math.radians(30))
+TURNED = Quaternion.from_euler(*ROS_ANGLES)
+TRIGGERS = ('take_control', 'release_control', 'neutral', 'retract', 'clear_roi')
+
+
+def start_gimbal(ros: Ros, port: int, **parameters: Any) -> Program:  # noqa: F811
+    return python('illuminator_ros.gimbal', *bridge_arguments(port, **parameters),
+                  env={'ROS_DOMAIN_ID': str(ros.domain)})
+
+
+@contextlib.contextmanager
+def bridge(ros: Ros, *managers: FakeManager, **parameters: Any) -> Iterator[Program]:  # noqa: F811
+    """Run a bridge that serves gimbals, and fake managers that are connected to it."""
+    port = free_port()
+    with (ended(start_gimbal(ros, port, **parameters)) as program,
+          served_gimbals(port, *managers)):
+        program.wait_for('connected, manager')
+        yield program
+
+
+@pytest.fixture(scope='module')
+def served(ros: Ros) -> Iterator[tuple[Program, FakeManager]]:  # noqa: F811
+    manager = FakeManager(
+        q=to_mavlink(TURNED, YawFrame.VEHICLE), rates=(0.1, 0.2, 0.3), delta_yaw=0.5)
+    with bridge(ros, manager, setpoint_timeout=0.2, geoid_separation=47.5) as program:
+        yield program, manager
+
+
+@pytest.fixture
+def gimbal(served: tuple[Program, FakeManager]) -> Iterator[FakeManager]:
+    """Return the module's gimbal, which does as it is told."""
+    manager = served[1]
+    before = vars(manager).copy()
+    manager.received.clear()
+    manager.commands.clear()
+    yield manager
+    vars(manager).update(before, results={})
+
+
+@pytest.fixture
+def program(served: tuple[Program, FakeManager]) -> Program:
+    return served[0]
+
+
+def take_control(ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    gimbal.primary = OURS
+    ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+
+
+def trigger(ros: Ros, name: str) -> Trigger.Response:  # noqa: F811
+    answer: Trigger.Response = ros.call(Trigger, f'/gimbal/{name}', Trigger.Request())
+    return answer
+
+
+def publish(ros: Ros, name: str, message: Any) -> None:  # noqa: F811
+    ros.publisher(type(message), f'/gimbal/{name}', '/gimbal').publish(message)
+
+
+def values(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+# Published
+
+def test_gm_2_attitude_is_flu_and_its_frame_tells_what_yaw_is_relative_to(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    attitude = ros.subscribe(QuaternionStamped, '/gimbal/attitude', STREAM)
+    angles = ros.subscribe(Vector3Stamped, '/gimbal/angles', STREAM)
+    rates = ros.subscribe(Vector3Stamped, '/gimbal/angular_velocity', STREAM)
+    lock = ros.subscribe(Bool, '/gimbal/yaw_lock')
+
+    message = attitude.wait(lambda one: one.header.frame_id == 'base_link_stabilized')
+    q = message.quaternion
+    assert Quaternion(q.w, q.x, q.y, q.z).angle_to(TURNED) == pytest.approx(0, abs=1e-6)
+    assert message.header.stamp.sec > 1_600_000_000
+    assert values(angles.wait().vector) == pytest.approx(ROS_ANGLES, abs=1e-6)
+    assert values(rates.wait().vector) == pytest.approx((0.1, -0.2, -0.3))
+    assert lock.wait().data is False
+
+    gimbal.flags, gimbal.rates = MountFlags.YAW_LOCK | MountFlags.YAW_IN_EARTH_FRAME, (NAN,) * 3
+    gimbal.q = to_mavlink(TURNED, YawFrame.EARTH)
+    lock.wait_value(True)
+    angles.clear()
+    assert angles.wait(lambda one: one.header.frame_id == 'map')
+    assert values(angles.wait().vector) == pytest.approx(ROS_ANGLES, abs=1e-6)
+    rates.clear()
+    angles.wait(count=4)
+    assert not rates.messages
+
+
+def test_state_topics_give_late_subscribers_the_last_value(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    for name, type_ in (('connected', Bool), ('yaw_lock', Bool), ('in_control', Bool),
+                        ('controller', String)):
+        assert ros.subscribe(type_, f'/gimbal/{name}').wait()
+        [info] = ros.node.get_publishers_info_by_topic(f'/gimbal/{name}')
+        assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+
+
+def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:  # noqa: F811
+    controller = ros.subscribe(String, '/gimbal/controller')
+    gimbal.primary = OTHER
+    controller.wait_value('primary 1/195, secondary none')
+    take_control(ros, gimbal)
+    controller.wait_value('primary 1/194, secondary none')
+    lost = program.count('control of gimbal 1/154 lost: primary 1/195')
+
+    gimbal.primary, gimbal.secondary = OTHER, OURS
+    controller.wait_value('primary 1/195, secondary 1/194')
+
+    program.wait_for('control of gimbal 1/154 lost: primary 1/195', count=lost + 1)
+    ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
+
+
+# Services
+
+def test_gm_16_control_is_taken_and_released_by_services(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    for name, primary in (('take_control', OURS), ('release_control', NOBODY)):
+        answer = trigger(ros, name)
+        assert answer.success, answer.message
+        assert 'confirmed by GIMBAL_MANAGER_STATUS' in answer.message
+        assert gimbal.primary == primary
+    gimbal.results[GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE] = MavResult.DENIED
+    answer = trigger(ros, 'take_control')
+    assert not answer.success
+    assert answer.message.startswith('refused: MAV_RESULT_DENIED')
+
+
+@pytest.mark.parametrize(('name', 'flag'), [
+    ('neutral', MountFlags.NEUTRAL), ('retract', MountFlags.RETRACT)])
+def test_positions_are_taken_by_services(
+        name: str, flag: MountFlags, ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    take_control(ros, gimbal)
+
+    assert trigger(ros, name).success
+    assert gimbal.flags & flag
+
+
+def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_service(
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:  # noqa: F811
+    take_control(ros, gimbal)
+
+    publish(ros, 'cmd/roi', NavSatFix(latitude=47.39, longitude=8.54, altitude=535.5))
+
+    [place] = eventually(
+        lambda: [one for one in gimbal.commands if isinstance(one, CommandInt)])
+    assert (place.command, place.frame, place.x, place.y, place.z) == (
+        195, 0, 473900000, 85400000, 488.0)
+    assert trigger(ros, 'clear_roi').success
+    publish(ros, 'cmd/roi', NavSatFix(latitude=91.0, longitude=8.54, altitude=0.0))
+    program.wait_for('~/cmd/roi: latitude 91')
+
+
+def test_gm_3_yaw_lock_is_set_by_a_service_unless_the_gimbal_lacks_it(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    take_control(ros, gimbal)
+    lock = ros.subscribe(Bool, '/gimbal/yaw_lock')
+    for on in (True, False):
+        answer = ros.call(SetBool, '/gimbal/set_yaw_lock', SetBool.Request(data=on))
+        assert answer.success, answer.message
+        lock.wait_value(on)
+
+
+def test_gm_14_services_without_control_say_who_has_it(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    gimbal.primary = OTHER
+    ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
+    for name in ('neutral', 'retract', 'clear_roi'):
+        answer = trigger(ros, name)
+        assert (answer.success, answer.message) == (
+            False, 'no control of gimbal 1/154: primary 1/195, secondary none')
+
+
+# Setpoints
+
+@pytest.mark.parametrize(('header', 'frame'), [
+    (EARTH, YawFrame.EARTH), (VEHICLE, YawFrame.VEHICLE)])
+@pytest.mark.parametrize('as_angles', [True, False])
+def test_gm_4_attitude_and_angles_are_the_same_setpoint(
+        header: Header, frame: YawFrame, as_angles: bool, ros: Ros,  # noqa: F811
+        gimbal: FakeManager) -> None:
+    take_control(ros, gimbal)
+    if as_angles:
+        roll, pitch, yaw = ROS_ANGLES
+        publish(ros, 'cmd/angles', Vector3Stamped(
+            header=header, vector=Vector3(x=roll, y=pitch, z=yaw)))
+    else:
+        publish(ros, 'cmd/attitude', QuaternionStamped(header=header, quaternion=QuaternionMessage(
+            x=2 * TURNED.x, y=2 * TURNED.y, z=2 * TURNED.z, w=2 * TURNED.w)))
+
+    sent = eventually(lambda: gimbal.received)[0]
+
+    assert from_mavlink(sent.q, frame).angle_to(TURNED) == pytest.approx(0, abs=1e-6)
+    assert sent.flags & frame.flag
+
+
+def test_angle_that_is_nan_is_left_as_it_is(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    take_control(ros, gimbal)
+    publish(ros, 'cmd/angles', Vector3Stamped(header=VEHICLE, vector=Vector3(x=NAN, y=0.1, z=NAN)))
+
+    sent = eventually(lambda: gimbal.received)[0]
+
+    assert from_mavlink(sent.q, YawFrame.VEHICLE).euler() == pytest.approx(
+        (0.0, 0.1, ROS_ANGLES[2]), abs=1e-6)
+
+
+def test_rate_is_sent_and_zero_follows_once_after_the_time_out(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    take_control(ros, gimbal)
+    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(y=0.2, z=-0.1)))
+
+    eventually(lambda: len(gimbal.received) == 2)
+
+    assert [(one.angular_velocity_x, one.angular_velocity_y, one.angular_velocity_z)
+            for one in gimbal.received] == [
+        (0.0, pytest.approx(-0.2), pytest.approx(0.1)), (0.0, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize(('topic', 'message', 'text'), [
+    ('cmd/attitude', QuaternionStamped(header=Header(frame_id='odom')),
+     "frame_id 'odom' is neither 'map' nor 'base_link_stabilized'"),
+    ('cmd/attitude', QuaternionStamped(header=EARTH, quaternion=QuaternionMessage(w=0.0)),
+     '(0, 0, 0, 0) is not a rotation'),
+    ('cmd/angles', Vector3Stamped(header=Header(frame_id='base_link')),
+     "frame_id 'base_link' is neither 'map' nor 'base_link_stabilized'"),
+    ('cmd/angles', Vector3Stamped(header=EARTH, vector=Vector3(x=math.inf)),
+     '(inf, 0.0, 0.0) is not finite'),
+    ('cmd/rate', Vector3Stamped(vector=Vector3(z=NAN)),
+     '(0.0, 0.0, nan) is not finite')])
+def test_wrong_setpoint_is_refused_with_the_reason(
+        topic: str, message: Any, text: str, ros: Ros, gimbal: FakeManager,  # noqa: F811
+        program: Program) -> None:
+    take_control(ros, gimbal)
+    publish(ros, topic, message)
+
+    program.wait_for(f'~/{topic}: {text}')
+    assert gimbal.received == []
+
+
+def test_gm_14_setpoint_without_control_is_not_sent_and_the_log_names_the_controller(
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:  # noqa: F811
+    gimbal.primary = OTHER
+    ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
+    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=0.1)))
+
+    program.wait_for('~/cmd/rate is not sent: no control of gimbal 1/154: primary 1/195')
+    assert gimbal.received == []
+
+
+# Diagnostics
+
+def report(ros: Ros, wanted: str) -> DiagnosticStatus:  # noqa: F811
+    """Return the first status of the device whose message has a text."""
+    def statuses(array: DiagnosticArray) -> list[DiagnosticStatus]:
+        return [one for one in array.status
+                if one.name == 'gimbal: device' and wanted in one.message]
+
+    found: DiagnosticStatus = statuses(
+        ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait(statuses))[0]
+    return found
+
+
+def test_diagnostics_name_flags_limits_identity_and_control(
+        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+    take_control(ros, gimbal)
+    status = report(ros, 'in control')
+    shown = {one.key: one.value for one in status.values}
+    assert (status.level, status.hardware_id) == (DiagnosticStatus.OK, '4d')
+    assert {'vendor': 'Maker', 'model': 'Turn', 'firmware_version': '1.2.3',
+            'controller': 'primary 1/194, secondary none', 'manager': '1/1',
+            'yaw_frame': 'vehicle', 'pitch_rad': '0.785398', 'pitch_min_rad': '-0.5',
+            'pitch_max_rad': '1.5'}.items() <= shown.items()
+    assert 'has yaw lock' in shown['capabilities']
+
+    gimbal.failure_flags = ErrorFlags.MOTOR_ERROR | ErrorFlags.AT_PITCH_LIMIT | 1 << 20
+    status = report(ros, 'motor error')
+    assert status.level == DiagnosticStatus.ERROR
+    assert status.message == 'motor error; unknown flags 0x100000; at pitch limit'
+    gimbal.failure_flags, gimbal.q = 0, (NAN,) * 4
+    assert report(ros, 'attitude unknown').level == DiagnosticStatus.WARN
+    gimbal.reports = False
+    assert report(ros, 'no GIMBAL_MANAGER_STATUS for').level == DiagnosticStatus.WARN
+
+
+# Several gimbals, parameters, start and end
+
+def test_gm_26_each_further_gimbal_has_a_node_and_a_second_manager_is_reported(
+        own_ros: Ros) -> None:  # noqa: F811
+    managers = [FakeManager(), FakeManager(device_id=2, primary=OTHER), FakeManager(OTHER, 2),
+                FakeManager(OTHER, device_alive=False)]
+    with bridge(own_ros, *managers, gimbal_device_id=154) as program:
+        for node in ('gimbal', 'gimbal_1_2', 'gimbal_1_2_195'):
+            own_ros.subscribe(Bool, f'/{node}/connected').wait_value(True)
+        controllers = [own_ros.subscribe(String, f'/{node}/controller').wait().data
+                       for node in ('gimbal_1_2', 'gimbal_1_2_195')]
+        assert sorted(controllers) == [
+            'primary 1/195, secondary none', 'primary none, secondary none']
+        program.wait_for('announces gimbal 1/154 too')
+        assert report(own_ros, 'announce the gimbal too: only 1/').level == DiagnosticStatus.WARN
+
+
+def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
+        own_ros: Ros) -> None:  # noqa: F811
+    manager = FakeManager(autopilot=3)
+    with bridge(own_ros, manager, auto_take_control='true') as program:
+        own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+        assert 'exclusive control is not guaranteed' in report(own_ros, 'ArduPilot').message
+        assert program.end() == 0
+        assert manager.primary == NOBODY
+        assert program.count('gimbal 1/154: control released') == 1
+
+
+def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
+        own_ros: Ros) -> None:  # noqa: F811
+    lacking = ALL & ~Capabilities.HAS_YAW_LOCK & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
+    manager = FakeManager(primary=OURS, capabilities=lacking)
+    with bridge(own_ros, manager, attitude_interval=0.05, earth_frame='odom') as program:
+        own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+        answer = own_ros.call(SetBool, '/gimbal/set_yaw_lock', SetBool.Request(data=True))
+        assert (answer.success, answer.message) == (
+            False, 'gimbal 1/154 does not have HAS_YAW_LOCK')
+        publish(own_ros, 'cmd/attitude', QuaternionStamped(header=Header(frame_id='odom')))
+        program.wait_for('~/cmd/attitude is not sent: gimbal 1/154 does not have')
+        eventually(lambda: [one for one in manager.commands if one.command == 511
+                            and (one.param1, one.param2) == (285, 50_000)])
+
+
+def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:  # noqa: F811
+    with bridge(own_ros, FakeManager(), payloads='[gimbal, illuminator]'):
+        own_ros.subscribe(Bool, '/gimbal/connected').wait_value(True)
+        assert own_ros.subscribe(Bool, '/illuminator/connected').wait().data is False
+        assert {'gimbal_device_id', 'beam_range'} <= {*Parameters(own_ros, '/gimbal').names()}
+
+
+def test_lost_gimbal_is_reported(own_ros: Ros) -> None:  # noqa: F811
+    manager = FakeManager()
+    with bridge(own_ros, manager) as program:
+        connected = own_ros.subscribe(Bool, '/gimbal/connected')
+        connected.wait_value(True)
+        manager.alive = manager.device_alive = False
+        connected.wait_value(False)
+        program.wait_for('gimbal 1/154 lost: nothing from')
+        assert report(own_ros, 'nothing from').level == DiagnosticStatus.ERROR
+
+
+def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:  # noqa: F811
+    with ended(start_gimbal(own_ros, free_port())) as program:
+        program.wait_for('link open')
+        for name in TRIGGERS:
+            answer = trigger(own_ros, name)
+            assert (answer.success, answer.message) == (
+                False, 'no gimbal connected: no component announces a gimbal: nothing is received')
+
+
+@pytest.mark.parametrize(('parameter', 'text'), [
+    ('earth_frame:=base_link_stabilized', 'two different names'),
+    ('gimbal_device_id:=256', 'out of range'), ('setpoint_timeout:=0', 'out of range')])
+def test_wrong_parameter_is_refused(parameter: str, text: str) -> None:
+    done = run('illuminator_ros.gimbal', '--ros-args', '-p', parameter)
+
+    assert done.returncode == 2
+    assert text in done.stderr
