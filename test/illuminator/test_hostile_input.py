@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 import itertools
 import math
@@ -26,6 +27,7 @@ from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import (
     Address,
     Heartbeat,
+    heartbeat,
     LAYOUTS,
 )
 from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
@@ -38,6 +40,7 @@ import pytest
 from support.fake_light import status_message
 from support.frames import frame_of, heartbeat_frame, raw_v2
 from support.siege import BridgeSiege, GENUINE, Siege, SIEGES
+from support.simulated_link import SimulatedLink
 
 
 @pytest.mark.parametrize(('kind', 'mode'), list(itertools.product(sorted(SIEGES), SigningMode)))
@@ -97,6 +100,50 @@ def test_a_flood_is_bounded_and_the_genuine_light_is_served(
     assert {name: sizes[name] for name in full} == full
     assert list(bridge.controller.lights) == [GENUINE]
     bridge.check_service()
+
+
+class NeverEmpty(deque[Any]):
+    """An inbox with a flood behind the genuine frames; time passes while a datagram is read."""
+
+    def __init__(self, link: SimulatedLink, frames: Iterable[bytes]) -> None:
+        super().__init__()
+        self._link = link
+        self._flood = itertools.cycle(frames)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def popleft(self) -> Any:
+        self._link.now += 0.0002
+        return super().popleft() if len(self) else (next(self._flood), ('127.0.0.2', 1))
+
+
+@pytest.mark.parametrize('frames', [
+    [frame_of(heartbeat(2), number, Address(9, 9)) for number in range(256)],
+    [raw_v2(30, bytes(28), crc_extra=39, source=Address(1, 1), sequence=number)
+     for number in range(256)],
+    [heartbeat_frame(address) for address in forged(300)],
+    [frame_of(status_message(number), number % 256, Address(1, 1)) for number in range(500)],
+    [bytes(range(256)) * 5],
+], ids=['heartbeats', 'unused messages', 'lights', 'statuses', 'noise'])
+@pytest.mark.parametrize('fault', ['', 'silence'])
+def test_a_set_ends_within_0_9_s_in_a_flood_that_never_ends(
+    bridge: BridgeSiege, frames: list[bytes], fault: str,
+) -> None:
+    light, link = bridge.controller.lights[GENUINE], bridge.link
+    ended: list[tuple[bool, float]] = []
+    link.socket.inbox = NeverEmpty(link, frames)
+    bridge.genuine(2.0)
+    if fault:
+        bridge.disturb(fault)
+    begun = link.now
+    link.call(lambda now: light.configure(
+        {'brightness': 55.0}, now,
+        lambda result, now: ended.append((result.success, now - begun))))
+    bridge.genuine(1.2)
+    [(success, seconds)] = ended
+    assert success != bool(fault)
+    assert seconds < 0.9
 
 
 def test_a_flood_of_signed_streams_is_bounded() -> None:

@@ -23,7 +23,7 @@ from typing import Any, cast
 
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated import describe, simulated_lights
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.command import MAX_WAITING
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
@@ -142,7 +142,7 @@ class BridgeSiege(Siege):
         self._light = SimulatedComponent(
             describe(IlluminatorProperties(address=GENUINE)), self.link.now)
         self._party = Codec(self._signing(7))
-        self._genuine(3.0)
+        self.genuine(3.0)
         self._check_command()
 
     def take(self, data: bytes, peer: Any) -> None:
@@ -151,18 +151,21 @@ class BridgeSiege(Siege):
                 self._light.receive(source, message, self.link.now)
                 self._flush()
 
+    def disturb(self, fault: str) -> None:
+        """Give the genuine light a fault of the simulator."""
+        self._light.behave(FAULTS.add(self._light.behaviour, fault), self.link.now)
+
     def _flush(self) -> None:
         while self._light.outgoing:
             frame = self._party.frame(*self._light.outgoing.popleft(), self.link.now)
             self.link.socket.inbox.append((frame, GENUINE_PEER))
 
-    def _genuine(self, seconds: float) -> None:
-        """Let time pass with the genuine light alone."""
+    def genuine(self, seconds: float) -> None:
+        """Let time pass with the genuine light, and with what else is in the inbox."""
         until = self.link.now + seconds
         while self.link.now < until:
             self._light.poll(self.link.now)
             self._flush()
-            self.link.receive()
             self.link.run(min(self._light.next_deadline(), until) - self.link.now + 0.001)
 
     def busy(self) -> None:
@@ -199,7 +202,7 @@ class BridgeSiege(Siege):
             assert size <= bound, f'{size} {what}, more than {bound}'
 
     def check_service(self) -> None:
-        self._genuine(ANSWERED_WITHIN)
+        self.genuine(ANSWERED_WITHIN)
         assert all(len(results) == 1 for results in self.results), (
             f'{sum(not results for results in self.results)} requests without an answer, '
             f'{sum(len(results) > 1 for results in self.results)} with more than one')
@@ -221,7 +224,7 @@ class BridgeSiege(Siege):
                 light.configure({'brightness': brightness}, now, done)
 
             self.link.ask(ask)
-            self._genuine(2.0)
+            self.genuine(2.0)
             assert [result.success for result in results] == [True, True], results
             lamp = self._light.device
             assert (lamp.enabled, lamp.configuration.brightness) == (on, brightness)
