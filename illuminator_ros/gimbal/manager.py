@@ -295,6 +295,7 @@ class GimbalManager(Payload):
                 self._autopilot_at = now
             elif isinstance(message, Attitude | GlobalPositionInt):
                 self.vehicle.take(message, now)
+                self.vehicle_changed(now)
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """See :meth:`Payload.execute`."""
@@ -354,7 +355,7 @@ class GimbalManager(Payload):
         self._report(status, now)
 
     def vehicle_changed(self, now: float) -> None:
-        """Tell the device what ROS knows of the vehicle, unless an autopilot does."""
+        """Tell the device the vehicle's state, unless an autopilot does."""
         if (self.device is None or self.state is not ManagerState.ACTIVE
                 or now < self._autopilot_at + AUTOPILOT_SILENCE
                 or now < self._state_sent_at + AUTOPILOT_INTERVAL):

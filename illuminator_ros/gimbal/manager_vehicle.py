@@ -67,9 +67,12 @@ class VehicleState:
         if isinstance(message, Attitude):
             self._attitude.set(Quaternion.from_euler(
                 message.roll, message.pitch, message.yaw), now, link=True)
+            self._yaw_rate.set(message.yawspeed, now, link=True)
         else:
             self._position.set(GeoPoint(
                 message.lat / 1e7, message.lon / 1e7, message.alt / 1e3), now, link=True)
+            self._velocity.set(
+                (message.vx / 100, message.vy / 100, message.vz / 100), now, link=True)
             self._home_altitude = (message.alt - message.relative_alt) / 1e3
 
     def set_attitude(self, attitude: Quaternion, yaw_rate: float, now: float) -> None:

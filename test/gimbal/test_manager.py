@@ -529,6 +529,15 @@ def test_gm_20_the_attitude_of_the_device_is_an_event() -> None:
     assert rig.messages(GimbalDeviceAttitudeStatus) == []
 
 
+def test_the_device_learns_the_vehicle_from_an_autopilot_that_knows_no_gimbal() -> None:
+    rig = ManagerRig()
+
+    [message] = of(AutopilotStateForGimbalDevice, rig.give(AUTOPILOT, vehicle_yaw(0.5)))
+
+    assert (message.target_system, message.target_component) == DEVICE
+    assert Quaternion(*message.q).euler() == pytest.approx((0.0, 0.0, 0.5))
+
+
 @pytest.mark.parametrize('autopilot_sends', [False, True])
 def test_the_device_learns_the_vehicle_from_ros_where_no_autopilot_tells_it(
         autopilot_sends: bool) -> None:

@@ -1,0 +1,133 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A vehicle on one link: an autopilot, a simulated gimbal, and its manager."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import math
+
+from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
+from illuminator_ros.gimbal.manager_control import ControlSettings
+from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component, Endpoint, HeartbeatTimer
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import Address, CommandAck, Message
+from illuminator_ros.mavlink.url import parse_url
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt
+from support.gimbal_manager import AUTOPILOT, DEVICE, OURS
+
+HERE = 47.0, 8.0, 500.0
+MAV_TYPE_QUADROTOR = 2
+
+
+class Autopilot(Endpoint):
+    """Reports a vehicle that heads east."""
+
+    messages = ()
+    sends = (Attitude, GlobalPositionInt)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._heartbeat = HeartbeatTimer(AUTOPILOT, MAV_TYPE_QUADROTOR)
+        self._due = 0.0
+
+    def link_opened(self, now: float) -> None:
+        self._heartbeat.due = now
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        return
+
+    def poll(self, now: float) -> None:
+        self._heartbeat.poll(now, self.outgoing)
+        if now >= self._due:
+            self._due = now + 0.1
+            latitude, longitude, altitude = HERE
+            for message in (
+                    Attitude(0, 0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0),
+                    GlobalPositionInt(0, round(latitude * 1e7), round(longitude * 1e7),
+                                      round(altitude * 1e3), round(altitude * 1e3), 0, 0, 0, 0)):
+                self.outgoing.append((AUTOPILOT, message))
+
+    def next_deadline(self) -> float:
+        return min(self._due, self._heartbeat.due)
+
+
+class Vehicle(Endpoint):
+    """
+    Endpoints that hear each other and the link, as behind a router.
+
+    :ivar acks: all acknowledgements that they have sent.
+    """
+
+    def __init__(self, *endpoints: Endpoint) -> None:
+        super().__init__()
+        self.endpoints = endpoints
+        self.acks: list[CommandAck] = []
+        self.messages = tuple(dict.fromkeys(cls for one in endpoints for cls in one.messages))
+        self.sends = tuple(dict.fromkeys(cls for one in endpoints for cls in one.sends))
+
+    def link_opened(self, now: float) -> None:
+        for one in self.endpoints:
+            one.link_opened(now)
+        self._route(now)
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        for one in self.endpoints:
+            if type(message) in one.messages:
+                one.receive(source, message, now)
+        self._route(now)
+
+    def poll(self, now: float) -> None:
+        for one in self.endpoints:
+            one.poll(now)
+        self._route(now)
+
+    def next_deadline(self) -> float:
+        return min(one.next_deadline() for one in self.endpoints)
+
+    def _route(self, now: float) -> None:
+        while any(one.outgoing for one in self.endpoints):
+            for sender in self.endpoints:
+                while sender.outgoing:
+                    source, message = sender.outgoing.popleft()
+                    self.outgoing.append((source, message))
+                    if isinstance(message, CommandAck):
+                        self.acks.append(message)
+                    for one in self.endpoints:
+                        if one is not sender and type(message) in one.messages:
+                            one.receive(source, message, now)
+
+
+@contextlib.contextmanager
+def managed_gimbal(
+    port: int, control: ControlSettings | None = None,
+) -> Iterator[tuple[GimbalManager, SimulatedGimbal, Vehicle]]:
+    """Serve a gimbal and its manager to UDP peers that send to a port."""
+    url = f'udpin://127.0.0.1:{port}'
+    commands = CommandSender(OURS)
+    manager = GimbalManager(commands, ManagerSettings(control or ControlSettings()))
+    device = SimulatedGimbal(GimbalProperties(DEVICE))
+    vehicle = Vehicle(Component(commands, [manager]), Autopilot(), SimulatedComponents(
+        [Description(DEVICE, device)], 0.0))
+    link = Link(parse_url(url), vehicle, label=url)
+    link.start()
+    try:
+        yield manager, device, vehicle
+    finally:
+        link.stop()
