@@ -198,7 +198,7 @@ def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_serv
         195, 0, 473900000, 85400000, 488.0)
     assert trigger(ros, 'clear_roi').success
     publish(ros, 'cmd/roi', NavSatFix(latitude=91.0, longitude=8.54, altitude=0.0))
-    program.wait_for('~/cmd/roi: latitude 91')
+    program.wait_for('~/cmd/roi: ignored: latitude 91')
 
 
 def test_gm_3_yaw_lock_is_set_by_a_service_unless_the_gimbal_lacks_it(
@@ -284,7 +284,7 @@ def test_wrong_setpoint_is_refused_with_the_reason(
     take_control(ros, gimbal)
     publish(ros, topic, message)
 
-    program.wait_for(f'~/{topic}: {text}')
+    program.wait_for(f'~/{topic}: ignored: {text}')
     assert gimbal.received == []
 
 
@@ -294,7 +294,7 @@ def test_gm_14_setpoint_without_control_is_not_sent_and_the_log_names_the_contro
     ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
     publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=0.1)))
 
-    program.wait_for('~/cmd/rate is not sent: no control of gimbal 1/154: primary 1/195')
+    program.wait_for('~/cmd/rate: ignored: no control of gimbal 1/154: primary 1/195')
     assert gimbal.received == []
 
 
@@ -371,7 +371,7 @@ def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
         assert (answer.success, answer.message) == (
             False, 'gimbal 1/154 does not have HAS_YAW_LOCK')
         publish(own_ros, 'cmd/attitude', QuaternionStamped(header=Header(frame_id='odom')))
-        program.wait_for('~/cmd/attitude is not sent: gimbal 1/154 does not have')
+        program.wait_for('~/cmd/attitude: ignored: gimbal 1/154 does not have')
         eventually(lambda: [one for one in manager.commands if one.command == 511
                             and (one.param1, one.param2) == (285, 50_000)])
 
@@ -399,8 +399,9 @@ def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:  # noq
         program.wait_for('link open')
         for name in TRIGGERS:
             answer = trigger(own_ros, name)
-            assert (answer.success, answer.message) == (
-                False, 'no gimbal connected: no component announces a gimbal: nothing is received')
+            assert not answer.success
+            assert answer.message.startswith(
+                'no gimbal connected: no component announces a gimbal: nothing is received')
 
 
 @pytest.mark.parametrize(('parameter', 'text'), [

@@ -254,7 +254,7 @@ class GimbalNode:
 
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
-            self._log.warning(f'~/{topic} is not sent: {reason}', topic)
+            self._log.warning(f'~/{topic}: ignored: {reason}', topic)
 
     # Diagnostics
 
