@@ -89,16 +89,6 @@ def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
     assert any(one.failure for one in pair.recorder.others if isinstance(one, AutomaticSwitch))
 
 
-def test_a_light_without_statuses_goes_off_after_silence_too() -> None:
-    light = FakeLight(stream=0.0)
-    light.answers.clear()
-    pair = silenced(light)
-    pair.enable(True)
-    pair.run(SILENCE + 1.0)
-
-    assert [command.param1 for command in pair.commands(ON_OFF)] == [1.0, 0.0]
-
-
 def test_a_light_that_was_lost_meanwhile_goes_off_when_it_is_heard_again() -> None:
     light = FakeLight()
     pair = silenced(light)

@@ -130,27 +130,6 @@ def test_the_answer_to_a_set_says_how_the_light_shows_it(
     assert sent(faked)[0][0] == (2 if 'mode' in changes else 1)
 
 
-@pytest.mark.parametrize('result', [DENIED, None])
-def test_a_set_that_is_not_accepted_changes_nothing(
-    fake: FakeLight, faked: Pair, result: MavResult | None,
-) -> None:
-    fake.results[CONFIGURE] = result
-    before = faked.snapshot.configuration
-    assert not faked.configure(brightness=50).success
-    faked.run(5.0)
-    assert faked.snapshot.configuration == before
-    assert len(faked.recorder.changes) == 1
-
-
-def test_a_discrepancy_ends_when_the_light_shows_the_change(fake: FakeLight, faked: Pair) -> None:
-    fake.apply_after = 2.0
-    assert not faked.configure(brightness=50).success
-    assert faked.snapshot.discrepancy
-    faked.run(3.0)
-    assert faked.snapshot.discrepancy == ''
-    assert confirmed(faked).brightness == 50.0
-
-
 def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
     pair = Pair(mute()).settle()
     assert pair.snapshot.configuration is None
@@ -364,18 +343,6 @@ def test_a_stream_goes_on_after_a_failure(fake: FakeLight, faked: Pair) -> None:
     assert fake.fields['brightness'] == 40.0
 
 
-def test_a_setpoint_does_not_wait_for_a_lost_light(fake: FakeLight, faked: Pair) -> None:
-    fake.results[CONFIGURE] = None
-    publish(faked, 30.0, 40.0)
-    faked.close()
-    assert any('the link is not open' in one for one in faked.recorder.failed_setpoints)
-    faked.run(5.0)
-    fake.results[CONFIGURE] = ACCEPTED
-    faked.open()
-    faked.run(5.0)
-    assert fake.fields['brightness'] == 100.0
-
-
 def test_a_setpoint_before_the_first_status_fails_with_the_reason() -> None:
     pair = Pair(mute()).settle()
     publish(pair, 40.0)
@@ -429,15 +396,6 @@ def test_overrides_within_the_limits_are_sent_as_one_command(
     fake.fields['brightness'] = 5.0
     pair.run(2.0)
     assert confirmed(pair).brightness == 5.0
-
-
-def test_overrides_are_sent_once_however_late_the_light_is_found(fake: FakeLight) -> None:
-    fake.silent = True
-    pair = overriding(fake, brightness=30.0).settle(600.0)
-    for silent in (False, True, False):
-        fake.silent = silent
-        pair.run(30.0)
-    assert sent(pair) == [(1, 30, 0, 0)]
 
 
 @pytest.mark.parametrize('result', [DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_LONG_ONLY])

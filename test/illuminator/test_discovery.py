@@ -23,7 +23,6 @@ from illuminator_ros.illuminator.events import (
     LightConnected,
     LightForgotten,
     LightFound,
-    StatusReceived,
 )
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.messages import (
@@ -92,14 +91,6 @@ def test_one_message_that_any_component_may_send_announces_no_light(
     assert client.heard == []
 
 
-def test_lights_are_announced_once_in_the_order_of_their_statuses(client: Heard) -> None:
-    order = [Address(1, 244), Address(1, 243), Address(1, 244)]
-    for source in order:
-        client.receive(source, status_message(), 0.0)
-    assert [event.address for event in client.heard if isinstance(event, LightFound)] == order[:2]
-    assert isinstance(client.heard[2], StatusReceived)
-
-
 def test_forged_heartbeats_do_not_keep_a_real_light_out() -> None:
     pair = Pair(FakeLight(stream=0.0))
     for source in FORGED:
@@ -152,11 +143,3 @@ def test_a_light_that_is_not_wanted_is_named_and_not_commanded() -> None:
     assert client.ignored == (Address(1, 243),)
     assert {message.target_system for _, message in client.outgoing
             if hasattr(message, 'target_system')} == {2}
-
-
-def test_nothing_is_sent_after_the_link_was_closed(client: Heard) -> None:
-    client.receive(LIGHT, status_message(), 0.0)
-    client.outgoing.clear()
-    client.link_closed(0.1, 'lost')
-    client.run(10.0)
-    assert not client.outgoing

@@ -19,10 +19,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 import itertools
-import math
 from typing import Any
 
-from illuminator_ros.illuminator.model import checked
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -178,14 +176,6 @@ def send_status(bridge: BridgeSiege, later_ms: int = 10, **fields: Any) -> None:
     """Send a status in the name of the genuine light."""
     uptime_ms = bridge.controller.lights[GENUINE].status.uptime_ms + later_ms
     flood(bridge, [frame_of(status_message(uptime_ms, **{'enable': 1, **fields}), 0, GENUINE)])
-
-
-@pytest.mark.parametrize('low', [math.nan, -1.0, math.inf, 5.0])
-def test_implausible_limits_refuse_nothing(bridge: BridgeSiege, low: float) -> None:
-    light = bridge.controller.lights[GENUINE]
-    send_status(bridge, min_strobe_period=low, max_strobe_period=math.nan)
-    assert not light.limits.known
-    assert checked('strobe_period', 7.0, light.limits) == 7.0
 
 
 def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSiege) -> None:

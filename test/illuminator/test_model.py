@@ -226,9 +226,3 @@ def test_a_status_names_all_its_implausible_fields() -> None:
                   temp_c=INF)
     assert status.invalid == ('mode 9', 'enable 9', 'brightness nan', 'strobe_period -1',
                               'strobe_duty_cycle 101', 'temp_c inf')
-
-
-def test_the_reported_configuration_has_the_shortest_numbers() -> None:
-    assert read(brightness=60.1, strobe_period=0.1, strobe_duty_cycle=33.3).configuration(
-        BASE) == Configuration(Mode.INTERNAL_CONTROL, 60.1, 0.1, 33.3)
-    assert read(strobe_period=1e-45).configuration(BASE).strobe_period == 0.0

@@ -234,15 +234,6 @@ def test_off_overtakes_the_requests_before_it(pair: Pair) -> None:
     assert [answer.result.success for answer in answers] == [False, True, False, False, True]
 
 
-def test_each_configuration_builds_on_the_one_before(pair: Pair) -> None:
-    answers = [pair.ask_configure(brightness=40), pair.ask_configure(strobe_period=2),
-               pair.ask_configure(strobe_duty_cycle=30)]
-    pair.run(2.0)
-    assert all(answer.result.success for answer in answers)
-    last = pair.commands(CONFIGURE)[-1]
-    assert (last.param2, last.param3, last.param4) == (40, 2, 30)
-
-
 def test_switches_and_configurations_do_not_wait_for_each_other(
     fake: FakeLight, faked: Pair,
 ) -> None:
@@ -316,22 +307,6 @@ def test_an_answer_may_start_the_next_request(pair: Pair, kind: MavCmd) -> None:
     assert log == [True] * 6
 
 
-def test_an_answer_to_a_request_that_waited_may_start_another(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[CONFIGURE] = None
-    log: list[bool] = []
-    faked.ask_configure(brightness=1)
-    faked.light.configure(
-        {'brightness': 2}, faked.now, lambda result, now: faked.light.configure(
-            {'brightness': 3}, now, lambda result, now: log.append(result.success)))
-    faked.run(0.9)
-    fake.results.clear()
-    faked.run(1.0)
-    assert log == [True]
-    assert fake.fields['brightness'] == 3.0
-
-
 def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> None:
     def done(result: Result, now: float) -> None:
         raise RuntimeError('as the test says')
@@ -361,16 +336,6 @@ def test_cancelling_ends_each_request_once_and_sends_nothing_that_waited(
     faked.run(60.0)
     assert [len(answer.results) for answer in answers] == [1, 1, 1]
     assert len(faked.commands(ON_OFF, CONFIGURE)) == sent
-
-
-def test_after_cancelling_the_next_request_is_sent_at_once(fake: FakeLight, faked: Pair) -> None:
-    fake.results[ON_OFF] = [IN_PROGRESS, ACCEPTED]
-    faked.ask_enable(True)
-    faked.run(0.1)
-    faked.light.cancel(faked.now)
-    answer = faked.ask_enable(False)
-    assert faked.wait_for(answer).success
-    assert answer.seconds < 0.1
 
 
 # The time of a set
@@ -465,21 +430,6 @@ def test_a_refresh_ends_once_and_in_time_with_the_reason(
     assert f'ILLUMINATOR_STATUS: {status}' in answers[0].result.message
     assert f'COMPONENT_INFORMATION_BASIC: {identity}' in answers[0].result.message
     assert max(answer.seconds for answer in answers) <= REFRESH_LIMIT
-
-
-def test_the_limit_of_a_refresh_holds_whatever_the_timeout_of_commands(fake: FakeLight) -> None:
-    pair = Pair(fake, command_timeout=10.0).settle()
-    change(fake, stream=0.0, results={REQUEST: None})
-    assert pair.wait_for(pair.ask_refresh()).message == (
-        'ILLUMINATOR_STATUS: nothing came, COMPONENT_INFORMATION_BASIC: nothing came (5.00 s)')
-
-
-def test_a_refresh_ends_when_the_link_is_lost(pair: Pair) -> None:
-    answer = pair.ask_refresh()
-    pair.close()
-    pair.run(0.1)
-    assert not answer.result.success
-    assert 'the link was lost' in answer.result.message
 
 
 # All lights at once

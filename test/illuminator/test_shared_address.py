@@ -56,10 +56,6 @@ def different(lights: list[FakeLight]) -> Pair:
     return pair.settle(6.0)
 
 
-def test_two_lights_that_show_the_same_are_taken_for_one() -> None:
-    assert not two()[0].settle(10.0).snapshot.shared_address
-
-
 @pytest.mark.parametrize('offset', [0.0, 0.01, 0.5])
 def test_parameters_move_once_at_most_and_nothing_is_sent_while_lights_differ(
     offset: float,
@@ -130,25 +126,6 @@ def test_a_set_makes_two_lights_equal_again(different: Pair) -> None:
     assert not different.snapshot.shared_address
     assert different.snapshot.configuration
     assert different.snapshot.configuration.brightness == 70.0
-
-
-def test_a_setpoint_equal_to_the_parameter_is_sent(
-    different: Pair, lights: list[FakeLight],
-) -> None:
-    assert different.snapshot.configuration
-    different.light.set_brightness(different.snapshot.configuration.brightness, different.now)
-    different.run(1.0)
-    assert len({light.fields['brightness'] for light in lights}) == 1
-
-
-def test_parameters_follow_again_once_the_lights_agree(
-    different: Pair, lights: list[FakeLight],
-) -> None:
-    for light in lights:
-        light.fields |= {'enable': 1, 'brightness': 55.0}
-    different.run(6.0)
-    assert different.snapshot.configuration
-    assert different.snapshot.configuration.brightness == 55.0
 
 
 @pytest.mark.parametrize('instance', [0, 2])

@@ -264,16 +264,6 @@ def test_one_light_with_odd_uptimes_is_not_taken_for_several(
     assert not observed.conflict.detected
 
 
-def test_frames_that_a_slower_path_repeats_are_not_those_of_a_second_light() -> None:
-    conflict = AddressConflict()
-    frames = [Status.from_message(status_message(100_000 + 1000 * number, enable=number % 3 > 1))
-              for number in range(20)]
-    for number in range(2, 20):
-        conflict.take(frames[number], 1000.0 + number, commanded=False)
-        conflict.take(frames[number - 2], 1000.1 + number, commanded=False)
-    assert not conflict.detected
-
-
 def test_a_conflict_ends_when_the_statuses_agree_again() -> None:
     observed = Observed()
     observed.see(*[OFF, ON] * 6)

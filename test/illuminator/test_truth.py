@@ -151,49 +151,9 @@ def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
     assert faked.wait_for(answer).success
 
 
-def test_a_second_refusal_is_reported_at_once(fake: FakeLight, faked: Pair) -> None:
-    fake.results[ON_OFF] = MavResult.DENIED
-    for _ in range(2):
-        answer = faked.ask_enable(True)
-        assert faked.wait_for(answer).message.startswith('refused: MAV_RESULT_DENIED')
-        assert answer.seconds < 0.5
-
-
 # Off overtakes
 
-@pytest.mark.parametrize('result', [MavResult.IN_PROGRESS, None])
-def test_off_overtakes_on_that_waits_or_is_in_progress(
-    fake: FakeLight, faked: Pair, result: MavResult | None,
-) -> None:
-    fake.results[ON_OFF] = result
-    ons = [faked.ask_enable(True) for _ in range(31)]
-    faked.run(0.45)
-    fake.results[ON_OFF] = MavResult.ACCEPTED
-    off = faked.ask_enable(False)
-    assert [command.param1 for command in faked.commands(ON_OFF, since=faked.now)] == [0.0]
-    assert faked.wait_for(off).success
-    assert off.seconds < 1.0
-    assert {on.result.success for on in ons} == {False}
-    assert {on.result.message for on in ons} == {'cancelled by a later request'}
-
-
 # Restarts
-
-def test_two_restarts_in_a_row_do_not_lose_the_configuration(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    assert faked.configure(brightness=5.0).success
-    faked.run(60.0)
-    fake.restart(faked.now)
-    faked.run(1.1)
-    fake.silent = True
-    fake.restart(faked.now)
-    faked.run(1.08)
-    fake.silent = False
-    faked.run(6.0)
-    assert fake.fields['brightness'] == 5.0
-    assert faked.snapshot.configuration is not None
-    assert faked.snapshot.configuration.brightness == 5.0
 
 
 # Events

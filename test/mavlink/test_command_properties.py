@@ -16,16 +16,12 @@
 
 from __future__ import annotations
 
-import itertools
-
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 from illuminator_ros.mavlink.command import CommandStatus, MAX_WAITING
 from illuminator_ros.mavlink.messages import Address
-import pytest
-from support.command_rig import ACCEPTED, DENIED, IN_PROGRESS, LIGHT, LONG, REJECTED, Rig, Run
-from support.faulty_wire import Faults, FaultyWire
+from support.command_rig import LIGHT, LONG, Rig, Run
 
 COMPONENTS = st.sampled_from([LIGHT, Address(1, 244)])
 COMMANDS = st.sampled_from([405, 406])
@@ -97,63 +93,3 @@ class CommandSenderMachine(RuleBasedStateMachine):
 
 TestCommandSenderMachine = CommandSenderMachine.TestCase
 TestCommandSenderMachine.settings = settings(max_examples=80, stateful_step_count=30)
-
-
-class Executor:
-    """
-    A target at the other end of a bad line, which denies half of its commands.
-
-    Some take a second, during which it reports progress and rejects what comes again.
-    """
-
-    def __init__(self, rig: Rig, faults: Faults) -> None:
-        self.rig = rig
-        self.there, self.back = FaultyWire(faults, '1 there'), FaultyWire(faults, 1)
-        self.results: dict[int, int] = {}
-        self.busy: dict[int, float] = {}
-        self._seen = 0
-
-    def run(self, seconds: float) -> None:
-        """Let time pass on both sides in small steps."""
-        end = self.rig.now + seconds
-        while self.rig.now < end and not all(run.outcomes for run in self.rig.runs):
-            self.rig.run(0.01)
-            for _, message in self.rig.frames[self._seen:]:
-                self.there.send(message.command.to_bytes(2, 'little'), self.rig.now)
-            self._seen = len(self.rig.frames)
-            for data in self.there.receive(self.rig.now):
-                self._take(int.from_bytes(data, 'little'))
-            for command in [c for c, until in self.busy.items() if self.rig.now >= until]:
-                del self.busy[command]
-                self._answer(command, ACCEPTED)
-            for data in self.back.receive(self.rig.now):
-                self.rig.ack(data[2], int.from_bytes(data[:2], 'little'))
-
-    def _take(self, command: int) -> None:
-        if command in self.busy:
-            self._answer(command, REJECTED)
-        elif command % 4 == 0 and command not in self.results:
-            self.busy[command] = self.rig.now + 1.0
-            self._answer(command, IN_PROGRESS)
-        else:
-            self._answer(command, ACCEPTED if command % 2 == 0 else DENIED)
-
-    def _answer(self, command: int, result: int) -> None:
-        if result in (ACCEPTED, DENIED):
-            self.results[command] = result
-        self.back.send(command.to_bytes(2, 'little') + bytes([result]), self.rig.now)
-
-
-@pytest.mark.parametrize(('loss', 'reorder', 'duplicate'), list(itertools.product(
-    (0.0, 0.1, 0.3, 0.5), (0.0, 0.3), (0.0, 0.3))))
-def test_every_outcome_over_a_bad_line_is_one_and_true(
-        loss: float, reorder: float, duplicate: float) -> None:
-    rig = Rig()
-    executor = Executor(rig, Faults(drop=loss, reorder=reorder, duplicate=duplicate,
-                                    delay=reorder))
-    runs = {command: rig.start(command) for command in range(1000, 1100)}
-    executor.run(LONG)
-    answered = [command for command, run in runs.items()
-                if run.outcome.status is CommandStatus.ANSWERED]
-    assert all(runs[command].outcome.result == executor.results[command] for command in answered)
-    assert len(answered) >= {0.0: 100, 0.1: 90, 0.3: 60, 0.5: 30}[loss]

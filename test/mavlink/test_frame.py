@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-import random
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
@@ -253,14 +252,6 @@ def test_frame_comes_with_its_last_byte_whatever_its_signature_looks_like(
     for frame, mark in sent:
         whole = frame[:-6] + mark if frame[0] == 0xFD and frame[2] == FLAG_SIGNED else frame
         assert [bytes_of(found) for found in decoder.feed(whole)] == [whole]
-
-
-def test_all_of_2000_frames_are_found_with_up_to_40_random_bytes_between_them() -> None:
-    # pymavlink finds 70 % of them.
-    chance = random.Random(1)
-    sent = [frame_of(chance.choice(EVERY_MESSAGE), number % 256) for number in range(2000)]
-    data = b''.join(chance.randbytes(chance.randrange(41)) + frame for frame in sent) + FILLER
-    assert [bytes_of(frame) for frame in Decoder().feed(data)] == sent
 
 
 def test_longest_frame_is_read_and_a_chain_of_false_beginnings_takes_no_more_memory() -> None:

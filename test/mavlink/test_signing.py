@@ -24,7 +24,6 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink import signing as module
-from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.signing import (
     MAX_STREAMS,
@@ -145,14 +144,6 @@ def test_forged_frame_changes_nothing(first: list[Any], forged: Any) -> None:
     assert signing.accepts(signed(STAMP, source=Address(9, 9)), NOW)
 
 
-def test_forged_frames_do_not_fill_the_table_of_streams() -> None:
-    signing = checker()
-    for number in range(2 * MAX_STREAMS):
-        assert not signing.accepts(signed(STAMP, key=WRONG_KEY, link_id=number % 7,
-                                          source=Address(number // 256, number % 256)), NOW)
-    fill(signing, NOW)
-
-
 # Replays
 
 @pytest.mark.parametrize(('stamps', 'accepted'), [
@@ -181,15 +172,6 @@ def test_own_frame_that_returns_is_accepted_once() -> None:
     signing = checker()
     data = signing.sign(frame_of(signed=True), NOW)
     assert [signing.accepts(only(data), NOW) for _ in range(2)] == [True, False]
-
-
-def test_frames_of_mavlink_1_between_signed_ones_are_refused_and_lose_no_state() -> None:
-    signing, peer, decoder = checker(), Peer(key=KEY, timestamp=STAMP), Decoder()
-    old, first = (one.encode(twin(EVERY_MESSAGE[0]), version=version)
-                  for one, version in ((Peer(), 1), (peer, 2)))
-    stream = old + first + old + first + peer.encode(twin(EVERY_MESSAGE[0]))
-    assert [signing.accepts(frame, NOW) for frame in decoder.feed(stream)] == [
-        False, True, False, False, True]
 
 
 @given(st.lists(st.tuples(

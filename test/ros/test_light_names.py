@@ -148,15 +148,3 @@ def test_each_node_takes_its_own_section_of_a_parameter_file_but_for_link_parame
     bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is of the link, and ignored "
                     'here: that of /illuminator holds')
     assert bridge.count('ignored here') == 1
-
-
-def test_invalid_parameter_of_a_further_light_is_named_and_the_other_lights_are_served(
-    own_ros: Ros, start: Start, tmp_path: Path,
-) -> None:
-    file = tmp_path / 'lights.yaml'
-    file.write_text('/illuminator_1_244: {ros__parameters: {brightness: 400.0}}\n')
-
-    bridge, lights = start('--params-file', str(file), unserved=(SECOND,))
-
-    bridge.wait_for('light 1/244 gets no node: brightness 400 % is out of range')
-    assert light_of(own_ros, '/illuminator', lights) == FIRST

@@ -20,7 +20,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Temperature
-from support.light import Address, MavCmd, ON_OFF, ServedLight
+from support.light import Address, MavCmd, ServedLight
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import CLOCK
 
@@ -38,23 +38,6 @@ def test_bridge_sends_from_its_address_and_leaves_the_status_interval_alone(
 
         assert light.fake.heard_from == {address}
         assert light.commands(INTERVAL) == []
-
-
-@pytest.mark.parametrize(('retries', 'text'), [(0, '(1 try, '), (1, '(2 tries, ')])
-def test_command_retries_and_command_timeout_bound_the_wait(
-    own_ros: Ros, port: int, retries: int, text: str,
-) -> None:
-    with (running_bridge(own_ros.domain, port, command_retries=retries, command_timeout=0.1),
-          ServedLight(port) as light):
-        Parameters(own_ros).wait(brightness=100.0)
-        light.fake.results[ON_OFF] = None
-        call = own_ros.start_enable()
-        for tries in range(1, retries + 2):
-            light.wait_for(ON_OFF, tries)
-            CLOCK.forward(0.1)
-
-        assert not call.result().success
-        assert text in call.result().message
 
 
 def test_simulated_time_without_a_clock_affects_stamps_only(own_ros: Ros, port: int) -> None:

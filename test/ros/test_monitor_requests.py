@@ -174,28 +174,3 @@ def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Be
     assert bench.light.wanted == {'enabled': False}
     bench.enable.calls[0][1].set_result(SetBool.Response(success=True, message='late'))
     assert bench.light.action.outcome is Outcome.PENDING
-
-
-def test_failed_call_and_missing_service_are_reported(bench: Bench) -> None:
-    bench.ask(switch)
-    bench.enable.calls[0][1].set_exception(RuntimeError('broken'))
-    assert bench.light.action.answer == 'RuntimeError: broken'
-
-    bench.enable.ready = False
-    bench.ask(switch)
-
-    assert bench.switches == [True]
-    assert '/bow/enable' in bench.light.action.answer
-
-
-def test_setpoint_is_requested_until_it_is_known(bench: Bench) -> None:
-    bench.requests.poll()
-    assert bench.getter.calls == []
-
-    bench.light.setpoint = None
-    bench.requests.poll()
-    bench.requests.poll()
-    assert len(bench.getter.calls) == 1
-    bench.poll(ANSWER_LIMIT)
-
-    assert len(bench.getter.calls) == 2

@@ -24,8 +24,6 @@ import sys
 
 from illuminator_ros.mavlink.link import Link
 import pytest
-from rclpy.qos import qos_profile_sensor_data
-from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 from support.light import MavResult, ON_OFF, ServedLight
 from support.processes import environment, prepare_child
@@ -94,17 +92,3 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
         light.fake.results[ON_OFF] = MavResult.FAILED
         pass_time_until(lambda: all(call.answered for call in calls), step=0.1)
         assert all(call.result().message for call in calls)
-
-
-def test_best_effort_publisher_is_heard(own_ros: Ros, port: int) -> None:
-    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
-        bridge.wait_for('connected')
-        publisher = own_ros.node.create_publisher(
-            Bool, '/illuminator/cmd/enable', qos_profile_sensor_data)
-        eventually(publisher.get_subscription_count)
-
-        def heard() -> bool:
-            publisher.publish(Bool(data=True))
-            return bool(light.commands(ON_OFF))
-
-        eventually(heard)

@@ -90,17 +90,6 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
         eventually(lambda: screen.restored)
 
 
-def test_ctrl_z_is_ignored_without_a_shell_that_could_continue_it(own_ros: Ros) -> None:
-    with terminal(env=domain(own_ros)) as screen:
-        screen.wait_for('no lights in this ROS graph yet')
-
-        screen.type('\x1a')
-        eventually(lambda: screen.raw.count('\x1b[?1049h') == 2)
-        screen.type('?')
-
-        screen.wait_for('any key goes back')
-
-
 def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> None:
     with terminal(env=domain(own_ros)) as screen:
         screen.wait_for('no lights in this ROS graph yet')
