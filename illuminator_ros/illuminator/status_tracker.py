@@ -127,6 +127,7 @@ class SendingTimes:
 
     def __init__(self) -> None:
         self._last: Status | None = None
+        self._last_at = -math.inf
         # Without wraps, from the first status on.
         self._running_ms = 0
         # The uptimes differ by multiples of this, 0 means no clock; and whether different
@@ -150,14 +151,14 @@ class SendingTimes:
             self._running_ms += ahead_ms
             self._has_repeated |= not ahead_ms and status != self._last
             self._step_ms = math.gcd(self._step_ms, ahead_ms)
-        self._last = status
         if now >= self._half_ends:
-            is_next = now < self._half_ends + COMPARED_TIME / 2
-            self._least_before = self._least if is_next else math.inf
+            is_comparable = now < self._last_at + COMPARED_TIME
+            self._least_before = self._least if is_comparable else math.inf
             self._least, self._half_ends = math.inf, now + COMPARED_TIME / 2
         known = min(self._least, self._least_before)
         running, step = self._running_ms / 1000, self._step_ms / 1000
         self._least = min(self._least, now - running)
+        self._last, self._last_at = status, now
         if not step or known == math.inf:
             return now, False
         if step > MAX_STEP and not self._has_repeated:

@@ -127,6 +127,9 @@ def test_a_clock_that_is_a_little_wrong_shows_no_restart(drift: float, interval:
     ([(5000, 100.0), (6001, 101.0), (6301, 103.3), (6401, 103.4)], 101.401, True),
     # Nor does the time since the last quick one, which the error of a clock may explain.
     ([(5000, 100.0), (6001, 101.0), (9301, 104.36), (9901, 104.95)], 104.901, True),
+    # Nor a pause.
+    ([(5000, 100.0), (6001, 101.0), (8802, 108.9)], 103.802, True),
+    ([(5000, 100.0), (6001, 101.0), (8802, 109.1)], 109.1, False),
     # One that was sent in time, at regular intervals, is not older than it is.
     ([(5000, 100.0), (6000, 101.0), (7000, 102.0)], 102.0, True),
     ([(5000, 100.0), (6000, 101.0), (7000, 102.9)], 102.001, True),
