@@ -23,7 +23,7 @@ from ..payload.registry import PayloadType
 PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
-        simulated='illuminator_ros.illuminator.simulated_settings:SIMULATED',
+        simulated='illuminator_ros.illuminator.simulated:SIMULATED',
         checks='illuminator_ros.illuminator.checks.requirements:CHECKS'),
     PayloadType('rededge', simulated='illuminator_ros.rededge.simulated:SIMULATED'),
     PayloadType(

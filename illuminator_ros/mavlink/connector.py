@@ -77,19 +77,16 @@ class Connector:
     Every try counts as failed until ``backoff.succeeded()`` says otherwise: a channel that can be
     opened need not lead anywhere.
 
-    :param opened: called in that thread with the open channel, never after :meth:`stop`.
-    :param failed: called in that thread with the reason, after each failure.
-    :param ended: called in that thread if it ends without a channel.
+    :param report: called in that thread with the open channel, never after :meth:`stop`; with the
+        reason after each failure; with None if the thread ends without a channel.
     """
 
     def __init__(
-        self, url: Url, opened: Callable[[Channel], None], failed: Callable[[str], None],
-        ended: Callable[[], None] = lambda: None, *, backoff: Backoff | None = None,
+        self, url: Url, report: Callable[[Channel | str | None], None], *,
+        backoff: Backoff | None = None,
     ) -> None:
         self._url = url
-        self._opened = opened
-        self._failed = failed
-        self._ended = ended
+        self._report = report
         self.backoff = backoff or Backoff()
         self._stopping = threading.Event()
         # s that the last try took.
@@ -115,7 +112,7 @@ class Connector:
             while not self._try():
                 pass
         except BaseException:
-            self._ended()
+            self._report(None)
             raise
 
     def _try(self) -> bool:
@@ -127,10 +124,10 @@ class Connector:
         try:
             channel = open_channel(self._url)
         except OSError as error:
-            self._failed(error.strerror or str(error))
+            self._report(error.strerror or str(error))
         except Exception as error:
             _log.exception('internal error while opening')
-            self._failed(repr(error))
+            self._report(repr(error))
         else:
             self._hand_over(channel)
             return True
@@ -140,6 +137,6 @@ class Connector:
     def _hand_over(self, channel: Channel) -> None:
         with self._handing_over:
             if not self._stopping.is_set():
-                self._opened(channel)
+                self._report(channel)
                 return
         channel.close()

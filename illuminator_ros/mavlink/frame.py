@@ -233,62 +233,37 @@ class Decoder:
         self.counters.foreign += count
         return start
 
-    def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
-        """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""
-        if data[start] == STX_V2:
-            return self._read_v2(data, start)
-        return self._read_v1(data, start)
-
     def _is_frame(self, data: bytes, start: int) -> bool:
         """Return whether a whole and good frame begins here."""
         found = self._read(data, start) if data[start:start + 1] in STARTS else None
         return found is not None and found[1] is not None
 
-    def _read_v2(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
-        if len(data) - start < HEADER_V2:
+    def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
+        """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""
+        version, header, at = (
+            (2, HEADER_V2, start + 4) if data[start] == STX_V2 else (1, HEADER_V1, start + 2))
+        if len(data) - start < header:
             return None
-        length, flags, _, sequence, system, component = data[start + 1:start + 7]
-        message_id = int.from_bytes(data[start + 7:start + HEADER_V2], 'little')
+        length, flags = data[start + 1], data[start + 2] if version == 2 else 0
+        sequence, system, component = data[at:at + 3]
+        message_id = int.from_bytes(data[at + 3:start + header], 'little')
         layout = self.layouts.get(message_id)
         # "Incompatibility flags": a frame with a flag that is not understood must be dropped.
-        if layout is None or flags & ~FLAG_SIGNED:
-            self.counters.unknown_ids += layout is None
-            return 1, None
-        end = start + HEADER_V2 + length + CHECKSUM
-        size = end - start + (SIGNATURE if flags & FLAG_SIGNED else 0)
-        if len(data) < start + size:
-            return None
-        if not self._checksum_right(data, start, end, layout.crc_extra):
-            return 1, None
-        frame = Frame(
-            2, sequence, Address(system, component), message_id,
-            data[start + HEADER_V2:end - CHECKSUM])
-        if flags & FLAG_SIGNED:
-            frame.signature = data[end:start + size]
-            frame.signed_part = data[start:end]
-        return size, frame
-
-    def _read_v1(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
-        if len(data) - start < HEADER_V1:
-            return None
-        length, sequence, system, component, message_id = data[start + 1:start + HEADER_V1]
-        layout = self.layouts.get(message_id)
         # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting
         # for the rest of it would hold back the good frames behind.
-        if layout is None or length > layout.size:
+        if layout is None or flags & ~FLAG_SIGNED or version == 1 and length > layout.size:
             self.counters.unknown_ids += layout is None
             return 1, None
-        end = start + HEADER_V1 + length + CHECKSUM
-        if len(data) < end:
+        end = start + header + length + CHECKSUM
+        size = end - start + (SIGNATURE if flags else 0)
+        if len(data) < start + size:
             return None
-        if not self._checksum_right(data, start, end, layout.crc_extra):
+        body = data[start + 1:end - CHECKSUM] + bytes((layout.crc_extra,))
+        if mcrf4xx(body) != int.from_bytes(data[end - CHECKSUM:end], 'little'):
+            self.counters.crc_errors += 1
             return 1, None
-        return end - start, Frame(
-            1, sequence, Address(system, component), message_id,
-            data[start + HEADER_V1:end - CHECKSUM])
-
-    def _checksum_right(self, data: bytes, start: int, end: int, crc_extra: int) -> bool:
-        body = data[start + 1:end - CHECKSUM] + bytes((crc_extra,))
-        right = mcrf4xx(body) == int.from_bytes(data[end - CHECKSUM:end], 'little')
-        self.counters.crc_errors += not right
-        return right
+        frame = Frame(version, sequence, Address(system, component), message_id,
+                      data[start + header:end - CHECKSUM])
+        if flags:
+            frame.signature, frame.signed_part = data[end:start + size], data[start:end]
+        return size, frame

@@ -20,6 +20,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 import contextlib
 import copy
+import functools
 import logging
 import math
 import select
@@ -38,7 +39,7 @@ from .link_state import LinkEvent, LinkInput, LinkSnapshot, LinkStatus
 from .messages import Address, decode_payload, Message
 from .routing_table import RoutingTable
 from .signing import Signing
-from .signing_files import TimestampKeeper, TimestampStore
+from .signing_files import TimestampStore
 from .statistics import Traffic
 from .stream_queue import StreamQueue
 from .transport import Channel, Peer
@@ -116,9 +117,9 @@ class Link:
         if mavlink_version == 1 and (too_high := [c.name for c in classes if c.id > MAX_ID_V1]):
             raise ValueError(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
                              f'ids above {MAX_ID_V1}; use MAVLink 2')
-        self._timestamps = TimestampKeeper(self._signing, store)
+        self._store = store
         self._connector = Connector(
-            url, self._opened_elsewhere, self._failed_elsewhere, self._connector_ended)
+            url, lambda outcome: self.call(functools.partial(self._connector_reports, outcome)))
         self._connecting = False
         self._connect_at = -math.inf
         self._channel: Channel | None = None
@@ -207,15 +208,6 @@ class Link:
         with contextlib.suppress(OSError):
             self._wake_in.send(b'\0')
 
-    def _opened_elsewhere(self, channel: Channel) -> None:
-        self.call(lambda now: self._opened(channel, now))
-
-    def _failed_elsewhere(self, reason: str) -> None:
-        self.call(lambda now: self._status.failed(reason))
-
-    def _connector_ended(self) -> None:
-        self.call(self._connect_later)
-
     # In the link's thread
 
     def snapshot(self, now: float) -> LinkSnapshot:
@@ -245,7 +237,7 @@ class Link:
         # No channel is handed over any more, and one that just was is among the calls.
         self._connector.stop()
         self._run_calls()
-        self._safe_call(self._timestamps.keep, self._wall_clock(), True)
+        self._keep_timestamp(last=True)
         self._close()
         self._status.take(LinkInput.STOPPED, self.clock())
         self._snapshot = self.snapshot(self.clock())
@@ -304,12 +296,17 @@ class Link:
         now = self.clock()
         if now >= self._store_due:
             self._store_due = now + STORE_INTERVAL
-            self._safe_call(self._timestamps.keep, self._wall_clock(), False)
+            self._keep_timestamp(last=False)
         self._report(now)
         self._due = min(
             self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
             self._status.next_deadline(), self._snapshot_due, self._stream_due(),
             math.inf if self._channel is not None or self._connecting else self._connect_at)
+
+    def _keep_timestamp(self, *, last: bool) -> None:
+        if self._store:
+            self._safe_call(
+                self._store.keep, self._signing.timestamp, self._wall_clock(), last)
 
     def _report(self, now: float) -> None:
         """Make a snapshot if the last one is out of date, and report the newest event."""
@@ -467,12 +464,17 @@ class Link:
             self._status.failed(f'{error}; trying again')
             self._connect_at = now + THREAD_RETRY_INTERVAL
 
-    def _connect_later(self, now: float) -> None:
+    def _connector_reports(self, outcome: Channel | str | None, now: float) -> None:
+        if isinstance(outcome, str):
+            self._status.failed(outcome)
+            return
         self._connecting = False
-        self._connect_at = now + THREAD_RETRY_INTERVAL
+        if outcome is None:
+            self._connect_at = now + THREAD_RETRY_INTERVAL
+        else:
+            self._opened(outcome, now)
 
     def _opened(self, channel: Channel, now: float) -> None:
-        self._connecting = False
         if self._stopping.is_set():
             channel.close()
             return

@@ -119,6 +119,7 @@ class TimestampStore:
         path = os.path.realpath(os.path.expanduser(key_file))
         tag = hashlib.sha256(f'{path}\0{name}'.encode()).hexdigest()[:16]
         self.path = directory / f'signing-{tag}'
+        self._failed = False
 
     def begin(self, unix_time: float) -> int:
         """
@@ -155,6 +156,18 @@ class TimestampStore:
             with contextlib.suppress(OSError):
                 scratch.unlink()
 
+    def keep(self, timestamp: int, unix_time: float, last: bool = False) -> None:
+        """Store it as :meth:`store` does; a failure is logged once until it ends."""
+        try:
+            self.store(timestamp, unix_time, last=last)
+        except OSError as error:
+            if not self._failed:
+                _log.error('cannot store the signing time stamp, trying again: a restart may '
+                           'repeat some: %s', error)
+            self._failed = True
+        else:
+            self._failed = False
+
 
 def keyed(
     mode: SigningMode, key_file: str, name: str, unix_time: float,
@@ -171,29 +184,3 @@ def keyed(
     store = TimestampStore(key_file, name)
     return Signing(mode, key, timestamp=store.begin(unix_time)), store
 
-
-class TimestampKeeper:
-    """
-    Stores the time stamp for the next run ("Timestamp Handling").
-
-    :param store: None keeps it nowhere.
-    """
-
-    def __init__(self, signing: Signing, store: TimestampStore | None) -> None:
-        self._signing = signing
-        self._store = store
-        self._failed = False
-
-    def keep(self, unix_time: float, last: bool = False) -> None:
-        """Store it; see :meth:`TimestampStore.store`. A failure is logged once until it ends."""
-        if self._store is None:
-            return
-        try:
-            self._store.store(self._signing.timestamp, unix_time, last=last)
-        except OSError as error:
-            if not self._failed:
-                _log.error('cannot store the signing time stamp, trying again: a restart may '
-                           'repeat some: %s', error)
-            self._failed = True
-        else:
-            self._failed = False

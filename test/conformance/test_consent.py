@@ -18,12 +18,12 @@ from dataclasses import replace
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.model import Configuration, Mode
+from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorProperties,
     PROFILES,
 )
-from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.simulated import CommandReply

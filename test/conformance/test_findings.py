@@ -19,12 +19,12 @@ import math
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.model import Limits, Mode
+from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorProperties,
     PROFILES,
 )
-from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.identity import Identity

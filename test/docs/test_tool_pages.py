@@ -21,8 +21,8 @@ from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
+from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
-from illuminator_ros.illuminator.simulated_settings import SIMULATED
 from illuminator_ros.payload.faults import FaultTable
 from illuminator_ros.payload.simulated import SimulatedType
 from illuminator_ros.rededge.simulated import COLUMNS

@@ -14,8 +14,8 @@
 
 """The profiles of simulated lights, lights as seen in the field: how each is served."""
 
+from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
-from illuminator_ros.illuminator.simulated_settings import properties
 from illuminator_ros.mavlink.messages import CommandInt, encode_payload, MavCmd
 import pytest
 from support.back_to_back import Pair

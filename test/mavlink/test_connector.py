@@ -92,7 +92,7 @@ def test_connector_counts_the_time_of_a_try_in_its_pause(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(connector, 'open_channel', fail_slowly)
     monkeypatch.setattr(connector, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    one = Connector(MemoryUrl('x'), lambda channel: None, lambda reason: None, backoff=Recorded())
+    one = Connector(MemoryUrl('x'), lambda outcome: None, backoff=Recorded())
     one.start()
     assert ended.wait(20.0)
     assert spent == pytest.approx([0.0, 0.7, 0.7])

@@ -30,7 +30,6 @@ from illuminator_ros.mavlink.signing_files import (
     KeyFileError,
     load_key,
     MAX_KEY_FILE,
-    TimestampKeeper,
     TimestampStore,
 )
 import pytest
@@ -141,10 +140,10 @@ def test_clock_that_was_ahead_for_a_moment_locks_no_light_out(store: TimestampSt
 SIGN_UNTIL_KILLED = """
 import sys
 from illuminator_ros.mavlink.signing import SigningMode
-from illuminator_ros.mavlink.signing_files import keyed, TimestampKeeper
+from illuminator_ros.mavlink.signing_files import keyed
 now = float(sys.argv[2])
 signing, store = keyed(SigningMode.SIGN, sys.argv[1], 'bridge', now)
-TimestampKeeper(signing, store).keep(now)
+store.keep(signing.timestamp, now)
 while True:
     signing.sign(b'', now)
     sys.stdout.buffer.write(signing.timestamp.to_bytes(8, 'big'))
@@ -178,17 +177,16 @@ def test_failed_write_is_logged_once_tried_again_and_leaves_the_old_time_stamp(
     def fail(source: object, target: object) -> None:
         raise OSError(28, 'No space left on device')
 
-    keeper = TimestampKeeper(checker(timestamp=5), store)
     store.store(1, last=True)
     with monkeypatch.context() as patch:
         patch.setattr(os, 'replace', fail)
-        keeper.keep(NOW)
-        keeper.keep(NOW)
+        store.keep(5, NOW)
+        store.keep(5, NOW)
     assert [record.getMessage() for record in caplog.records] == [
         'cannot store the signing time stamp, trying again: a restart may repeat some: '
         '[Errno 28] No space left on device']
     assert (store.load(), os.listdir(store.path.parent)) == (1, [store.path.name])
-    keeper.keep(NOW)
+    store.keep(5, NOW)
     assert store.load() > STAMP
 
 

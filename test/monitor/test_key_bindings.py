@@ -109,7 +109,7 @@ class Desk:
                        for name in ('/a', '/b', '/c')]
         self.asked: list[tuple[str, object]] = []
         self.cleared = 0
-        self.bindings = KeyBindings(self)
+        self.bindings = KeyBindings(self.submit, self.clear_gone)
         self.bindings.update(self.lights)
 
     def submit(self, name: str, ask: Ask) -> None:

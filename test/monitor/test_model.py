@@ -45,30 +45,30 @@ def fleet_with(**values: object) -> Fleet:
     ({'connected': False, 'enabled': True}, State.LOST),
 ])
 def test_state_follows_from_the_topics(values: dict[str, bool], state: State) -> None:
-    assert fleet_with(**values).lights[0].state(100.0) is state
+    assert fleet_with(**values).snapshot()[0].state(100.0) is state
 
 
 def test_light_without_topics_and_diagnostics_is_silent() -> None:
     fleet = fleet_with(connected=True, enabled=True)
-    [light] = fleet.lights
+    [light] = fleet.snapshot()
     assert light.state(100.0 + SILENCE) is State.ON
     assert light.state(100.1 + SILENCE) is State.SILENT
 
     fleet.diagnosed(BOW, 'link', Diagnosis(0, 'open', {}), 110.0)
 
-    assert light.state(111.0) is State.ON
+    assert fleet.snapshot()[0].state(111.0) is State.ON
 
 
 def test_light_that_left_the_graph_is_gone_and_returns_without_its_setpoint() -> None:
     fleet = fleet_with(connected=True, enabled=True)
     fleet.agreed(BOW, 30.0)
     fleet.seen([], 101.0)
-    assert fleet.lights[0].state(101.0) is State.GONE
+    assert fleet.snapshot()[0].state(101.0) is State.GONE
 
     assert fleet.seen([BOW], 102.0) == []
 
-    assert fleet.lights[0].state(102.0) is State.ON
-    assert fleet.lights[0].setpoint is None
+    assert fleet.snapshot()[0].state(102.0) is State.ON
+    assert fleet.snapshot()[0].setpoint is None
 
 
 def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
@@ -76,12 +76,12 @@ def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
 
     assert fleet.seen(['/b', '/a'], 0.0) == ['/a', '/b']
     assert fleet.seen(['/a', '/b', '/aa'], 1.0) == ['/aa']
-    assert [light.name for light in fleet.lights] == ['/a', '/aa', '/b']
+    assert [light.name for light in fleet.snapshot()] == ['/a', '/aa', '/b']
     fleet.seen(['/b'], 2.0)
     assert fleet.clear_gone() == ['/a', '/aa']
-    assert [light.name for light in fleet.lights] == ['/b']
+    assert [light.name for light in fleet.snapshot()] == ['/b']
     fleet.seen(['/b', *(f'/light_{number}' for number in range(MAX_LIGHTS + 5))], 3.0)
-    assert len(fleet.lights) == MAX_LIGHTS
+    assert len(fleet.snapshot()) == MAX_LIGHTS
 
 
 def test_values_of_unknown_lights_are_ignored() -> None:
@@ -91,11 +91,11 @@ def test_values_of_unknown_lights_are_ignored() -> None:
     fleet.diagnosed('', 'lamp', Diagnosis(2, 'broken', {}), 100.0)
     fleet.agreed('/other', 1.0)
 
-    assert [(light.name, light.lamp) for light in fleet.lights] == [(BOW, None)]
+    assert [(light.name, light.lamp) for light in fleet.snapshot()] == [(BOW, None)]
 
 
 def test_error_flags_have_texts() -> None:
-    assert fleet_with(error_flags=0x15).lights[0].flags == [
+    assert fleet_with(error_flags=0x15).snapshot()[0].flags == [
         'thermal throttling', 'thermistor failure', 'unknown flags 0x10']
 
 
@@ -112,7 +112,7 @@ def test_number_of_a_diagnosis_is_finite_or_none(
 def test_control_characters_of_others_never_reach_the_terminal() -> None:
     fleet = fleet_with(mode='\x1b[2J')
     fleet.diagnosed(BOW, 'lamp', Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
-    [light] = fleet.lights
+    [light] = fleet.snapshot()
 
     assert light.lamp is not None
     texts = [light.value('mode'), light.lamp.message, *light.lamp.values.values()]

@@ -57,7 +57,7 @@ def shown(fleet: Fleet, width: int = 132, height: int = 24, *,
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, force_terminal=bool(color),
                       color_system=color, highlight=False, legacy_windows=False)
-    drawn = screen(ViewState(fleet.lights, selected, now, **how), width, height)
+    drawn = screen(ViewState(fleet.snapshot(), selected, now, **how), width, height)
     # As rich.live.Live draws it.
     console.print(Screen(drawn), end='')
     return file.getvalue()
@@ -172,7 +172,7 @@ def test_ascii_terminal_gets_ascii_only(ascii_only: bool) -> None:
 def table(fleet: Fleet) -> list[list[str]]:
     """Return the cells of the table for a pipe."""
     console = Console(file=io.StringIO(), width=400, record=True, color_system=None)
-    console.print(plain(ViewState(fleet.lights, None, NOW)))
+    console.print(plain(ViewState(fleet.snapshot(), None, NOW)))
     return [re.split(' {2,}', line.rstrip()) for line in console.export_text().splitlines()]
 
 

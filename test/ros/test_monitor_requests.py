@@ -75,7 +75,8 @@ class Bench:
 
     @property
     def light(self) -> Any:
-        return self.fleet.lights[0]
+        with self.fleet.light('/bow') as light:
+            return light
 
     @property
     def sets(self) -> list[dict[str, Any]]:

@@ -29,9 +29,8 @@ from illuminator_ros.cli.simulator.components import (
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.gimbal.simulated_manager import SIMULATED as MANAGERS
 from illuminator_ros.illuminator.model import Limits, Mode
-from illuminator_ros.illuminator.simulated import SimulatedIlluminator
+from illuminator_ros.illuminator.simulated import SIMULATED, SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.illuminator.simulated_settings import SIMULATED
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import Description, SimulatedType
 import pytest

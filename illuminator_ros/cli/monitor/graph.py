@@ -34,13 +34,13 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from std_srvs.srv import SetBool, Trigger
 
 from .key_bindings import Ask, Request, Service
-from .model import Diagnosis, Fleet, Outcome
+from .model import Diagnosis, Fleet, Outcome, Values
 
 if TYPE_CHECKING:
     from rclpy.task import Future
 
 # The topics of a light with their types.
-TOPICS: dict[str, type[Any]] = {
+TOPICS: dict[str, type[object]] = {
     'connected': Bool, 'enabled': Bool, 'brightness': Float32, 'error_flags': UInt32,
     'mode': String, 'strobe_period': Float32, 'strobe_duty_cycle': Float32, 'uptime': Float64,
     'temperature': Temperature,
@@ -55,14 +55,18 @@ EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 QUERY_INTERVAL = 0.5
 # s for an answer: longer than a bridge takes, whatever its light does.
 ANSWER_LIMIT = 8.0
-# The type of each service, and its request from the value of a request of the monitor.
+# The type of each service, and its request from the value of a request of the monitor. Any: they
+# differ in both.
 SERVICES: dict[Service, tuple[type[Any], Callable[[Any], Any]]] = {
     Service.ENABLE: (SetBool, lambda on: SetBool.Request(data=on)),
     Service.REFRESH: (Trigger, lambda _: Trigger.Request()),
     Service.SET: (SetParametersAtomically, lambda values: SetParametersAtomically.Request(
         parameters=[Parameter(name, value=value).to_parameter_msg()
                     for name, value in values.items()])),
+    Service.GET: (GetParameters, lambda names: GetParameters.Request(names=names)),
 }
+# The request for the setpoint of a light, which the operator does not see.
+GET_BRIGHTNESS = Request(Service.GET, '', ['brightness'])
 
 
 def type_name(type_: type[object]) -> str:
@@ -109,10 +113,8 @@ class Requests:
         self._clock = clock
         self._clients = {service: node.create_client(type_, f'{name}/{service.value}')
                          for service, (type_, _) in SERVICES.items()}
-        self._getter = node.create_client(GetParameters, f'{name}/get_parameters')
         self._pending: dict[Service, _Pending] = {}
         self._waiting: dict[Service, Request] = {}
-        self._asked: tuple[Future[GetParameters.Response], float] | None = None
 
     def submit(self, request: Request) -> None:
         """Send a request, or let it wait for the pending one."""
@@ -128,24 +130,18 @@ class Requests:
 
     def poll(self) -> None:
         """Give up requests without an answer, and request the brightness if it is unknown."""
-        now = self._clock()
         for service, one in list(self._pending.items()):
-            if now >= one.deadline:
+            if self._clock() >= one.deadline:
                 self._clients[service].remove_pending_request(one.future)
                 self._end(one, False, f'no answer from {self._name} for {ANSWER_LIMIT:g} s')
-        if self._asked is not None and now >= self._asked[1]:
-            self._getter.remove_pending_request(self._asked[0])
-            self._asked = None
         with self._fleet.light(self._name) as light:
             known = light.gone_at is not None or light.setpoint is not None
-        if not known and self._asked is None and self._getter.service_is_ready():
-            future = self._getter.call_async(GetParameters.Request(names=['brightness']))
-            self._asked = future, now + ANSWER_LIMIT
-            future.add_done_callback(self._got)
+        if not known and Service.GET not in self._pending:
+            self._send(GET_BRIGHTNESS)
 
     def destroy(self) -> None:
         """Drop all requests."""
-        for client in [*self._clients.values(), self._getter]:
+        for client in self._clients.values():
             self._node.destroy_client(client)
         self._pending.clear()
         self._waiting.clear()
@@ -170,7 +166,10 @@ class Requests:
         except Exception as error:
             self._end(one, False, f'{type(error).__name__}: {error}')
             return
-        if one.request.service is Service.SET:
+        if one.request.service is Service.GET:
+            self._take_brightness(response)
+            self._end(one, True, '')
+        elif one.request.service is Service.SET:
             if response.result.successful and 'brightness' in one.request.value:
                 self._fleet.agreed(self._name, one.request.value['brightness'])
             self._end(one, response.result.successful, response.result.reason)
@@ -187,20 +186,19 @@ class Requests:
             self._send(waiting)
         self._show_wanted()
 
-    def _got(self, future: Future[GetParameters.Response]) -> None:
-        self._asked = None
-        if future.exception() is None and future.result() is not None:
-            values = [parameter_value_to_python(value) for value in future.result().values]
-            with self._fleet.light(self._name) as light:
-                # A parameter event that came meanwhile is newer.
-                if light.setpoint is None and values and isinstance(values[0], float):
-                    light.setpoint = values[0]
+    def _take_brightness(self, response: GetParameters.Response) -> None:
+        values = [parameter_value_to_python(value) for value in response.values]
+        with self._fleet.light(self._name) as light:
+            # A parameter event that came meanwhile is newer.
+            if light.setpoint is None and values and isinstance(values[0], float):
+                light.setpoint = values[0]
 
     def _note(self, request: Request, outcome: Outcome, answer: str) -> None:
-        self._fleet.acted(self._name, request.text, outcome, answer, self._clock())
+        if request.text:
+            self._fleet.acted(self._name, request.text, outcome, answer, self._clock())
 
     def _show_wanted(self) -> None:
-        wanted: dict[str, Any] = {}
+        wanted: Values = {}
         for request in [*(one.request for one in self._pending.values()),
                         *self._waiting.values()]:
             if request.service is Service.SET:
@@ -277,8 +275,8 @@ class Graph:
             for subscription in self._subscriptions.pop(name):
                 self._node.destroy_subscription(subscription)
 
-    def _take(self, name: str, topic: str, message: Any) -> None:
-        value = message.temperature if topic == 'temperature' else message.data
+    def _take(self, name: str, topic: str, message: object) -> None:
+        value = getattr(message, 'temperature' if topic == 'temperature' else 'data')
         self._fleet.take(name, topic, value, self._clock())
 
     def _diagnosed(self, array: DiagnosticArray) -> None:

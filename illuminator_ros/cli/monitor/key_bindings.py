@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from enum import auto, Enum
 import functools
 import re
-from typing import Any, Protocol
+from typing import Any
 
 from .model import Light, State
 
@@ -74,6 +74,7 @@ class Service(Enum):
     ENABLE = 'enable'
     REFRESH = 'refresh'
     SET = 'set_parameters_atomically'
+    GET = 'get_parameters'
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,8 @@ class Request:
     """
     A request to a light.
 
-    :param text: what the operator reads of it.
-    :param value: for ENABLE a bool, for SET the parameters by their names.
+    :param text: what the operator reads of it, '' for nothing.
+    :param value: for ENABLE a bool, for SET the parameters by their names, for GET the names.
     """
 
     service: Service
@@ -101,9 +102,7 @@ def switch(light: Light, on: bool | None = None) -> Request:
     return Request(Service.ENABLE, 'on' if wanted else 'off', wanted)
 
 
-def switch_off(light: Light) -> Request:
-    """Switch a light off."""
-    return switch(light, False)
+switch_off = functools.partial(switch, on=False)
 
 
 def dim(light: Light, step: float) -> Request | None:
@@ -163,26 +162,21 @@ _MOVES = {'up': -1, 'k': -1, 'down': 1, 'j': 1, 'page up': -PAGE, 'page down': P
           'home': -10**6, 'end': 10**6}
 
 
-class Lights(Protocol):
-    """The lights that the keys control."""
-
-    def submit(self, name: str, ask: Ask) -> None:
-        """Send a request to a light."""
-
-    def clear_gone(self) -> None:
-        """Remove the lights that are gone."""
-
-
 class KeyBindings:
     """
     The state that keys change.
 
+    :param submit: sends a request to a light, given its name.
+    :param clear_gone: removes the lights that are gone.
     :ivar selected: the name of a light, None while there is none.
     :ivar stop: whether the job must stop until the shell continues it.
     """
 
-    def __init__(self, lights: Lights) -> None:
-        self._lights = lights
+    def __init__(
+        self, submit: Callable[[str, Ask], None], clear_gone: Callable[[], None],
+    ) -> None:
+        self._submit = submit
+        self._clear_gone = clear_gone
         self.selected: str | None = None
         self.show_help = False
         self.quit = False
@@ -206,11 +200,11 @@ class KeyBindings:
         elif self.show_help or meaning is Command.HELP:
             self.show_help = not self.show_help
         elif meaning is Command.CLEAR:
-            self._lights.clear_gone()
+            self._clear_gone()
         elif meaning is Command.ALL_OFF:
             for light in lights:
                 if light.state(now) is not State.GONE:
-                    self._lights.submit(light.name, switch_off)
+                    self._submit(light.name, switch_off)
         elif self.selected is None or meaning is None:
             return
         elif isinstance(meaning, Command):
@@ -218,4 +212,4 @@ class KeyBindings:
             at = names.index(self.selected) + _MOVES[key]
             self.selected = names[min(max(at, 0), len(names) - 1)]
         else:
-            self._lights.submit(self.selected, meaning)
+            self._submit(self.selected, meaning)

@@ -38,6 +38,10 @@ TREND_SIZE = 60
 MAX_LIGHTS = 256
 
 
+# Values by name. Any: switches, numbers and texts.
+Values = dict[str, Any]
+
+
 class State(Enum):
     """The state of a light."""
 
@@ -121,9 +125,9 @@ class Light:
     name: str
     heard_at: float
     gone_at: float | None = None
-    values: dict[str, Any] = field(default_factory=dict)
+    values: Values = field(default_factory=dict)
     setpoint: float | None = None
-    wanted: dict[str, Any] = field(default_factory=dict)
+    wanted: Values = field(default_factory=dict)
     temperatures: Trend = field(default_factory=Trend)
     link: Diagnosis | None = None
     lamp: Diagnosis | None = None
@@ -160,15 +164,10 @@ class Fleet:
         self._lights: dict[str, Light] = {}
         self._lock = threading.Lock()
 
-    @property
-    def lights(self) -> list[Light]:
-        """Return the lights, sorted by their names."""
-        return [self._lights[name] for name in sorted(self._lights)]
-
     def snapshot(self) -> list[Light]:
         """Return copies of the lights, sorted by their names."""
         with self._lock:
-            return copy.deepcopy(self.lights)
+            return copy.deepcopy([self._lights[name] for name in sorted(self._lights)])
 
     @contextlib.contextmanager
     def light(self, name: str) -> Iterator[Light]:
@@ -198,12 +197,12 @@ class Fleet:
                 del self._lights[name]
         return gone
 
-    def take(self, name: str, topic: str, value: Any, now: float) -> None:
+    def take(self, name: str, topic: str, value: object, now: float) -> None:
         """Take a value that a light has published."""
         with self.light(name) as light:
             light.heard_at = now
             light.values[topic] = printable(value) if isinstance(value, str) else value
-            if topic == 'temperature' and math.isfinite(value):
+            if (topic == 'temperature' and isinstance(value, float) and math.isfinite(value)):
                 light.temperatures.add(value, now)
 
     def agreed(self, name: str, brightness: float) -> None:

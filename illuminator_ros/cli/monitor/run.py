@@ -143,7 +143,7 @@ def _watch(
     monitor: Monitor, console: Console, termination: Termination, *, ascii_only: bool,
 ) -> None:
     """Show the lights until the end is requested."""
-    bindings = KeyBindings(monitor.graph)
+    bindings = KeyBindings(monitor.graph.submit, monitor.graph.clear_gone)
     keyboard = terminal.Keyboard(sys.stdin.fileno())
     decoder = KeyDecoder()
     stopped = threading.Event()
