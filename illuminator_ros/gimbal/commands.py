@@ -22,6 +22,7 @@ import math
 from .messages import flag_names, GimbalCommand, GimbalManagerStatus
 from ..mavlink.messages import Address
 from ..payload.mount import MountFlags, YawFrame
+from ..payload.vehicle import GimbalDeviceAttitudeStatus
 
 # Roll and pitch are relative to the horizon in each setpoint.
 LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
@@ -105,6 +106,8 @@ class SetFlags:
     """
     Sets flags of the gimbal, and leaves its angles and rates as they are.
 
+    The device shows them; GIMBAL_MANAGER_STATUS of ArduPilot does not.
+
     :param flag: the flag that changes.
     :param goal: the state to be reached, for people.
     """
@@ -121,14 +124,14 @@ class SetFlags:
         """See :class:`~..payload.request.Change`."""
         return *(math.nan,) * 4, self.flags, 0, self.device_id
 
-    def shown_by(self, status: GimbalManagerStatus) -> bool:
+    def shown_by(self, status: GimbalDeviceAttitudeStatus) -> bool:
         """See :class:`~..payload.request.Change`."""
         return status.flags & self.flag == self.flags & self.flag
 
-    def evidence(self, status: GimbalManagerStatus) -> str:
+    def evidence(self, status: GimbalDeviceAttitudeStatus) -> str:
         """See :class:`~..payload.request.Change`."""
-        return 'confirmed by GIMBAL_MANAGER_STATUS'
+        return 'confirmed by GIMBAL_DEVICE_ATTITUDE_STATUS'
 
-    def actual(self, status: GimbalManagerStatus) -> str:
+    def actual(self, status: GimbalDeviceAttitudeStatus) -> str:
         """See :class:`~..payload.request.Change`."""
         return ', '.join(flag_names(MountFlags(status.flags))) or 'no flags'

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 import math
+from typing import Any, TypeVar
 
 from .commands import Configure, Control, SetFlags, setpoint_flags
 from .events import (
@@ -60,6 +61,7 @@ REPEATS = (0.2, 0.4, 0.8)
 # Managers of one gimbal; more are ignored.
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
+S = TypeVar('S')
 _STILL = (0.0, 0.0, 0.0)
 
 
@@ -69,11 +71,18 @@ class _Manager:
 
     target: request.Target
     requests: request.RequestQueue[GimbalManagerStatus]
+    # For changes that the device shows.
+    flag_target: request.Target
+    flag_requests: request.RequestQueue[GimbalDeviceAttitudeStatus]
     heard_at: float = -math.inf
     autopilot: int | None = None
     information: GimbalManagerInformation | None = None
     control: Control | None = None
     status_at: float = -math.inf
+
+    @property
+    def queues(self) -> tuple[request.RequestQueue[Any], ...]:
+        return self.requests, self.flag_requests
 
     def is_heard(self, now: float) -> bool:
         return now < self.heard_at + SILENCE_LIMIT
@@ -250,7 +259,8 @@ class Gimbal:
         if self._manager not in heard:
             before, self._manager = self._manager, heard[0]
             if before in self._managers:
-                self._managers[before].requests.cancel('the manager was lost', now)
+                for queue in self._managers[before].queues:
+                    queue.cancel('the manager was lost', now)
                 self._emit(ManagerChanged(self.key, before, self._manager))
         others = set(heard) - {self._manager}
         for other in others - self._others:
@@ -265,7 +275,13 @@ class Gimbal:
             target = request.Target(
                 address, self._commands, lambda result, now: None, kind='gimbal manager',
                 status_id=GimbalManagerStatus.id, status_name='GIMBAL_MANAGER_STATUS')
-            manager = self._managers[address] = _Manager(target, request.RequestQueue(target))
+            flag_target = request.Target(
+                address, self._commands, lambda result, now: None, kind='gimbal device',
+                status_id=GimbalDeviceAttitudeStatus.id,
+                status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_sender=self.key.address)
+            manager = self._managers[address] = _Manager(
+                target, request.RequestQueue(target), flag_target,
+                request.RequestQueue(flag_target))
         self._announced_at = now
         if manager is not None:
             manager.heard_at = now
@@ -290,7 +306,7 @@ class Gimbal:
             return
         manager.status_at, manager.control = now, Control.of(status)
         self._check(now)
-        manager.requests.take(request.Report(status, sent_by=now, has_clock=False), now)
+        manager.requests.take(request.Report(status, now, has_clock=False), now)
 
     def take_device_information(self, message: GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION of the device."""
@@ -307,6 +323,8 @@ class Gimbal:
         except ValueError as error:
             self._attitude, self._problem = None, str(error)
         self._check(now)
+        if (manager := self._active) is not None:
+            manager.flag_requests.take(request.Report(status, now, has_clock=False), now)
         self._emit(AttitudeReceived(self.key, self._attitude, self._flags, self._errors))
 
     # Control
@@ -370,17 +388,8 @@ class Gimbal:
             state = 'in control already' if take else 'not in control'
             done(request.Result(True, f'{state}: {self._control}'), now)
         else:
-            self._submit(manager, Configure(
-                self._commands.address, self.key.device_id, take), now, ended)
-
-    def _submit(
-        self, manager: _Manager, change: request.Change[GimbalManagerStatus], now: float,
-        done: request.Done,
-    ) -> None:
-        manager.requests.submit(request.Request(
-            manager.target, lambda now: change,
-            lambda result, change, status, now: done(result, now), now=now,
-            limit=now + REQUEST_LIMIT), now)
+            manager.requests.submit(_request(manager.target, Configure(
+                self._commands.address, self.key.device_id, take), now, ended), now)
 
     # Requests
 
@@ -416,7 +425,8 @@ class Gimbal:
             done(request.Result(False, reason), now)
             return
         self._stop()
-        self._submit(manager, SetFlags(flags, flag, self.key.device_id, goal), now, done)
+        manager.flag_requests.submit(_request(manager.flag_target, SetFlags(
+            flags, flag, self.key.device_id, goal), now, done), now)
 
     def _capabilities(self) -> Capabilities | None:
         manager = self._active
@@ -549,7 +559,8 @@ class Gimbal:
         manager = self._active
         if manager is None:
             return
-        manager.requests.poll(now)
+        for queue in manager.queues:
+            queue.poll(now)
         self._poll_setpoint(now)
         if not self._connected:
             return
@@ -591,7 +602,7 @@ class Gimbal:
         manager = self._active
         if manager is None:
             return math.inf
-        deadlines = [manager.requests.next_deadline()]
+        deadlines = [queue.next_deadline() for queue in manager.queues]
         if self._manager_heard:
             deadlines.append(manager.heard_at + SILENCE_LIMIT)
         if self._connected:
@@ -615,6 +626,14 @@ class Gimbal:
             self._errors, self._control, self.in_control,
             manager.status_at if manager else -math.inf, self.enforces_control,
             self._setpoints_sent)
+
+
+def _request(
+    target: request.Target, change: request.Change[S], now: float, done: request.Done,
+) -> request.Request[S]:
+    return request.Request(
+        target, lambda now: change, lambda result, change, status, now: done(result, now),
+        now=now, limit=now + REQUEST_LIMIT)
 
 
 def _silence(what: str, heard_at: float, now: float) -> str:

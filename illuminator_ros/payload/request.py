@@ -61,13 +61,15 @@ class Target:
     :param ended: called with each command that has ended, after its own receiver.
     :param kind: a noun for it, such as ``light``.
     :param status_id: the message id of its status.
+    :param status_sender: the component that sends the status, if another one executes commands.
     """
 
     def __init__(
         self, address: Address, commands: CommandSender, ended: CommandDone, *,
-        kind: str, status_id: int, status_name: str,
+        kind: str, status_id: int, status_name: str, status_sender: Address | None = None,
     ) -> None:
         self.address = address
+        self._status_sender = status_sender or address
         self.kind = kind
         self.status_name = status_name
         self._commands = commands
@@ -79,27 +81,31 @@ class Target:
     def send(
         self, command: int, params: tuple[float, ...], now: float,
         done: CommandDone = lambda result, now: None, *, limit: float = math.inf,
-        overtake: bool = False,
+        overtake: bool = False, to: Address | None = None,
     ) -> None:
-        """Send a command; see :meth:`CommandSender.start`."""
+        """Send a command, to the device or to another component; see :class:`CommandSender`."""
         def ended(result: CommandResult, now: float) -> None:
             done(result, now)
             self._ended(result, now)
 
         self._commands.start(
-            Command(self.address, command, params), now, ended, limit=limit, overtake=overtake)
+            Command(to or self.address, command, params), now, ended, limit=limit,
+            overtake=overtake)
 
-    def request_message(self, message_id: int, now: float, done: CommandDone) -> None:
-        """Request one message."""
-        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done)
+    def request_message(
+        self, message_id: int, now: float, done: CommandDone, *, to: Address | None = None,
+    ) -> None:
+        """Request one message of the device or of another component."""
+        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
 
     def request_status(self, now: float, done: CommandDone | None = None) -> None:
         """Request the status; without ``done`` only where no such request is under way."""
         if done is not None:
-            self.request_message(self._status_id, now, done)
+            self.request_message(self._status_id, now, done, to=self._status_sender)
         elif not self._status_requested:
             self._status_requested = True
-            self.request_message(self._status_id, now, self._status_answered)
+            self.request_message(
+                self._status_id, now, self._status_answered, to=self._status_sender)
 
     def _status_answered(self, result: CommandResult, now: float) -> None:
         self._status_requested = False

@@ -162,7 +162,7 @@ FLAG_REQUESTS: list[tuple[Ask, MountFlags, bool, Capabilities]] = [
 
 
 @pytest.mark.parametrize(('ask', 'flag', 'on', 'needed'), FLAG_REQUESTS)
-def test_gm_3_flag_is_set_by_command_and_shown_by_the_status(
+def test_gm_3_flag_is_set_by_command_and_shown_by_the_device(
         ask: Ask, flag: MountFlags, on: bool, needed: Capabilities) -> None:
     rig = in_control()
     rig.managers[0].flags = MountFlags(0) if on else flag
@@ -184,7 +184,7 @@ def test_gm_3_flag_is_set_by_command_and_shown_by_the_status(
     rig.run(1.0)
     success, message = asked(rig, ask)
     assert not success
-    assert 'but GIMBAL_MANAGER_STATUS shows' in message
+    assert 'but GIMBAL_DEVICE_ATTITUDE_STATUS shows' in message
 
 
 @pytest.mark.parametrize(('ask', 'needed'), [
