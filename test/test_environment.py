@@ -30,8 +30,6 @@ case "$1 $2" in
   "-m venv") mkdir -p "$3/bin" && touch "$3/pyvenv.cfg" && cp "$0" "$3/bin/python" ;;
 esac
 """
-ON_ARM = ('import platform, runpy, sys; platform.machine = lambda: "aarch64"; '
-          'runpy.run_path("tools/environment.py", run_name="__main__")')
 
 
 class Project:
@@ -85,14 +83,6 @@ def test_venv_of_another_python_is_kept_and_installed_into(project: Project) -> 
     assert '-m venv' not in project.calls()
 
 
-def test_second_run_installs_nothing(project: Project) -> None:
-    project.run()
-    installed = project.calls().count('pip')
-
-    assert project.run() == (0, '')
-    assert project.calls().count('pip') == installed
-
-
 def test_venv_is_made_anew_if_python_asks_for_another_version(project: Project) -> None:
     status, output = project.run(PYTHON='python3.13')
 
@@ -115,11 +105,3 @@ def test_chosen_python_that_cannot_be_used_is_explained(
 
     assert (status, message in output) == (1, True), output
     assert 'venv' not in project.calls()
-
-
-def test_arm64_without_ros_is_told_how_to_go_on(project: Project) -> None:
-    status, output = project.run('-c', ON_ARM)
-
-    assert status == 1
-    for remedy in ('aarch64', 'source /opt/ros/jazzy/setup.bash && make demo', 'docker run'):
-        assert remedy in output

@@ -25,7 +25,9 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
         simulated='illuminator_ros.illuminator.simulated:SIMULATED',
         checks='illuminator_ros.illuminator.checks.requirements:CHECKS'),
-    PayloadType('rededge', simulated='illuminator_ros.rededge.simulated:SIMULATED'),
+    PayloadType('rededge', ros='illuminator_ros.rededge.ros.camera_node:REDEDGE',
+                simulated='illuminator_ros.rededge.simulated:SIMULATED',
+                checks='illuminator_ros.rededge.checks:CHECKS'),
     PayloadType(
         'gimbal', ros='illuminator_ros.gimbal.ros.gimbals:GIMBAL',
         simulated='illuminator_ros.gimbal.simulated_device:SIMULATED'),

@@ -24,6 +24,7 @@ from typing import Protocol
 
 from .command import CommandSender, CommandStatus
 from .command_receiver import AnyCommand, CommandReceiver
+from .frame import Frame
 from .messages import (
     Address,
     CommandAck,
@@ -74,6 +75,9 @@ class Endpoint(ABC):
 
     def link_closed(self, now: float, reason: str) -> None:  # noqa: B027 - optional
         """Note that nothing can be sent any more, and why."""
+
+    def inspect(self, frame: Frame, cls: type[Message]) -> None:  # noqa: B027 - optional
+        """Look at the frame of a message, of this class, before it is received."""
 
     @abstractmethod
     def receive(self, source: Address, message: Message, now: float) -> None:

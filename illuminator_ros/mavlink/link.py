@@ -357,6 +357,7 @@ class Link:
         cls = self._classes.get(frame.message_id)
         if cls is not None:
             self._work_pending = True
+            self._safe_call(self.endpoint.inspect, frame, cls)
             message = decode_payload(cls, frame.payload)
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('received from %s: %s', frame.source, message,

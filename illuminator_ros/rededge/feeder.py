@@ -412,6 +412,11 @@ class Feeder:
         if self._take(Input.MOUNT, now, take):
             self._send_pair(now)
 
+    @property
+    def mount_is_fixed(self) -> bool:
+        """Return whether parameters tell the mount, and not ``~/mount``."""
+        return self._fixed_mount is not None
+
     def expect_mount(self) -> None:
         """Send no fixed mount any more, since ``~/mount`` has a publisher."""
         self._fixed_mount = None

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The messages of the camera, as MAVLink 1 carries them: without extension fields.
+The messages of the camera; MAVLink 1 carries them without extension fields.
 
 Fields and scales are those of MAVLink; deviations of the camera stand with the field.
 """
@@ -133,7 +133,7 @@ class CameraStatus(mav.Message):
     p4: mav.Float
 
 
-@mav.define(180, 'CAMERA_FEEDBACK')
+@mav.define(180, 'CAMERA_FEEDBACK', extensions=1)
 @dataclass(slots=True)
 class CameraFeedback(mav.Message):
     """
@@ -143,6 +143,7 @@ class CameraFeedback(mav.Message):
     0..360) turn north, east, down into top of the image, right of the image, line of sight: all
     are zero for a camera that looks straight down with the top of its images to the north. The
     manufacturer does not name the axes; these are those of image metadata.
+    ``completed_captures`` is an extension field, which MAVLink 1 does not have.
     """
 
     time_usec: mav.UInt64
@@ -158,3 +159,4 @@ class CameraFeedback(mav.Message):
     yaw: mav.Float
     foc_len: mav.Float
     flags: mav.UInt8
+    completed_captures: mav.UInt16 = 0

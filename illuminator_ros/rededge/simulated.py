@@ -41,7 +41,7 @@ from .messages import (
     Ping,
     Shot,
 )
-from ..mavlink.messages import Address, define, Heartbeat, Message, UInt16
+from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
@@ -143,16 +143,10 @@ FAULTS = FaultTable({
 })
 
 
-@define(CameraFeedback.id, 'CAMERA_FEEDBACK', extensions=1)
-@dataclass(slots=True)
 class ExtendedCameraFeedback(CameraFeedback):
     """CAMERA_FEEDBACK as some libraries send it with MAVLink 1: 47 bytes instead of 45."""
 
-    completed_captures: UInt16 = 0
-
-
-# The faulty sender takes the extension field for a part of the message.
-ExtendedCameraFeedback.base_size = ExtendedCameraFeedback.codec.size
+    base_size = CameraFeedback.codec.size
 
 
 class Injected(NamedTuple, Generic[M]):

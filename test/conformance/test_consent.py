@@ -98,18 +98,3 @@ def test_without_consent_a_light_that_cannot_be_dimmed_is_not_switched_on(
         assert run.result(name).verdict is Verdict.SKIPPED
         assert 'cannot be changed: not agreed to; see --yes' in run.result(name).detail
     assert {'mode-internal', 'brightness', 'brightness-values'} <= run.failed
-
-
-@pytest.mark.parametrize(('brightness', 'consent'), [(15.0, False), (100.0, True)])
-def test_a_light_that_rejects_configurations_is_switched_on_if_dim_or_with_consent(
-        brightness: float, consent: bool) -> None:
-    run, seen = rejecting(
-        IlluminatorProperties(), replace(BRIGHT, brightness=brightness), consent=consent)
-    assert {one.brightness for one in seen} == {brightness}
-    assert run.result('on').verdict is Verdict.PASS
-
-
-def test_invalid_brightness_is_not_sent_without_consent_where_brightness_is_the_switch() -> None:
-    run = Run(LIGHTS['brightness is the switch'], faults=('anything',), consent=False).finish()
-    for name in ('brightness-values', 'not-a-number'):
-        assert 'its brightness switches it on' in run.result(name).detail

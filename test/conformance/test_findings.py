@@ -140,13 +140,6 @@ def test_a_hot_light_without_faults_meets_every_requirement() -> None:
     assert run.suite.passed
 
 
-def test_a_restart_during_the_run_fails_uptime() -> None:
-    run = Run()
-    run.link.run(12.0)
-    run.light.restart(run.link.now)
-    assert 'uptime' in run.finish().failed
-
-
 def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped() -> None:
     run = Run()
     run.link.run(8.0)
@@ -154,18 +147,6 @@ def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped() -> None
     run.finish()
     assert {'heartbeat-rate', 'acknowledged'} < run.failed
     assert run.result('thermal-flags').detail == 'the light has stopped sending'
-
-
-def test_an_accepted_invalid_value_is_corrected_before_the_next_one() -> None:
-    run = Run(faults=('anything',)).finish()
-    configured = [one.text for one in run.session.transactions if one.command == 406]
-    invalid = next(i for i, text in enumerate(configured) if text.endswith('1 -1 0 0'))
-    assert configured[invalid + 1].endswith(' 1 10 0 0')
-
-
-def test_a_duplicate_acknowledgement_is_not_counted_for_the_next_command() -> None:
-    run = Run(faults=('duplicate=1',)).finish()
-    assert {len(one.finals) for one in run.session.transactions if one.expected} == {2}
 
 
 LIE = 'MAV_RESULT_ACCEPTED, but then the status differs in '
@@ -211,25 +192,3 @@ def test_a_light_that_stays_in_external_sync_fails_mode_internal() -> None:
     run.light.apply = stuck  # type: ignore[method-assign]
     assert run.finish().failed == {'mode-internal'}
     assert 'then the status differs in mode' in run.result('mode-internal').detail
-
-
-@pytest.mark.parametrize(('light', 'only'), [
-    (IlluminatorProperties(modes=(Mode.INTERNAL_CONTROL,)), 'mode-internal'),
-    *((IlluminatorProperties(), name) for name in ('on', 'off', 'brightness'))])
-def test_one_requirement_alone_passes(light: IlluminatorProperties, only: str) -> None:
-    assert Run(light, only=(only,)).finish().names(Verdict.PASS) == {only}
-
-
-def test_a_state_that_cannot_be_left_does_not_count_as_reached() -> None:
-    run = Run(faults=('lie',), only=('on', 'off'))
-    run.press(enabled=True)
-    assert run.finish().failed == {'off'}
-    assert 'could not be switched off before' in run.result('on').detail
-
-
-def test_an_accepted_change_passes_where_the_light_reports_no_status() -> None:
-    run = Run(IlluminatorProperties(status_interval=0.0), faults=('lie',), only=('on',))
-    run.link.run_until(lambda: any(
-        one.text.endswith('ON_OFF 1') for one in run.session.transactions), within=60.0)
-    run.fault('no-request')
-    assert run.finish().result('on').verdict is Verdict.PASS

@@ -20,9 +20,8 @@ from typing import Any
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.checks.tester import LightTester
-from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration, Mode
-from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
+from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.payload.checks.requirement import Requirement, Verdict
 import pytest
 from support.conformance_run import Run
@@ -50,16 +49,6 @@ def test_switch_and_configuration_are_restored(faults: tuple[str, ...]) -> None:
     run = used(*faults).finish()
     assert is_restored(run)
     assert run.suite.restored == 'the light is as it was'
-
-
-@pytest.mark.parametrize(('default', 'changed', 'after'), [
-    (0.2, None, 0.2), (1.0, None, 1.0), (3.0, None, 3.0), (0.0, None, 0.0), (1.0, 0.4, 0.4)])
-def test_the_status_interval_is_restored(
-        default: float, changed: float | None, after: float) -> None:
-    run = Run(IlluminatorProperties(status_interval=default))
-    if changed:
-        run.set_interval(changed)
-    assert run.finish().light.interval(STATUS_ID) == pytest.approx(after)
 
 
 @pytest.mark.parametrize('after', [0.0, *(0.5 + 0.7 * step for step in range(52))])
@@ -107,13 +96,6 @@ def test_a_light_that_cannot_be_restored_is_reported_with_its_former_state() -> 
     assert not run.suite.passed
 
 
-def test_a_light_that_was_silent_for_a_while_is_restored() -> None:
-    run = used()
-    run.link.run(20.0)
-    run.light.behave(replace(run.light.behaviour, silence=14.0), run.link.now)
-    assert is_restored(run.finish())
-
-
 def test_a_light_that_reports_no_status_is_not_changed() -> None:
     run = used()
     run.set_interval(-1)
@@ -123,10 +105,3 @@ def test_a_light_that_reports_no_status_is_not_changed() -> None:
     assert is_restored(run)
     assert run.result('on').verdict is Verdict.SKIPPED
     assert 'could not be restored' in run.result('on').detail
-
-
-def test_requests_alone_change_nothing() -> None:
-    run = Run(only=('heartbeat', 'status-request', 'information-request'))
-    seen = run.watch()
-    assert run.finish().suite.restored == 'nothing was changed'
-    assert seen == []

@@ -53,10 +53,6 @@ def test_the_target_is_checked() -> None:
     assert {'not-a-number', 'status-agrees'} <= run.failed
 
 
-def test_a_light_with_another_heartbeat_type_is_found_by_its_status() -> None:
-    assert Run(faults=('type=12',)).finish().session.found == FIRST.address
-
-
 @pytest.mark.parametrize(('addresses', 'target', 'text'), [
     ((), Address(9, 9), '9/9 was not heard within 10 s; nothing else was heard'),
     ((243, 244), Address(9, 9), '9/9 was not heard within 10 s; heard instead: 1/243 and 1/244'),

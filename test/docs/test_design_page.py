@@ -64,22 +64,6 @@ def test_a_diagram_has_the_transitions_of_the_table(module: ModuleType, first: s
         for (state, by), after in transitions if after.name != 'STOPPED')
 
 
-def test_the_places_to_add_something_exist() -> None:
-    code = '\n'.join(path.read_text() for path in PACKAGE.rglob('*.py'))
-    files = [*PACKAGE.rglob('*'), *(ROOT / 'test').rglob('*.py'), *ROOT.glob('*'),
-             *ROOT.glob('*/*')]
-    names = {name for cells in table(PAGE, 'addition') for cell in cells
-             for name in re.findall('`([^`]+)`', cell)}
-
-    def exists(name: str) -> bool:
-        if re.search(r'/|\.py$', name):
-            return any(str(path).endswith(f'/{name.rstrip("/")}') for path in files)
-        return re.search(rf'\b{name.rpartition(".")[2]}\b', code) is not None
-
-    assert len(names) > 30
-    assert [name for name in sorted(names) if not exists(name)] == []
-
-
 def test_the_bounds_of_stores_are_those_of_the_code() -> None:
     for _, bound in table(PAGE, 'store'):
         numbers = [int(number) for number in re.findall(r'\d+', bound.partition('(')[0])]

@@ -19,13 +19,11 @@ from pathlib import Path
 import re
 from typing import Any
 
-from bench.subjects import SUBJECTS
 from illuminator_ros.cli.bridge import Executable, usage
 from illuminator_ros.cli.monitor import graph, key_bindings, model
 from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag
-from illuminator_ros.illuminator.ros import beam
 from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
 from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic, MavCmd
@@ -163,13 +161,6 @@ def test_the_protocol_page_has_each_command_and_error_flag() -> None:
         assert rows[f'{flag.name} ({flag.value})'] == [LEVELS[level], text]
 
 
-def test_the_beam_page_has_the_parameters_and_limits_of_the_code() -> None:
-    assert {cells[0]: cells[1] for cells in table(BEAM, 'parameter')} == {
-        f'`{name}`': spec.unit for spec in LINK_PARAMETERS
-        if (name := spec.name) in ('frame_id', 'beam_range', 'beam_angle')}
-    assert f'{beam.LIFETIME} s' in BEAM
-
-
 def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:
     assert [(tuple(re.findall('`([^`]+)`', cells[0])), cells[1])
             for cells in table(MONITOR, 'key')] == [
@@ -180,8 +171,3 @@ def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:
     for text in (f'for {model.SILENCE:g} s', f'within {graph.ANSWER_LIMIT:g} s',
                  f'`--wait` {parser().get_default("wait"):g} s'):
         assert text in MONITOR
-
-
-def test_the_performance_page_has_each_subject_of_the_benchmark() -> None:
-    assert [cells[0] for cells in table(PERFORMANCE, 'subject') if cells[0]] == [
-        f'`{subject}`' for subject in SUBJECTS]

@@ -14,6 +14,7 @@
 
 """The pages of simulator and conformance, and what these programs have; no ROS is needed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,10 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
+from illuminator_ros.payload.checks.requirement import Requirement
 from illuminator_ros.payload.faults import FaultTable
 from illuminator_ros.payload.simulated import SimulatedType
+from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from illuminator_ros.rededge.simulated import COLUMNS
 from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
 import pytest
@@ -34,18 +37,20 @@ DOC = Path(__file__).parents[2] / 'doc'
 CONFORMANCE = (DOC / 'conformance.md').read_text()
 SIMULATOR = (DOC / 'simulator.md').read_text()
 
-CONSENT = {(False, False): '', (True, False): 'changes', (True, True): 'dazzles'}
 
 
-def test_the_requirements_are_listed_in_order_with_their_sections() -> None:
-    assert table(CONFORMANCE, 'requirement') == [
+@pytest.mark.parametrize(('heading', 'requirements', 'consent'), [
+    ('requirement', REQUIREMENTS, 'dazzles'),
+    ('requirement on a camera', CAMERA_REQUIREMENTS, 'images')])
+def test_the_requirements_are_listed_in_order_with_their_sections_and_counted(
+    heading: str, requirements: Sequence[Requirement[Any]], consent: str,
+) -> None:
+    notes = {(False, False): '', (True, False): 'changes', (True, True): consent}
+    assert table(CONFORMANCE, heading) == [
         [f'`{one.name}`', one.title,
          f'[{one.specification.title}]({one.specification.url}), {one.section}',
-         CONSENT[one.changes, one.needs_consent]] for one in REQUIREMENTS]
-
-
-def test_the_requirements_are_counted() -> None:
-    assert f'{len(REQUIREMENTS)} requirements' in CONFORMANCE
+         notes[one.changes, one.needs_consent]] for one in requirements]
+    assert f'{len(requirements)} requirements' in CONFORMANCE
 
 
 def faults(of: FaultTable) -> list[list[str]]:

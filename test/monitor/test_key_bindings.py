@@ -159,14 +159,6 @@ def test_selection_stays_with_its_light_and_moves_up_when_it_is_cleared(desk: De
     assert desk.bindings.selected == '/b'
 
 
-def test_keys_do_nothing_without_lights(desk: Desk) -> None:
-    desk.lights.clear()
-
-    desk.press('down', 'space', '+', 's', 'r', 'a')
-
-    assert (desk.bindings.selected, desk.asked) == (None, [])
-
-
 @pytest.mark.parametrize(('key', 'value'), [
     ('space', False), ('enter', False), ('+', {'brightness': 60.0}), ('=', {'brightness': 60.0}),
     ('right', {'brightness': 60.0}), ('-', {'brightness': 40.0}), ('left', {'brightness': 40.0}),
@@ -186,19 +178,6 @@ def test_all_off_goes_to_each_light_that_is_not_gone(desk: Desk) -> None:
     assert desk.asked == [('/a', False), ('/c', False)]
 
 
-@pytest.mark.parametrize('key', ['q', 'ctrl-c', 'ctrl-d'])
-def test_quit_key_works_on_the_help_screen_too(desk: Desk, key: str) -> None:
-    desk.press('?', key)
-
-    assert desk.bindings.quit
-
-
-def test_any_other_key_closes_the_help_only(desk: Desk) -> None:
-    desk.press('h', 'space')
-
-    assert (desk.bindings.show_help, desk.asked) == (False, [])
-
-
 def test_each_key_of_the_help_has_one_meaning_and_an_effect(desk: Desk) -> None:
     assert len(KEYS) == len(set(KEYS))
     for key in KEYS:
@@ -207,12 +186,3 @@ def test_each_key_of_the_help_has_one_meaning_and_an_effect(desk: Desk) -> None:
         before = desk.state()
         desk.press(key)
         assert desk.state() != before, key
-
-
-@pytest.mark.parametrize('key', ['x', 'escape', 'é', 'Q', '\ufffd'])
-def test_key_without_a_binding_has_no_effect(desk: Desk, key: str) -> None:
-    before = desk.state()
-
-    desk.press(key)
-
-    assert desk.state() == before

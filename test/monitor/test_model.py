@@ -99,16 +99,6 @@ def test_error_flags_have_texts() -> None:
         'thermal throttling', 'thermistor failure', 'unknown flags 0x10']
 
 
-@pytest.mark.parametrize(('text', 'number'), [
-    ('12.5', 12.5), ('0', 0.0), ('n/a', None), ('nan', None), ('inf', None), (None, None)])
-def test_number_of_a_diagnosis_is_finite_or_none(
-    text: str | None, number: float | None,
-) -> None:
-    values = {} if text is None else {'loss_percent': text}
-
-    assert Diagnosis(0, '', values).number('loss_percent') == number
-
-
 def test_control_characters_of_others_never_reach_the_terminal() -> None:
     fleet = fleet_with(mode='\x1b[2J')
     fleet.diagnosed(BOW, 'lamp', Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)

@@ -19,7 +19,7 @@ import os
 import pty
 import termios
 
-from illuminator_ros.cli.monitor.terminal import Keyboard, quiet_errors, unbuffered
+from illuminator_ros.cli.monitor.terminal import Keyboard, unbuffered
 import pytest
 
 
@@ -91,22 +91,3 @@ def test_ctrl_c_alone_is_still_a_signal(line: tuple[int, int]) -> None:
     assert modes & termios.ISIG
     assert [characters[key] for key in (termios.VINTR, termios.VQUIT, termios.VSUSP)] == [
         b'\x03', b'\0', b'\0']
-
-
-def test_closed_terminal_is_not_an_error() -> None:
-    master, slave = pty.openpty()
-
-    with unbuffered(slave):
-        os.close(master)
-
-    os.close(slave)
-
-
-def test_errors_of_the_middleware_are_shown_afterwards(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    with quiet_errors():
-        os.write(2, b'from the middleware\n')
-        assert capfd.readouterr().err == ''
-
-    assert capfd.readouterr().err == 'from the middleware\n'

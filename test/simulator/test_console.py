@@ -61,13 +61,6 @@ def test_a_line_is_for_all_lights_or_for_the_one_that_it_names(
     assert (console.bow.enabled, console.other.enabled) == expected
 
 
-def test_a_change_by_hand_is_followed_by_a_status(console: Console) -> None:
-    console.enter('bow brightness 30')
-    ((source, status),) = console.lights.outgoing
-    assert isinstance(status, IlluminatorStatus)
-    assert (source, status.brightness) == (Address(1, 243), 30.0)
-
-
 def test_each_line_changes_its_part_of_the_configuration_only(console: Console) -> None:
     for line, params in (
             ('strobe 0.5', (1.0, 100.0, 0.5, 50.0)), ('strobe 0.5 25', (1.0, 100.0, 0.5, 25.0)),
@@ -113,15 +106,6 @@ def test_each_fault_can_be_typed_shown_and_ended(console: Console, name: str) ->
     assert console.behaviour == faulty
     console.enter('clear')
     assert console.behaviour == normal
-
-
-@pytest.mark.parametrize('line', ['reboot', 'fault reboot'])
-def test_a_restart_without_an_interval_happens_once(console: Console, line: str) -> None:
-    console.enter('on')
-    console.enter(line)
-    assert (console.bow.enabled, console.bow.uptime_ms(10.0)) == (False, 0)
-    console.lights.poll(60.0)
-    assert console.bow.uptime_ms(60.0) == 50_000
 
 
 def test_ambient_and_own_temperature_can_be_set(console: Console) -> None:

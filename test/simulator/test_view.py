@@ -112,22 +112,6 @@ def test_a_plain_line_is_written_when_the_state_changes(device: Light) -> None:
     assert ('off' in off, 'ON' in on, '\x1b' in stream.getvalue()) == (True, True, False)
 
 
-def test_a_plain_line_is_written_when_the_temperature_changes_by_5_kelvins(device: Light) -> None:
-    stream = io.StringIO()
-    view = PlainView(stream)
-    for temperature in range(30, 51):
-        device.device.heat_to(float(temperature), 0.0)
-        view.show([look(device, 0.0)])
-    assert len(stream.getvalue().splitlines()) == 5
-
-
-def test_a_fault_that_is_over_is_no_longer_shown(device: Light) -> None:
-    device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'silence=2'), 'lie'), 0.0)
-    assert str(look(device, 0.0)).endswith('[silence, lie]')
-    device.poll(2.0)
-    assert str(look(device, 2.0)).endswith('[lie]')
-
-
 def test_the_live_view_updates_the_line_and_keeps_what_is_typed(
         device: Light, terminal: Terminal, live: LiveView) -> None:
     terminal.write('brightn')

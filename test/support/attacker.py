@@ -51,6 +51,16 @@ LENGTHS = (0, 1, 2, 3, 9, 10, 30, 33, 34, 35, 36, 38, 160, 161, 200, 254, 255)
 Datagrams = list[tuple[bytes, Any]]
 
 
+def field_codes(cls: type[Message]) -> list[tuple[str, str]]:
+    """Return the fields of a message, each with its code in :mod:`struct`."""
+    hints = get_type_hints(cls, include_extras=True)
+    return [(field.name, get_args(hints[field.name])[1])
+            for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
+
+
+FIELDS = {cls.name: field_codes(cls) for cls in MESSAGES}
+
+
 class Attacker:
     """
     Makes datagrams, the same ones for the same seed.
@@ -150,13 +160,11 @@ class Attacker:
         return frame + (signature(self._key, frame) if genuine else self._draw.randbytes(6))
 
     def _message(self, cls: type[Message]) -> Message:
-        hints = get_type_hints(cls, include_extras=True)
         target = self._draw.choice([(0, 0), *self._sources, self._any_source()])
         telling = {**TELLING, 'target_system': target[:1], 'target_component': target[1:]}
         return cls(*(
-            self._draw.choice(telling[field.name]) if field.name in telling
-            else self._value(get_args(hints[field.name])[1])
-            for field in dataclasses.fields(cls)))  # type: ignore[arg-type]
+            self._draw.choice(telling[name]) if name in telling else self._value(code)
+            for name, code in FIELDS[cls.name]))
 
     def _value(self, code: str) -> Any:
         draw, size = self._draw, struct.calcsize(f'<{code}')

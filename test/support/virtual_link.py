@@ -82,5 +82,6 @@ class VirtualLink:
             for frame in decoder.feed(self._codec.frame(source, message)):
                 for cls in receiver.messages:
                     if frame.message_id == cls.id:
+                        receiver.inspect(frame, cls)
                         receiver.receive(
                             frame.source, decode_payload(cls, frame.payload), self.now)

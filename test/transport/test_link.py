@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import contextlib
 import logging
 import math
 from pathlib import Path
@@ -307,36 +306,6 @@ def test_link_ends_in_its_own_thread_and_in_a_listener(run: Run) -> None:
     one.ask(lambda now: one.link.stop())
     links.append(other)
     eventually(lambda: not one.link.is_running() and not other.link.is_running())
-
-
-def test_link_that_was_never_started_leaves_nothing(run: Run) -> None:
-    for _ in range(10):
-        link = Link(parse_url(URL), Talker(), label='x')
-        link.stop()
-        link.start()
-        assert not link.is_running()
-
-
-def test_link_with_traffic_ends_and_closes_its_connection(run: Run) -> None:
-    stopping = threading.Event()
-    with listening_socket() as server:
-        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
-        with server.accept()[0] as connection:
-            def flood() -> None:
-                with contextlib.suppress(OSError):
-                    while not stopping.is_set():
-                        connection.sendall(heartbeat_frame())
-
-            thread = threading.Thread(target=flood)
-            thread.start()
-            link.endpoint.wait_heard()
-            link.stop()
-            assert not link.link.is_running()
-            stopping.set()
-            thread.join()
-            with contextlib.suppress(ConnectionResetError):
-                while connection.recv(300):
-                    pass
 
 
 @pytest.mark.parametrize(('module', 'name', 'url', 'after'), [

@@ -24,7 +24,7 @@ import sys
 from typing import Any
 
 from illuminator_ros.mavlink.transport import open_channel, tcp
-from illuminator_ros.mavlink.url import HostPort, parse_url, UdpUrl
+from illuminator_ros.mavlink.url import parse_url
 import pytest
 from support.open_channel import bound_socket, listening_socket
 from support.ports import free_port
@@ -66,11 +66,6 @@ def test_error_names_address_or_device_and_reason(
     (tmp_path / 'others').touch(mode=0)
     values = {'port': free_port(socket.SOCK_STREAM), 'path': tmp_path}
     assert re.fullmatch(said.format(**values), reason(url.format(**values)))
-
-
-def test_addresses_of_different_ip_versions_are_named() -> None:
-    with pytest.raises(OSError, match=r'127\.0\.0\.1:1.*\[::1\]:2.*different IP versions'):
-        open_channel(UdpUrl(HostPort('127.0.0.1', 1), HostPort('::1', 2)))
 
 
 def test_missing_pyserial_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import math
 import socket
 
 from illuminator_ros.mavlink import component
@@ -25,7 +24,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
 from support.frames import heartbeat_frame, raw_v2
-from support.live_link import BRIDGE, LiveLink, Run, Talker
+from support.live_link import LiveLink, Run, Talker
 from support.ports import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
@@ -98,13 +97,6 @@ def test_foreign_frames_keep_a_peer_and_are_counted() -> None:
     assert (link.state().traffic.frames_received, len(endpoint.heard)) == (34, 0)
 
 
-def test_every_frame_from_our_own_address_is_received() -> None:
-    link, endpoint = simulated()
-    link.receive((heartbeat_frame(BRIDGE, sequence=77), PEER))
-    link.receive((foreign_frame(78, BRIDGE) + heartbeat_frame(BRIDGE, sequence=79), PEER))
-    assert [source for source, _ in endpoint.heard] == [BRIDGE, BRIDGE]
-
-
 def rests(link: LiveLink) -> bool:
     """Return whether the thread makes few turns during the next heartbeats."""
     turns = []
@@ -123,25 +115,6 @@ def _fast_heartbeat(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize('url', ['memory://quiet', 'udpin://127.0.0.1:{port}'])
 def test_open_link_without_traffic_rests(run: Run, url: str, _fast_heartbeat: None) -> None:
     assert rests(run(LiveLink(url.format(port=free_port(socket.SOCK_STREAM)))))
-
-
-class _Idle(Talker):
-    """Has nothing to do."""
-
-    def next_deadline(self) -> float:
-        super().next_deadline()
-        return math.inf
-
-
-@pytest.mark.parametrize('url', [
-    'tcp://127.0.0.1:{port}', 'serial:///dev/illuminator_ros_has_no_such_device:57600'])
-def test_link_that_cannot_be_opened_rests_between_tries(run: Run, url: str) -> None:
-    link = run(LiveLink(url.format(port=free_port(socket.SOCK_STREAM)), _Idle()))
-    link.wait_lost()
-    before = link.endpoint.turns
-    for _ in range(20):
-        link.state()
-    assert link.endpoint.turns - before < 100
 
 
 def test_line_that_takes_nothing_makes_no_work_and_drops_are_counted(

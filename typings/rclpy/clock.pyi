@@ -12,9 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+from collections.abc import Callable
 from enum import IntEnum
 
+from rclpy.duration import Duration
 from rclpy.time import Time
+
+class JumpThreshold:
+    def __init__(
+        self, *, min_forward: Duration | None, min_backward: Duration | None,
+        on_clock_change: bool = ...,
+    ) -> None: ...
+
+class TimeJump: ...
+class JumpHandle: ...
 
 class ClockType(IntEnum):
     ROS_TIME = ...
@@ -27,6 +38,10 @@ class Clock:
     @property
     def clock_type(self) -> ClockType: ...
     def now(self) -> Time: ...
+    def create_jump_callback(
+        self, threshold: JumpThreshold, *, pre_callback: Callable[[], None] | None = ...,
+        post_callback: Callable[[TimeJump], None] | None = ...,
+    ) -> JumpHandle: ...
 
 class ROSClock(Clock):
     @property

@@ -28,6 +28,7 @@ import select
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 from typing import Any
 
@@ -173,6 +174,7 @@ class Conformance:
                           signing=signs, store=store,
                           mavlink_version=mavlink_version(
                               options.mavlink_version, {checks.device: checks.mavlink_version}))
+        self._traces = f', besides {checks.traces}' if checks.traces else ''
         self._suite: CheckRunner[Any] | None = None
         self._signals = 0
         self._written = True
@@ -198,7 +200,7 @@ class Conformance:
         self._write_line(*self._announcement)
         conditions = Conditions(
             bool(self._announcement) and self._consent(),
-            lambda: self._link.state().decoding.crc_errors, self._payload_options)
+            lambda: self._link.state().decoding.crc_errors, self._payload_options, time.time)
         suite = self._suite = CheckRunner(
             checks, self._session, conditions, self._requirements, self._show)
         self._finish(suite.run(missing))
@@ -259,7 +261,8 @@ class Conformance:
             return
         changed = any(one.changes for one in self._requirements)
         self._announcement = [f'found {checks.device} {session.found}, which ' + (
-            'the checks will change and then restore' if changed else 'stays unchanged')]
+            f'the checks will change and then restore{self._traces}' if changed else
+            'stays unchanged')]
         if others := session.devices - {session.found}:
             self._announcement.append(
                 f'not checked: {checks.device} {names(others)}; --target selects another')

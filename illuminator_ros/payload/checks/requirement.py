@@ -43,12 +43,14 @@ class Conditions:
 
     :param consent: whether the operator has agreed to the checks that need consent.
     :param checksum_errors: returns how many frames with a wrong checksum the link has dropped.
+    :param utc: returns the time, s since 1970.
     :param options: values of the payload's own options.
     """
 
     consent: bool = True
     checksum_errors: Callable[[], int] = lambda: 0
     options: Mapping[str, float] = field(default_factory=dict)
+    utc: Callable[[], float] = lambda: 0.0
 
 
 class Tester(Protocol):
@@ -165,6 +167,8 @@ class PayloadChecks(Generic[T]):
     :param question: asked before them; ``{device}`` and the options are filled in.
     :param options: options of the command line, for :attr:`Conditions.options`.
     :param mavlink_version: 1 or 2, which the device needs; None if both will do.
+    :param component: the component id that alone identifies a device, see :class:`Session`.
+    :param traces: what the checks leave, although they restore the device.
     """
 
     payload: str
@@ -179,7 +183,10 @@ class PayloadChecks(Generic[T]):
     question: str = ''
     options: tuple[Option, ...] = ()
     mavlink_version: int | None = None
+    component: int | None = None
+    traces: str = ''
 
     def session(self, address: Address, target: Address | None = None) -> Session:
         """Return a session with a device, from our address."""
-        return Session(address, self.messages, self.is_device, self.describe, target)
+        return Session(
+            address, self.messages, self.is_device, self.describe, target, self.component)

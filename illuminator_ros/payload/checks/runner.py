@@ -168,6 +168,7 @@ class CheckRunner(Generic[T]):
                 break
             await self._session.runner.sleep(RESTORE_PAUSE)
         self.left_changed = bool(differing)
-        self.restored = f'the {device} is as it was' if not differing else (
+        traces = f', besides {self._checks.traces}' if self._checks.traces else ''
+        self.restored = f'the {device} is as it was{traces}' if not differing else (
             f'THE {device.upper()} IS NOT AS IT WAS ({", ".join(differing)}): it was '
             + self._tester.saved)

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, field
 import math
@@ -26,6 +26,7 @@ from .coroutine import CoroutineRunner
 from ..identity import Identity
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
+from ...mavlink.frame import Frame
 from ...mavlink.messages import (
     Address,
     command_name,
@@ -203,18 +204,23 @@ class Session(Endpoint):
     :param is_device: whether a message identifies its sender as a device of this payload.
     :param describe: text of a message of the payload, '' for its name.
     :param target: the device; None selects the first that is heard.
-    :ivar found: the device, once it is heard.
+    :param component: the component id that alone identifies the device, whose system id changes;
+        None if its address stays the same.
+    :ivar found: the present address of the device, once it is heard.
     :ivar heard: all senders.
     :ivar devices: the senders that are devices of this payload.
     :ivar idle_until: end of the time in which the session only listened, s.
     :ivar transactions: all commands.
+    :ivar versions: MAVLink versions of the frames of the device, each with their number.
+    :ivar odd_lengths: lengths of its MAVLink 1 frames that are not those of their messages, by
+        message name.
     :ivar log: a line for each message.
     """
 
     def __init__(
         self, address: Address, payload_messages: Sequence[type[Message]],
         is_device: Callable[[Message], bool], describe: Callable[[Message], str],
-        target: Address | None,
+        target: Address | None, component: int | None = None,
     ) -> None:
         super().__init__()
         self.address = address
@@ -226,9 +232,12 @@ class Session(Endpoint):
         self.devices: set[Address] = set()
         self.idle_until = -math.inf
         self.transactions: History[Transaction] = History()
+        self.versions: Counter[int] = Counter()
+        self.odd_lengths: dict[str, int] = {}
         self.log: History[str] = History()
         self._received: dict[type[Message], History[tuple[float, Message]]] = {
             cls: History() for cls in self.messages}
+        self._component = component
         self._is_device = is_device
         self._describe = describe
         self._began: float | None = None
@@ -248,20 +257,35 @@ class Session(Endpoint):
         """See :meth:`Endpoint.link_closed`."""
         self._open = False
 
+    def inspect(self, frame: Frame, cls: type[Message]) -> None:
+        """See :meth:`Endpoint.inspect`."""
+        if self._same_device(frame.source, self.found):
+            self.versions[frame.version] += 1
+            if frame.version == 1 and len(frame.payload) != cls.base_size:
+                self.odd_lengths[cls.name] = len(frame.payload)
+
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         self._at(now)
         self.heard.add(source)
-        if self._is_device(message):
+        if self._component in (None, source.component) and self._is_device(message):
             self.devices.add(source)
-        if self.found is None and (
-                source == self.target if self.target else source in self.devices):
+        if self.found is None and (self._same_device(source, self.target) if self.target
+                                   else source in self.devices):
             self.found = source
-        if source == self.found:
+        if self._same_device(source, self.found):
+            if self.found is not None and source != self.found:
+                self.heard.discard(self.found)
+                self.devices.discard(self.found)
+            self.found = source
             self._last_heard = now
             self._note('<', self._describe(message) or _protocol_text(message))
             self._record(message)
         self.runner.advance(now)
+
+    def _same_device(self, source: Address, device: Address | None) -> bool:
+        return source == device or (
+            device is not None and source.component == device.component == self._component)
 
     def _record(self, message: Message) -> None:
         if (received := self._received.get(type(message))) is not None:
@@ -322,6 +346,20 @@ class Session(Endpoint):
         """Return those that the device sent before the session sent a command."""
         return [(at, one) for at, one in self.received(cls) if at <= self.idle_until]
 
+    def send(self, message: Message, sender: Address | None = None) -> None:
+        """Send a message from an address, by default our own."""
+        self.outgoing.append((sender or self.address, message))
+        self._note('>', self._describe(message) or message.name)
+
+    def check_presence(self) -> None:
+        """
+        Check that the device still sends.
+
+        :raises DeviceLost: if it has stopped.
+        """
+        if self.now - self._last_heard > LOST_TIMEOUT:
+            raise DeviceLost
+
     # For coroutines
 
     async def find(self, timeout: float, listen: float) -> None:
@@ -362,8 +400,7 @@ class Session(Endpoint):
                 self._send(one, target or self.device, confirmation + attempt, as_int=as_int)
                 if await self._answered(one):
                     break
-                if self.now - self._last_heard > LOST_TIMEOUT:
-                    raise DeviceLost
+                self.check_presence()
             if one.result != MavResult.TEMPORARILY_REJECTED:
                 break
             await self.runner.sleep(REJECTION_PAUSE)

@@ -1,0 +1,219 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The node of the camera: topics, services, parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import functools
+import logging
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion as QuaternionMessage
+from geometry_msgs.msg import QuaternionStamped
+from sensor_msgs.msg import NavSatFix, NavSatStatus
+from std_msgs.msg import Bool, Header, UInt32
+from std_srvs.srv import Trigger
+
+from .diagnostics import reports
+from .inputs import subscriptions
+from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
+from ..client import RedEdgeClient, Settings
+from ..conversions import image_attitude, image_position, MountFrame
+from ..feeder import FeederSettings, Input, InputChanged, InputState, PositionSource
+from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
+from ...mavlink.command import CommandSender
+from ...payload.rotation import Vector
+from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
+from ...ros.node import Answer, NodeInterface, Publication, RequestService, STREAM_QOS
+from ...ros.parameter_services import ParameterServices
+from ...ros.parameters import (
+    DeviceParameters,
+    given_parameters,
+    ParameterError,
+    ParameterSpec,
+    Values,
+)
+from ...ros.payload import Host, RosPayload, ServedPayload
+
+# The frame of ~/image/attitude: its axes point to east, north and up (REP-105).
+EARTH_FRAME = 'map'
+
+PARAMETERS = (
+    ParameterSpec('position_source', 'raw', 'messages that carry the position: GPS_RAW_INT, or '
+                  'GLOBAL_POSITION_INT with SYSTEM_TIME',
+                  choices=tuple(source.value for source in PositionSource)),
+    ParameterSpec('geoid_separation', 0.0, 'height of mean sea level above the WGS84 ellipsoid',
+                  'm', -120.0, 120.0),
+    ParameterSpec('mount_frame', 'camera', 'the camera in ~/mount: x out of the lens and z to the '
+                  'top of the image, or z out of the lens',
+                  choices=tuple(frame.value for frame in MountFrame)),
+    ParameterSpec('attitude_rate', 20.0, 'highest rate of attitudes', 'Hz', 1.0, 200.0),
+    # The camera keeps what it gets for 5 s.
+    ParameterSpec('position_timeout', 1.0, 'age at which position and velocity are stale', 's',
+                  0.05, 5.0),
+    ParameterSpec('attitude_timeout', 0.5, 'age at which attitude and mount are stale', 's',
+                  0.02, 5.0),
+    ParameterSpec('send_gps_status', False, "send the number of satellites to the camera's page"),
+    ParameterSpec('heartbeat_timeout', 3.5, 'silence after which the camera is lost', 's', 1.1,
+                  3600.0),
+    ParameterSpec('frame_id', 'rededge', 'frame of ~/image/fix'),
+)
+MOUNT_PARAMETERS = tuple(
+    ParameterSpec(f'mount_{name}', 0.0, f'{name} of a fixed camera in its own axes; 0 at first',
+                  'degrees', -180.0, 180.0) for name in ('roll', 'pitch', 'yaw'))
+
+
+class CameraNode(ServedPayload):
+    """
+    Serves the camera of a link. In the link's thread, except the making.
+
+    :raises ParameterError: if a parameter is wrong.
+    """
+
+    def __init__(self, client: RedEdgeClient, host: Host) -> None:
+        self._client = client
+        self._host = host
+        self._clock = host.node.get_clock()
+        self._started = host.link.clock()
+        if host.link_parameters.address.component == MAV_COMP_ID_CAMERA:
+            raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is that of the camera')
+        self._geoid_is_known = 'geoid_separation' in given_parameters(host.node)
+        self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
+        self._interface = NodeInterface(
+            host.node, host.link, host.log, publications=(
+                Publication('connected', Bool),
+                Publication('image/fix', NavSatFix, STREAM_QOS),
+                Publication('image/attitude', QuaternionStamped, STREAM_QOS),
+                Publication('image/index', UInt32, STREAM_QOS)),
+            services=(
+                RequestService('ping', Trigger, self._ping),
+                RequestService('capture', Trigger, self._capture(Shot.SURVEY)),
+                RequestService('capture_panel', Trigger, self._capture(Shot.PANEL))),
+            commands=subscriptions(host.node, host.link, client.feeder))
+        self._interface.publish('connected', False)
+        self._parameters = DeviceParameters(host.node, MOUNT_PARAMETERS)
+        given = self._parameters.overrides()
+        angles = {spec.name: spec.check(given.get(spec.name, spec.default))
+                  for spec in MOUNT_PARAMETERS}
+        self._parameters.show(angles)
+        client.feeder.set_fixed_mount(_angles(angles), host.link.clock())
+        ParameterServices(
+            host.node, host.link, host.log, self._parameters, self._check, self._set_mount)
+        host.diagnostics.add(DiagnosticsSource(
+            host.node.get_name(), host.node.get_fully_qualified_name(), self._look))
+        client.events.subscribe(self._take)
+
+    # Requests
+
+    def _ping(self, request: Trigger.Request, now: float, answer: Answer) -> None:
+        self._client.camera.ping(now, answer)
+
+    def _capture(self, shot: Shot) -> Callable[[Trigger.Request, float, Answer], None]:
+        return lambda request, now, answer: self._client.camera.capture(shot, now, answer)
+
+    def _check(self, name: str, value: object) -> None:
+        self._parameters.specs[name].check(value)
+
+    def _set_mount(
+        self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
+    ) -> None:
+        feeder = self._client.feeder
+        if not feeder.mount_is_fixed:
+            answer('the mount is not fixed: ~/mount has a publisher')
+            return
+        node, specs = self._host.node, self._parameters.specs
+        angles = {name: specs[name].check(changes.get(name, node.get_parameter(name).value))
+                  for name in specs}
+        feeder.set_fixed_mount(_angles(angles), now)
+        answer(self._parameters.show(angles))
+
+    def poll(self, now: float) -> None:
+        """See :meth:`ServedPayload.poll`."""
+        if (self._client.feeder.mount_is_fixed
+                and self._host.node.count_publishers(self._mount_topic)):
+            self._client.feeder.expect_mount()
+            self._host.log.info('~/mount has a publisher: the mount is not fixed')
+
+    # Events
+
+    def _take(self, event: CameraEvent | InputChanged) -> None:
+        log = self._host.log
+        if isinstance(event, ImageTaken):
+            self._publish(event.feedback)
+        elif isinstance(event, InputChanged):
+            log.write(logging.INFO if event.state is InputState.OK else logging.WARNING,
+                      f'~/{event.input.value}: {event.text}', f'input {event.input.value}')
+        elif isinstance(event, CameraConnected):
+            log.info(f'camera {event.address} connected', 'camera')
+            self._interface.publish('connected', True)
+        elif isinstance(event, CameraLost):
+            log.warning(f'camera {event.address} lost: {event.reason}', 'camera')
+            self._interface.publish('connected', False)
+        self._host.check_diagnostics()
+
+    def _publish(self, feedback: CameraFeedback) -> None:
+        """Publish the metadata of an image, stamped with its own time."""
+        settings = self._client.settings.feeder
+        time = self._client.feeder.ros_time(feedback.time_usec * 1000)
+        if time is None:
+            time = self._clock.now().nanoseconds
+        seconds, nanoseconds = divmod(time, 1_000_000_000)
+        stamp = Time(sec=seconds, nanosec=nanoseconds)
+        position = image_position(feedback, settings.geoid_separation)
+        fix = NavSatFix(header=Header(stamp=stamp, frame_id=self._host.values['frame_id']),
+                        status=NavSatStatus(status=NavSatStatus.STATUS_NO_FIX))
+        if position is not None:
+            fix.status.status = position.status
+            fix.latitude, fix.longitude = position.latitude, position.longitude
+            fix.altitude = position.altitude
+        self._interface.publish('image/fix', fix)
+        attitude = image_attitude(feedback, settings.mount_frame)
+        if attitude is not None:
+            self._interface.publish('image/attitude', QuaternionStamped(
+                header=Header(stamp=stamp, frame_id=EARTH_FRAME), quaternion=QuaternionMessage(
+                    w=attitude.w, x=attitude.x, y=attitude.y, z=attitude.z)))
+        self._interface.publish('image/index', feedback.img_idx)
+
+    def _look(self, now: float) -> MakeReports:
+        return functools.partial(
+            reports, client=self._client.snapshot(now), started=self._started,
+            geoid_is_known=self._geoid_is_known)
+
+
+def _angles(values: Values) -> Vector:
+    return values['mount_roll'], values['mount_pitch'], values['mount_yaw']
+
+
+def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
+    return RedEdgeClient(commands, Settings(
+        FeederSettings(
+            PositionSource(values['position_source']), values['geoid_separation'],
+            MountFrame(values['mount_frame']), values['attitude_rate'],
+            values['position_timeout'], values['attitude_timeout'], values['send_gps_status']),
+        values['heartbeat_timeout']))
+
+
+REDEDGE = RosPayload(
+    'rededge', _make_client, CameraNode, PARAMETERS, MOUNT_PARAMETERS,
+    summary='a MicaSense camera (RedEdge, RedEdge-MX, RedEdge-P, Altum)', examples=(
+        'ros2 run illuminator_ros rededge serial:///dev/ttyUSB0:57600 --ros-args '
+        '-r '"'~/fix:=/gps/fix' -r '~/imu:=/imu/data'",
+        'ros2 service call /rededge/capture std_srvs/srv/Trigger',
+        'ros2 param set /rededge mount_pitch 15.0'),
+    # MAV_COMP_ID_ONBOARD_COMPUTER.
+    link_defaults={'connection_url': 'udpin://127.0.0.1:14592', 'component_id': 191},
+    mavlink_version=1)

@@ -1,0 +1,133 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The reports of the camera's node on /diagnostics: pure functions of snapshots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from ..camera import CameraSnapshot
+from ..client import ClientSnapshot
+from ..feeder import FeederSnapshot, Input, InputSnapshot, InputState
+from ..messages import MAV_COMP_ID_CAMERA
+from ...mavlink.command import format_seconds
+from ...ros.diagnostics import (
+    ERROR,
+    Finding,
+    link_findings,
+    link_report,
+    LinkSnapshot,
+    Report,
+    Value,
+    WARN,
+    why_nothing_is_heard,
+)
+
+# It adopts our system id, so only the component id is its own.
+HARDWARE_ID = f'mavlink:{MAV_COMP_ID_CAMERA}'
+
+
+def reports(
+    link: LinkSnapshot, *, client: ClientSnapshot, started: float, geoid_is_known: bool,
+) -> list[Report]:
+    """
+    Return the reports of the node.
+
+    :param started: when the node was started, s on the link's clock.
+    :param geoid_is_known: whether ``geoid_separation`` is set.
+    """
+    address = client.camera.address
+    absence = link.state.failure or (
+        f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "a camera")}')
+    findings = link_findings(link, address, what='camera', absence=absence, started=started)
+    return [link_report(link, address, findings, {}),
+            _camera_report(client, link.taken_at, geoid_is_known)]
+
+
+def camera_findings(camera: CameraSnapshot) -> list[Finding]:
+    """Return the findings on the camera itself."""
+    if not camera.connected:
+        return [(ERROR, f'lost: {camera.lost_reason}') if camera.lost_reason
+                else (WARN, 'not heard yet')]
+    findings: list[Finding] = []
+    if camera.conflict:
+        findings.append((ERROR, f'several components have id {MAV_COMP_ID_CAMERA}: give each '
+                                'camera a link of its own'))
+    if camera.is_deaf:
+        findings.append((WARN, f'{camera.unanswered_pings} PINGs without a reply: the camera does '
+                               'not hear us; check the line to it'))
+    return findings
+
+
+def input_findings(feeder: FeederSnapshot) -> list[Finding]:
+    """Return a finding for each input that is missing, stale or refused."""
+    findings: list[Finding] = []
+    optional = set(Input).difference(*feeder.needed)
+    for group in (*feeder.needed, *((name,) for name in Input if name in optional)):
+        states = {feeder.inputs[name].state: name for name in reversed(group)}
+        if InputState.OK in states:
+            continue
+        for state in (InputState.REFUSED, InputState.STALE):
+            if state in states:
+                name = states[state]
+                findings.append((WARN, _why(name, feeder.inputs[name])))
+                break
+        else:
+            if group in feeder.needed:
+                findings.append((WARN, f'nothing received on {_topics(group)}'))
+    return findings
+
+
+def _topics(names: Sequence[Input]) -> str:
+    return ' or '.join(f'~/{name.value}' for name in names)
+
+
+def _why(name: Input, snapshot: InputSnapshot) -> str:
+    if snapshot.state is InputState.REFUSED or snapshot.age is None:
+        return (f'~/{name.value} refused {format_seconds(snapshot.refused_age or 0.0)} ago: '
+                f'{snapshot.refusal}')
+    return f'~/{name.value}: nothing for {format_seconds(snapshot.age)}'
+
+
+def _camera_report(client: ClientSnapshot, now: float, geoid_is_known: bool) -> Report:
+    findings = camera_findings(client.camera) + input_findings(client.feeder)
+    if not geoid_is_known:
+        findings.append((WARN, 'geoid_separation is not set, so altitudes are those above the '
+                               'ellipsoid'))
+    return Report('camera', HARDWARE_ID, findings, 'connected', lambda: _values(client, now))
+
+
+def _values(client: ClientSnapshot, now: float) -> dict[str, Value]:
+    camera, feeder = client.camera, client.feeder
+    values: dict[str, Value] = {
+        'address': str(camera.address) if camera.address else None,
+        'connected': camera.connected,
+        'heard_s_ago': now - camera.heard_at if math.isfinite(camera.heard_at) else None,
+        'round_trip_ms': None if camera.round_trip is None else camera.round_trip * 1000,
+        'pings_unanswered': camera.unanswered_pings,
+        'images': camera.images,
+        'image_index': camera.image_index,
+        'positions_sent': feeder.positions,
+        'attitudes_sent': feeder.attitudes,
+    }
+    for name, one in feeder.inputs.items():
+        values |= {f'{name.value}': one.state.value, f'{name.value}_s_ago': one.age}
+        if one.refused:
+            values |= {f'{name.value}_refused': one.refused,
+                       f'{name.value}_refused_s_ago': one.refused_age,
+                       f'{name.value}_refusal': one.refusal}
+    return values

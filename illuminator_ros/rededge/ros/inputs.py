@@ -1,0 +1,137 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The subscribed topics: their messages as the feeder takes them, and jumps of ROS time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import math
+import time
+from typing import Any
+
+from geometry_msgs.msg import Quaternion as QuaternionMessage
+from geometry_msgs.msg import QuaternionStamped, TwistStamped, Vector3
+from rclpy.clock import JumpThreshold, TimeJump
+from rclpy.duration import Duration
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, NavSatFix, TimeReference
+from std_msgs.msg import Header, UInt32
+
+from ..conversions import Position, standard_deviations
+from ..feeder import Feeder, Input, Stamp, UNKNOWN
+from ...mavlink.link import Link
+from ...payload.rotation import Quaternion, Vector
+from ...ros.node import AnyCommand, CommandTopic
+
+# s by which the clock must differ from a steady one to have jumped. Simulated time may run fast
+# and in steps.
+JUMP = 0.5
+SIMULATED_JUMP = 5.0
+# The covariance of an Imu message that has no such value begins with this (sensor_msgs/Imu).
+NO_VALUE = -1.0
+
+
+class StampReader:
+    """
+    Stamps with their age by the node's clock.
+
+    :param jumped: called when ROS time has jumped, in any thread.
+    """
+
+    def __init__(self, node: Node, jumped: Callable[[], None]) -> None:
+        self._clock = node.get_clock()
+        self._jumped = jumped
+        # The system time less a steady one, s.
+        self._offset: float | None = None
+        # rclpy tells of jumps of simulated time only. The handle keeps the callback.
+        self._handle = self._clock.create_jump_callback(
+            JumpThreshold(min_forward=Duration(seconds=SIMULATED_JUMP),
+                          min_backward=Duration(nanoseconds=-1), on_clock_change=True),
+            post_callback=self._take_jump)
+
+    def _take_jump(self, jump: TimeJump) -> None:
+        self._jumped()
+
+    def read(self, header: Header) -> Stamp:
+        """Return the stamp of a message that was received just now."""
+        now = self._clock.now().nanoseconds
+        simulated = self._clock.ros_time_is_active
+        if not simulated:
+            offset = now / 1e9 - time.monotonic()
+            if self._offset is not None and abs(offset - self._offset) > JUMP:
+                self._jumped()
+            self._offset = offset
+        stamp = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+        return Stamp(stamp, (now - stamp) / 1e9, simulated)
+
+
+def _vector(message: Vector3) -> Vector:
+    return message.x, message.y, message.z
+
+
+def _quaternion(message: QuaternionMessage) -> Quaternion:
+    return Quaternion(message.w, message.x, message.y, message.z)
+
+
+def _position(message: NavSatFix) -> Position:
+    horizontal = vertical = math.nan
+    if message.position_covariance_type != NavSatFix.COVARIANCE_TYPE_UNKNOWN:
+        horizontal, vertical = standard_deviations(message.position_covariance)
+    return Position(message.status.status, message.latitude, message.longitude, message.altitude,
+                    horizontal, vertical)
+
+
+def _imu(message: Imu) -> tuple[Quaternion | None, Vector]:
+    return (
+        None if message.orientation_covariance[0] == NO_VALUE
+        else _quaternion(message.orientation),
+        UNKNOWN if message.angular_velocity_covariance[0] == NO_VALUE
+        else _vector(message.angular_velocity))
+
+
+def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand]:
+    """Return the subscribed topics, which the feeder takes in the link's thread."""
+    reader = StampReader(node, lambda: link.call(lambda now: feeder.clock_jumped()))
+
+    def topic(
+        name: Input, type_: type[object], values: Callable[[Any], tuple[object, ...]],
+        take: Callable[..., None],
+    ) -> AnyCommand:
+        def read(message: Any) -> tuple[object, ...]:
+            return *values(message), reader.read(message.header)
+
+        return CommandTopic(name.value, type_, lambda taken, now: take(*taken, now), read)
+
+    def take_attitude(name: Input) -> Callable[..., None]:
+        return lambda *taken: feeder.take_attitude(name, *taken)
+
+    def take_reference(utc: int, stamp: Stamp, now: float) -> None:
+        feeder.take_time_reference(stamp, utc, now)
+
+    return (
+        topic(Input.FIX, NavSatFix, lambda one: (_position(one),), feeder.take_fix),
+        topic(Input.VELOCITY, TwistStamped, lambda one: (_vector(one.twist.linear),),
+              feeder.take_velocity),
+        CommandTopic(Input.SATELLITES.value, UInt32, feeder.take_satellites),
+        topic(Input.IMU, Imu, _imu, take_attitude(Input.IMU)),
+        topic(Input.ATTITUDE, QuaternionStamped,
+              lambda one: (_quaternion(one.quaternion), UNKNOWN), take_attitude(Input.ATTITUDE)),
+        topic(Input.MOUNT, QuaternionStamped, lambda one: (_quaternion(one.quaternion),),
+              feeder.take_mount),
+        topic(Input.TIME_REFERENCE, TimeReference,
+              lambda one: (one.time_ref.sec * 1_000_000_000 + one.time_ref.nanosec,),
+              take_reference),
+    )

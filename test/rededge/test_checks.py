@@ -1,0 +1,172 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Each fault of a camera is found by the requirement that covers it, and by no other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.checks.requirement import Conditions, Verdict
+from illuminator_ros.payload.checks.runner import absence, CheckRunner
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.rededge.checks import CHECKS, REQUIREMENTS
+from illuminator_ros.rededge.simulated import FAULTS, Place, SimulatedRedEdge
+import pytest
+from support.virtual_link import START, VirtualLink
+
+UTC = 1.7e9
+CAMERA = Address(255, 100)
+# Without images there is nothing to count.
+WITHOUT_CONSENT = {one.name for one in REQUIREMENTS if not one.needs_consent} - {'capture-index'}
+CAPTURES = {one.name for one in REQUIREMENTS if one.needs_consent}
+PINGS = {'ping', 'ping-sequence', 'ping-once', 'ping-target', 'system-id'}
+INJECTED = {'raw-position', 'fused-position', 'attitude', 'validity'}
+
+# Fault -> all requirements that fail.
+SEEDED = {
+    'silence': {'heartbeat'},
+    'slow': PINGS,
+    'heartbeat': {'heartbeat-rate'},
+    'type': {'heartbeat-contents'},
+    'autopilot': {'heartbeat-contents'},
+    'any-target': {'other-component'},
+    'fixed-system': {'system-id', 'any-system'},
+    'other-ping': PINGS,
+    'ping-sequence': {'ping-sequence'},
+    'ping-target': {'ping-target'},
+    'no-status': {'capture-status'},
+    'no-feedback': CAPTURES - {'capture-status', 'shot-values', 'other-component'},
+    'late': CAPTURES - {'capture-status', 'shot-values', 'other-component'},
+    'same-index': {'capture-index'},
+    'no-panel': {'capture-panel'},
+    'any-shot': {'shot-values'},
+    'no-injection': INJECTED,
+    'stale': {'validity'},
+    'extension': {'lengths'},
+}
+# Random fault -> a requirement that fails; others may fail, too.
+RANDOM = {'drop': 'heartbeat-rate', 'duplicate': 'ping-once', 'delay': 'ping',
+          'corrupt': 'checksums', 'reboot': 'capture-index'}
+
+
+class Run:
+    """
+    A session and a check runner, a camera, and the line between them.
+
+    :param target: of the session.
+    :param others: component ids of further cameras.
+    :param version: of MAVLink.
+    """
+
+    def __init__(
+        self, fault: str = '', *, consent: bool = True, target: Address | None = None,
+        address: Address = CAMERA, others: Iterable[int] = (), version: int = 1, seed: int = 0,
+    ) -> None:
+        self.camera = SimulatedRedEdge(address, own_gps=Place(47.0, 8.0, 400.0))
+        if fault:
+            self.camera.behave(FAULTS.add(self.camera.behaviour, fault), START)
+        cameras = SimulatedComponents([
+            Description(address, self.camera, seed=seed),
+            *(Description(one, SimulatedRedEdge(one))
+              for one in (Address(255, other) for other in others))], START)
+        self.camera.set_clock(UTC + START, START)
+        self.session = CHECKS.session(Address(255, 190), target)
+        link = VirtualLink(self.session, cameras, version)
+        self.runner = CheckRunner(CHECKS, self.session, Conditions(
+            consent, lambda: link.decoders[0].counters.crc_errors, {},
+            lambda: UTC + link.now), REQUIREMENTS)
+        self.session.runner.run(self._main())
+        link.run_until(lambda: not self.session.runner.running, within=3600.0)
+
+    async def _main(self) -> None:
+        await self.session.find(10.0, 4.5)
+        await self.runner.run('' if self.session.found else absence(self.session, CHECKS, 10.0))
+
+    def names(self, verdict: Verdict) -> set[str]:
+        return {one.requirement.name for one in self.runner.results if one.verdict is verdict}
+
+    @property
+    def failed(self) -> set[str]:
+        return self.names(Verdict.FAIL)
+
+    def detail(self, name: str) -> str:
+        return next(one.detail for one in self.runner.results if one.requirement.name == name)
+
+
+def test_camera_without_faults_meets_every_requirement() -> None:
+    run = Run()
+    assert run.names(Verdict.PASS) == {one.name for one in REQUIREMENTS}
+    assert run.runner.restored == 'the camera is as it was, besides its new images'
+
+
+@pytest.mark.parametrize('fault', SEEDED)
+def test_fault_fails_exactly_its_requirements(fault: str) -> None:
+    assert Run(fault).failed == SEEDED[fault]
+
+
+@pytest.mark.parametrize('fault', RANDOM)
+def test_random_fault_fails_its_requirement(fault: str) -> None:
+    assert RANDOM[fault] in Run(fault).failed
+
+
+def test_every_fault_is_seeded_and_every_requirement_can_fail() -> None:
+    assert set(FAULTS) == set(SEEDED) | set(RANDOM)
+    assert {one.name for one in REQUIREMENTS} == set().union(
+        *SEEDED.values(), RANDOM.values(), {'mavlink-1'})
+
+
+def test_camera_that_sends_mavlink_2_fails_mavlink_1_only_re_1() -> None:
+    assert Run(version=2).failed == {'mavlink-1'}
+
+
+def test_without_consent_no_image_is_taken() -> None:
+    run = Run(consent=False)
+    assert not run.camera.images
+    assert run.names(Verdict.PASS) == WITHOUT_CONSENT
+    assert run.names(Verdict.SKIPPED) == CAPTURES | {'capture-index'}
+    assert run.runner.restored == 'nothing was changed'
+    assert 'would take images with a false position: not agreed to' in run.detail('validity')
+
+
+def test_camera_is_one_device_whatever_its_system_id_re_8() -> None:
+    run = Run(address=Address(1, 100), target=Address(9, 100))
+    assert not run.failed
+    assert run.session.devices == run.session.heard == {Address(255, 100)}
+
+
+def test_component_other_than_100_is_not_a_camera_re_7() -> None:
+    run = Run(others=[101])
+    assert not run.failed
+    assert run.session.devices == {Address(255, 100)}
+    absent = Run(address=Address(255, 101))
+    assert absent.failed == {'heartbeat'}
+    assert absent.detail('heartbeat').startswith(
+        'no camera was heard within 10 s, that is, no HEARTBEAT from component 100')
+
+
+@pytest.mark.parametrize(('fault', 'name', 'detail'), [
+    ('ping-sequence', 'ping-sequence', 'answers sequence number 0 with 1'),
+    ('ping-target', 'ping-target', 'to 0/0 instead of 255/190'),
+    ('other-ping', 'ping', 'no answer to 3 requests within 1 s each'),
+    ('fixed-system', 'system-id', 'after a message from 2/190 it sends from 255/100'),
+    ('late', 'capture-feedback', 'no CAMERA_FEEDBACK within 10 s after CAMERA_STATUS'),
+    ('same-index', 'capture-index', 'img_idx 0, then 0'),
+    ('stale', 'validity', 'still used 7 s later'),
+    ('no-injection', 'raw-position', '47.0000000, 8.0000000, 400.00 m instead of -48.8766667'),
+    ('extension', 'lengths', 'CAMERA_FEEDBACK with 47 bytes'),
+])
+def test_finding_names_the_deviation(fault: str, name: str, detail: str) -> None:
+    assert detail in Run(fault).detail(name)
