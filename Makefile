@@ -10,7 +10,7 @@ BENCH ?=
 .PHONY: help demo test check lint unit fuzz soak bench clean environment
 
 help:
-	@echo 'make demo    run a simulated light and the bridge, and show what they do'
+	@echo 'make demo    run a simulated light and a camera with their nodes, and show what they do'
 	@echo 'make test    run all checks and tests'
 	@echo 'make unit    run the tests that need no ROS'
 	@echo 'make check   run ruff and mypy'

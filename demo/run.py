@@ -13,7 +13,9 @@
 # limitations under the License.
 
 """
-Run a simulated light and the bridge, use them from an ordinary ROS client, and show each step.
+Run simulated devices and their nodes, use them from ordinary ROS clients, and show each step.
+
+A light with the bridge comes first, then a camera on a flight.
 
 The exit status is 0 if each step succeeded, otherwise 1.
 """
@@ -176,6 +178,10 @@ WITHOUT_ROS2 = """
 The command ros2 is not installed here, so the client makes the calls itself. Under each step
 stands the command that has the same effect on a computer with ROS 2.
 """
+FLIGHT = """
+A robot flies a survey. The node /rededge gives its position, attitude and gimbal angles, which
+are ROS topics, to a simulated camera on a serial line. What the camera writes into its images is
+compared with the truth:"""
 NEXT = """
 Go on with these three, each in a terminal of its own:
   {python} -m illuminator_ros.simulator   # a light on the screen; type "help"
@@ -233,6 +239,11 @@ def main() -> int:
                 success = False
                 print(f'\nThe {name} ended with status {status}; its log:')
                 print(Path(logs, name).read_text())
+    if success:
+        print(FLIGHT, flush=True)
+        success = not subprocess.run(
+            [sys.executable, Path(__file__).with_name('flight.py'), '--seconds', '36'],
+            check=False).returncode
     print('\nEach step succeeded.' if success else '\nThe demonstration failed.')
     if success:
         python = Path(sys.executable)

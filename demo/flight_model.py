@@ -1,0 +1,300 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A simulated survey flight: the truth about it, and the comparison of images with the truth.
+
+Times are flight time, s since the take-off. A flight may be played faster than it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from illuminator_ros.payload.rotation import Quaternion, Vector
+
+# m/s, degrees, m/s^2
+SPEED, BANK, GRAVITY = 5.0, 40.0, 9.81
+# s: a straight leg with the turn behind it, and how long the vehicle takes to bank.
+LEG, STRAIGHT, BANKING = 9.0, 6.0, 0.6
+# s between the points of the path.
+STEP = 0.005
+# Hz
+FIX_RATE, ATTITUDE_RATE = 12.5, 20.0
+# s between images; s for which the camera uses injected state; s without a fix, without a link,
+# and after that.
+IMAGE_INTERVAL, VALIDITY, OUTAGE, PULL, RETURN = 0.5, 5.0, 8.0, 3.0, 12.0
+# The place of the take-off, degrees and m above mean sea level; and the ellipsoid below that, m.
+LATITUDE, LONGITUDE, ALTITUDE, GEOID = 47.397742, 8.545594, 488.0, -47.3
+METRES_PER_DEGREE = 111_319.49
+# m from the truth at the time of the image, for a fix that is not older than one interval; m from
+# the truth at the time of the fix, for any; degrees from the truth within MAX_DELAY.
+MAX_POSITION_ERROR, MAX_FIX_ERROR, MAX_ANGLE_ERROR = 0.5, 0.05, 0.05
+
+# From the axes of the camera, FRD with x out of the lens, to those of the image.
+LENS = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
+
+
+class Point(NamedTuple):
+    """
+    The state of the vehicle on its path.
+
+    :param north: and ``east``, m from the take-off.
+    :param heading: and ``bank``, rad.
+    """
+
+    north: float
+    east: float
+    heading: float
+    bank: float
+
+
+class Truth(NamedTuple):
+    """
+    The state at a moment.
+
+    :param vehicle: attitude of the FRD body in NED.
+    :param camera: attitude of the image in NED: x to its top, y to its right, z out of the lens.
+    :param velocity: ENU, m/s.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
+    vehicle: Quaternion
+    camera: Quaternion
+    velocity: Vector
+
+
+class Window(NamedTuple):
+    """A time within the flight."""
+
+    begin: float
+    end: float
+
+    def __contains__(self, time: object) -> bool:
+        return isinstance(time, float) and self.begin <= time < self.end
+
+
+def _bank(time: float) -> float:
+    """Return the bank in legs with turns to alternating sides, rad."""
+    number, within = divmod(time, LEG)
+    rise = min((within - STRAIGHT) / BANKING, (LEG - within) / BANKING, 1.0)
+    # Smooth at both ends.
+    share = rise * rise * (3 - 2 * rise) if rise > 0 else 0.0
+    return math.copysign(math.radians(BANK) * share, -1 if number % 2 else 1)
+
+
+class Flight:
+    """
+    Straight legs, with turns of 40 degrees of bank between them, below which a gimbal moves.
+
+    :param seconds: its duration, flight time.
+    :param speed: how much faster than real it is played.
+    :ivar outage: when there is no fix.
+    :ivar pull: when the link is pulled.
+    """
+
+    def __init__(self, seconds: float, speed: float) -> None:
+        self.seconds = seconds
+        self.speed = speed
+        self.outage = Window(seconds / 6, seconds / 6 + OUTAGE)
+        self.pull = Window(seconds - PULL - RETURN, seconds - RETURN)
+        self._path = [Point(0.0, 0.0, math.radians(20), 0.0)]
+        for number in range(math.ceil(seconds / STEP) + 1):
+            north, east, heading, bank = self._path[-1]
+            self._path.append(Point(
+                north + SPEED * STEP * math.cos(heading), east + SPEED * STEP * math.sin(heading),
+                heading + GRAVITY * math.tan(bank) / SPEED * STEP, _bank(number * STEP + STEP)))
+
+    def _point(self, time: float) -> Point:
+        position = min(max(time, 0.0), self.seconds) / STEP
+        index = int(position)
+        one, other = self._path[index], self._path[index + 1]
+        return Point(*(a + (position - index) * (b - a) for a, b in zip(one, other, strict=True)))
+
+    def truth(self, time: float) -> Truth:
+        """Return the state at a time; before and after the flight the vehicle stands still."""
+        time = min(max(time, 0.0), self.seconds)
+        north, east, heading, bank = self._point(time)
+        pitch = math.radians(4 + 2 * math.sin(0.9 * time))
+        # A stabilised camera, which follows the heading late and looks to both sides.
+        camera = Quaternion.from_euler(
+            math.radians(15 * math.sin(0.6 * time)), math.radians(10 * math.sin(0.4 * time)),
+            self._point(time - 0.5).heading)
+        return Truth(
+            LATITUDE + north / METRES_PER_DEGREE,
+            LONGITUDE + east / METRES_PER_DEGREE / math.cos(math.radians(LATITUDE)),
+            ALTITUDE + 60 + 5 * math.sin(0.2 * time),
+            Quaternion.from_euler(bank, pitch, heading), camera,
+            (SPEED * self.speed * math.sin(heading), SPEED * self.speed * math.cos(heading), 0.0))
+
+    def distance(self, time: float, image: Image) -> float:
+        """Return how far the position of an image is from the true one at a time, m."""
+        truth = self.truth(time)
+        return math.hypot(
+            (image.latitude - truth.latitude) * METRES_PER_DEGREE,
+            (image.longitude - truth.longitude) * METRES_PER_DEGREE
+            * math.cos(math.radians(truth.latitude)), image.altitude - truth.altitude)
+
+    def angle(self, time: float, image: Image) -> float:
+        """Return the larger error of the attitudes of vehicle and camera, degrees."""
+        truth = self.truth(time)
+        assert image.vehicle and image.camera
+        return math.degrees(max(
+            image.vehicle.angle_to(truth.vehicle), image.camera.angle_to(truth.camera)))
+
+    def delay(self, image: Image, time: float, limit: float) -> tuple[float, float]:
+        """
+        Return the delay, within a limit, that explains the attitude of an image best.
+
+        Vehicle and camera must have the same: they are of one instant.
+
+        :return: the delay, s; and the error that it leaves, degrees.
+        """
+        steps = [limit * number / 40 for number in range(-40, 41)]
+        best = min(steps, key=lambda delay: self.angle(time - delay, image))
+        low, high = best - limit / 40, best + limit / 40
+        for _ in range(40):
+            third = (high - low) / 3
+            if self.angle(time - low - third, image) < self.angle(time - high + third, image):
+                high -= third
+            else:
+                low += third
+        return low, self.angle(time - low, image)
+
+
+@dataclass(frozen=True)
+class Image:
+    """
+    A line of the simulated camera's CSV, in flight time.
+
+    :param time: by the camera's clock.
+    :param position_age: and ``attitude_age``, s; None if its own sensors were used.
+    :param vehicle: and ``camera``, attitudes as :class:`Truth` has them.
+    """
+
+    time: float
+    latitude: float
+    longitude: float
+    altitude: float
+    position_age: float | None
+    attitude_age: float | None
+    vehicle: Quaternion | None
+    camera: Quaternion | None
+
+    @classmethod
+    def read(cls, row: Mapping[str, str], begin: float, speed: float) -> Image:
+        """
+        Return the image of a line.
+
+        :param begin: UTC of the take-off, s.
+        """
+        def age(name: str) -> float | None:
+            return float(row[f'{name}_age_s']) * speed if row[f'{name}_age_s'] else None
+
+        def rotation(prefix: str) -> Quaternion | None:
+            texts = [row[f'{prefix}{name}_deg'] for name in ('roll', 'pitch', 'yaw')]
+            return Quaternion.from_euler(*(math.radians(float(text)) for text in texts)) if all(
+                texts) else None
+
+        return cls((float(row['time_utc_s']) - begin) * speed, float(row['latitude_deg']),
+                   float(row['longitude_deg']), float(row['altitude_m']), age('position'),
+                   age('attitude'), rotation(''), rotation('camera_'))
+
+
+@dataclass
+class Comparison:
+    """
+    Images compared with the truth.
+
+    :param images: how many.
+    :param fresh: how many have a fix that is not older than one interval.
+    :param position_error: of those, from the truth at the time of the image, at most, m.
+    :param fix_error: of every injected position, from the truth at the time of the fix, m.
+    :param angle_error: of every injected attitude, from the truth at its own time, degrees.
+    :param delay: by which such a time differs from what the ages say, at most, s.
+    :param oldest: age of the oldest injected position or attitude, s.
+    :param own: images in the outage with the position of the camera's own GPS.
+    :param returned: images with a fresh fix after the link was pulled.
+    """
+
+    images: int = 0
+    fresh: int = 0
+    position_error: float = 0.0
+    fix_error: float = 0.0
+    angle_error: float = 0.0
+    delay: float = 0.0
+    oldest: float = 0.0
+    own: int = 0
+    returned: int = 0
+    failures: list[str] = field(default_factory=list)
+
+    def check(self, met: bool, text: str) -> None:
+        """Note a failure."""
+        if not met:
+            self.failures.append(text)
+
+
+def compare(
+    images: Iterable[Image], flight: Flight, *, max_delay: float, least_fresh: float,
+) -> Comparison:
+    """
+    Compare the images of a flight with the truth.
+
+    :param max_delay: s that a message may take to the camera, flight time.
+    :param least_fresh: the share of images outside the disturbances whose fix must be fresh.
+    """
+    result, calm = Comparison(), 0
+    for one in images:
+        time = one.time
+        if not 0.0 <= time < flight.seconds:
+            continue
+        result.images += 1
+        # The first fix after the outage comes at its end, or later.
+        disturbed = time >= flight.pull.begin or (
+            flight.outage.begin <= time <= flight.outage.end + 2 / FIX_RATE)
+        calm += not disturbed
+        ages = [age for age in (one.position_age, one.attitude_age) if age is not None]
+        result.oldest = max(result.oldest, *ages, 0.0)
+        if one.position_age is None:
+            result.own += time in flight.outage
+        else:
+            result.fix_error = max(
+                result.fix_error, flight.distance(time - one.position_age, one))
+            if one.position_age <= 1 / FIX_RATE:
+                result.fresh += not disturbed
+                result.returned += time >= flight.pull.end
+                result.position_error = max(result.position_error, flight.distance(time, one))
+        if one.attitude_age is not None:
+            delay, error = flight.delay(one, time - one.attitude_age, max_delay)
+            result.angle_error = max(result.angle_error, error)
+            result.delay = max(result.delay, abs(delay))
+    expected = flight.seconds / IMAGE_INTERVAL
+    check = result.check
+    check(abs(result.images - expected) <= 2, f'{result.images} images instead of {expected:g}')
+    check(result.oldest <= VALIDITY + 0.01, f'an image has data that is {result.oldest:.2f} s old')
+    check(result.position_error <= MAX_POSITION_ERROR,
+          f'a position is wrong by {result.position_error:.2f} m')
+    check(result.fix_error <= MAX_FIX_ERROR, f'a fix is wrong by {result.fix_error:.2f} m')
+    check(result.angle_error <= MAX_ANGLE_ERROR,
+          f'an attitude is wrong by {result.angle_error:.3f} degrees')
+    check(result.fresh >= least_fresh * calm,
+          f'only {result.fresh} of {calm} images have a fresh fix')
+    check(result.own > 0, 'the camera did not fall back to its own GPS in the outage')
+    check(result.returned > 0, 'no image has a fresh fix after the link was pulled')
+    return result

@@ -1,0 +1,167 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A flight of a minute in no time: client, MAVLink 1 bytes, simulated camera, and the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+import heapq
+from pathlib import Path
+import sys
+
+from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.rededge.client import RedEdgeClient, Settings
+from illuminator_ros.rededge.conversions import Position
+from illuminator_ros.rededge.feeder import FeederSettings, Input, PositionSource, Stamp, UNKNOWN
+from illuminator_ros.rededge.simulated import COLUMNS, Place, SimulatedRedEdge
+import pytest
+from support.virtual_link import START, VirtualLink
+
+sys.path.insert(0, str(Path(__file__).parents[2] / 'demo'))
+from flight_model import (  # noqa: E402
+    ATTITUDE_RATE,
+    compare,
+    Comparison,
+    FIX_RATE,
+    Flight,
+    GEOID,
+    Image,
+    IMAGE_INTERVAL,
+    LENS,
+)
+
+UTC = 1.7e9
+
+
+class PullableLink(VirtualLink):
+    """A link that loses everything while it is pulled."""
+
+    pulled = False
+
+    def turn(self) -> None:
+        """See :class:`VirtualLink`."""
+        if not self.pulled:
+            super().turn()
+            return
+        for end in self.ends:
+            end.poll(self.now)
+            end.outgoing.clear()
+
+
+class Rig:
+    """The client of a camera, and the camera, during a flight at its real speed."""
+
+    def __init__(self, flight: Flight, settings: FeederSettings) -> None:
+        self.flight = flight
+        commands = CommandSender(Address(1, 191))
+        self.client = RedEdgeClient(commands, Settings(settings))
+        self.camera = SimulatedRedEdge(
+            Address(255, 100), interval=IMAGE_INTERVAL, own_gps=Place(0.0, 0.0, 0.0))
+        cameras = SimulatedComponents([Description(Address(255, 100), self.camera)], START)
+        self.camera.set_clock(UTC, START)
+        self.link = PullableLink(Component(commands, [self.client]), cameras, version=1)
+        self.rows: list[dict[str, str]] = []
+        self.camera.records.subscribe(
+            lambda row: self.rows.append(dict(zip(COLUMNS, row, strict=True))))
+        # Error of the altitude, m.
+        self.shift = 0.0
+
+    def stamp(self, time: float) -> Stamp:
+        return Stamp(round((UTC + time) * 1e9), 0.0)
+
+    def fix(self, time: float) -> None:
+        truth, feeder, now = self.flight.truth(time), self.client.feeder, self.link.now
+        feeder.take_velocity(truth.velocity, self.stamp(time), now)
+        if time not in self.flight.outage:
+            feeder.take_fix(Position(
+                0, truth.latitude, truth.longitude, truth.altitude + GEOID + self.shift),
+                self.stamp(time), now)
+
+    def attitude(self, time: float) -> None:
+        truth, feeder, now = self.flight.truth(time), self.client.feeder, self.link.now
+        feeder.take_attitude(
+            Input.IMU, enu_flu(truth.vehicle), UNKNOWN, self.stamp(time), now)
+        feeder.take_mount(
+            flip(truth.vehicle.inverse() * truth.camera * LENS),
+            self.stamp(time), now)
+
+    def events(self) -> Iterator[tuple[float, int]]:
+        count = int(self.flight.seconds * FIX_RATE)
+        return heapq.merge(((number / FIX_RATE, 0) for number in range(count)),
+                           ((number / ATTITUDE_RATE, 1) for number in range(
+                               int(self.flight.seconds * ATTITUDE_RATE))))
+
+    def fly(self) -> Comparison:
+        """Fly, and compare the images with the truth."""
+        for time, kind in self.events():
+            self.link.run(START + time - self.link.now)
+            if (time in self.flight.pull) is not self.link.pulled:
+                self.link.pulled = not self.link.pulled
+                for end in self.link.ends:
+                    if self.link.pulled:
+                        end.link_closed(self.link.now, 'pulled')
+                    else:
+                        end.link_opened(self.link.now)
+            (self.attitude if kind else self.fix)(time)
+            self.link.turn()
+        self.link.run(START + self.flight.seconds - self.link.now)
+        return compare((Image.read(row, UTC, 1.0) for row in self.rows), self.flight,
+                       max_delay=0.001, least_fresh=1.0)
+
+
+@pytest.mark.parametrize('source', PositionSource)
+def test_images_of_a_flight_have_the_true_position_and_attitude(source: PositionSource) -> None:
+    flight = Flight(60.0, 1.0)
+    result = Rig(flight, FeederSettings(source, GEOID, attitude_rate=ATTITUDE_RATE)).fly()
+
+    assert result.failures == []
+    assert max(abs(flight.truth(time / 10).vehicle.euler()[0]) for time in range(600)) > 0.69
+
+
+@pytest.mark.parametrize(('settings', 'shift', 'failure'), [
+    (FeederSettings(geoid_separation=0.0), 0.0, 'a position is wrong by 47.3'),
+    (FeederSettings(geoid_separation=GEOID), 0.6, 'a position is wrong by 0.'),
+    (FeederSettings(geoid_separation=GEOID, attitude_rate=2.0), 0.0, ''),
+])
+def test_comparison_finds_a_wrong_position_and_accepts_a_lower_rate(
+        settings: FeederSettings, shift: float, failure: str) -> None:
+    rig = Rig(Flight(36.0, 1.0), settings)
+    rig.shift = shift
+    assert ''.join(rig.fly().failures[:1]).startswith(failure)
+
+
+def test_comparison_finds_wrong_angles_and_old_data() -> None:
+    flight = Flight(36.0, 1.0)
+    rig = Rig(flight, FeederSettings(geoid_separation=GEOID))
+    rig.fly()
+    images = [Image.read(row, UTC, 1.0) for row in rig.rows]
+    turned = Quaternion.from_euler(0.0, 0.002, 0.0)
+
+    def failures(changed: list[Image]) -> str:
+        return '; '.join(compare(
+            changed, flight, max_delay=0.001, least_fresh=1.0).failures)
+
+    assert 'an attitude is wrong by 0.1' in failures(
+        [replace(one, camera=one.camera and one.camera * turned) for one in images])
+    assert 'data that is 6.00 s old' in failures(
+        [*images[1:], replace(images[0], position_age=6.0)])
+    assert 'instead of 72' in failures(images[5:])
+    assert 'did not fall back' in failures(
+        [replace(one, position_age=1.0) if one.position_age is None else one for one in images])
