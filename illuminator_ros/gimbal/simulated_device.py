@@ -47,7 +47,7 @@ from ..payload.simulated import (
     SimulatedType,
     Snapshot,
 )
-from ..payload.simulated_settings import integer, number, one_of, Setting, text
+from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 from ..payload.vehicle import GimbalDeviceAttitudeStatus
 
 # s without an announcement after which a manager no longer is one.
@@ -426,7 +426,7 @@ SETTINGS: dict[str, Setting] = {
 }
 
 
-def mechanics(settings: Mapping[str, Any]) -> GimbalMechanics:
+def mechanics(settings: Values) -> GimbalMechanics:
     """Return the mechanics that settings describe."""
     default = GimbalMechanics()
     given: dict[str, Any] = {
@@ -440,7 +440,7 @@ def mechanics(settings: Mapping[str, Any]) -> GimbalMechanics:
         & ~settings.get('lacks', 0))
 
 
-def properties(settings: Mapping[str, Any], address: Address) -> GimbalProperties:
+def properties(settings: Values, address: Address) -> GimbalProperties:
     """Return the gimbal that settings describe."""
     names = ('vendor', 'model', 'custom_name', 'status_interval')
     manager = settings.get('manager_id')

@@ -61,7 +61,7 @@ from ..payload.simulated import (
     SimulatedType,
     Snapshot,
 )
-from ..payload.simulated_settings import integer, number, one_of, Setting
+from ..payload.simulated_settings import integer, number, one_of, Setting, Values
 from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
@@ -491,11 +491,11 @@ SETTINGS: dict[str, Setting] = {
 }
 
 
-def _profile(settings: Mapping[str, Any]) -> Profile:
+def _profile(settings: Values) -> Profile:
     return PROFILES[settings.get('profile', 'reference')]
 
 
-def manager_properties(settings: Mapping[str, Any], address: Address) -> ManagerProperties:
+def manager_properties(settings: Values, address: Address) -> ManagerProperties:
     """Return the manager that settings describe."""
     profile, default = _profile(settings), ManagerProperties()
     described = properties(settings, address)

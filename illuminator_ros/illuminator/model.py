@@ -31,7 +31,7 @@ from typing import Any
 
 from .messages import IlluminatorStatus
 
-# Values of configuration fields by name. Any: the mode is a Mode, the others are numbers.
+# Values of configuration fields by name, untyped: the mode is a Mode, the others are numbers.
 Changes = Mapping[str, Any]
 
 ABSOLUTE_ZERO_C = -273.15
@@ -310,7 +310,7 @@ class Status:
 
     @classmethod
     def from_message(cls, message: IlluminatorStatus) -> Status:
-        """Read a message. Any content is accepted: a wrong field is marked, not raised."""
+        """Read a message. Each content is accepted: a wrong field is marked, not raised."""
         brightness, duty = message.brightness, message.strobe_duty_cycle
         limits = _limits(message.min_strobe_period, message.max_strobe_period)
         if (message.enable in (0, 1) and message.mode in _MODES and 0.0 <= brightness <= 100.0

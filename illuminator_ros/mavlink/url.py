@@ -51,7 +51,7 @@ class HostPort(NamedTuple):
         return f'[{self.host}]:{self.port}' if ':' in self.host else f'{self.host}:{self.port}'
 
 
-# Any free port of all interfaces.
+# All interfaces, with a port that the system chooses.
 ANY = HostPort('', 0)
 
 

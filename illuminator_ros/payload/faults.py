@@ -26,9 +26,9 @@ import copy
 from dataclasses import dataclass, replace
 import math
 import random
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from .simulated_settings import integer, number
+from .simulated_settings import integer, number, Values
 from ..mavlink.messages import (
     MAV_AUTOPILOT_INVALID,
     MAV_STATE_ACTIVE,
@@ -168,7 +168,7 @@ class FaultTable(dict[str, Fault]):
             raise FaultError(f'no fault {name!r}; there are {", ".join(self)}')
         return self[name]
 
-    def parse(self, text: str) -> dict[str, Any]:
+    def parse(self, text: str) -> Values:
         """
         Return the field of the behaviour that a fault sets, with its value.
 

@@ -545,7 +545,7 @@ class SimulatedComponent(Generic[D]):
 
 class SimulatedComponents(Endpoint, Generic[D]):
     """
-    Any number of simulated components on one link, of one payload or of several.
+    One or more simulated components on one link, of one payload or of several.
 
     :ivar components: in the order of their descriptions.
     :ivar new_peers: the address of each other component, with the first message from it.

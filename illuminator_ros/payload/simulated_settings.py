@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-# The values of settings by name. Any: each is what its Setting.read returns.
+# The values of settings by name, untyped: each is what its Setting.read returns.
 Values = Mapping[str, Any]
 
 

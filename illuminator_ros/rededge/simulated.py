@@ -46,7 +46,7 @@ from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import number, Setting
+from ..payload.simulated_settings import number, Setting, Values
 from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
 
 # Until the camera hears a host.
@@ -522,7 +522,7 @@ SETTINGS: Mapping[str, Setting] = {
 
 
 def _make(
-    settings: Mapping[str, Any], address: Address, several: bool = False,
+    settings: Values, address: Address, several: bool = False,
 ) -> SimulatedRedEdge:
     return SimulatedRedEdge(address, **{
         'own_gps': read_place(DEFAULT_PLACE),

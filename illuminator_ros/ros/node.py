@@ -64,7 +64,7 @@ class PayloadNode(Node):
     :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """
 
-    # Any: rclpy's own signatures are long, and differ between its versions.
+    # Untyped: rclpy's own signatures are long, and differ between its versions.
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, start_parameter_services=False, **options)
 
@@ -138,7 +138,7 @@ class CommandTopic(Generic[T]):
     name: str
     type: type[object]  # noqa: A003
     take: Callable[[T, float], None]
-    # Any: of the class that ``type`` names.
+    # Untyped: of the class that ``type`` names.
     read: Callable[[Any], T] = finite_data
 
 

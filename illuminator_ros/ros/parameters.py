@@ -218,8 +218,8 @@ def declare_link_parameters(node: Node, defaults: Values | None = None) -> LinkP
     :param defaults: replace those of :data:`LINK_PARAMETERS`.
     :raises ParameterError: if one is wrong.
     """
-    values = declare_read_only(
-        node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults)
+    values = dict(declare_read_only(
+        node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults))
     try:
         url = parse_url(values['connection_url'])
     except UrlError as error:
@@ -231,7 +231,7 @@ def declare_link_parameters(node: Node, defaults: Values | None = None) -> LinkP
 
 def declare_read_only(
     node: Node, specs: Iterable[ParameterSpec], defaults: Values | None = None,
-) -> dict[str, Any]:
+) -> Values:
     """
     Declare parameters as they are given, read-only, and return their values.
 
@@ -341,7 +341,7 @@ class DeviceParameters:
                 spec.name, spec.type, spec.descriptor(read_only=False), ignore_override=True)
         node.add_on_set_parameters_callback(self._may_set)
 
-    def overrides(self) -> dict[str, Any]:
+    def overrides(self) -> Values:
         """Return the values that the command line or a parameter file gives, unchecked."""
         given = given_parameters(self._node)
         return {name: given[name].value for name in self.specs if name in given}

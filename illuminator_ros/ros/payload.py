@@ -99,7 +99,7 @@ class RosPayload:
 
     node_name: str
     make_client: Callable[[CommandSender, Values], Payload]
-    # Any: the client is the one that make_client has returned.
+    # Untyped: the client is the one that make_client has returned.
     serve: Callable[[Any, Host], ServedPayload]
     parameters: tuple[ParameterSpec, ...] = ()
     device_parameters: tuple[ParameterSpec, ...] = ()

@@ -53,7 +53,7 @@ from ...mavlink.signing_files import KeyFileError, TimestampStore
 from ...mavlink.url import parse_url, Url, UrlError
 from ...payload.checks.coroutine import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
-from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, Result, Verdict
+from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
 from ...payload.simulated_settings import integer, number
 
@@ -78,7 +78,7 @@ exit status: 0 if all checked requirements are met, 1 if not or if no device was
 2 if an argument is wrong or this computer cannot open the link."""
 
 
-def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks[Any]]:
+def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, AnyChecks]:
     """
     Return the options, and the checks of the payload that they name.
 
@@ -89,7 +89,7 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, PayloadChecks
     payload.add_argument(
         '--payload', default=DEFAULT_PAYLOAD, help='the kind of device (default: %(default)s)',
         choices=[one.name for one in PAYLOADS.values() if one.checks])
-    checks: PayloadChecks[Any] = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
+    checks: AnyChecks = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
     parser = Parser(
         prog='conformance', formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EPILOG,
         description=f'Checks whether a {checks.device} follows its MAVLink protocols.',
@@ -157,13 +157,13 @@ class Conformance:
     """One run against one device."""
 
     def __init__(
-        self, options: argparse.Namespace, checks: PayloadChecks[Any], address: Address,
+        self, options: argparse.Namespace, checks: AnyChecks, address: Address,
         url: Url, signs: Signing, store: TimestampStore | None,
     ) -> None:
         self._options = options
         self._checks = checks
         self._payload_options = {one.name: getattr(options, one.name) for one in checks.options}
-        self._requirements: list[Requirement[Any]] = [
+        self._requirements: list[AnyRequirement] = [
             one for one in checks.requirements
             if not options.only or one.name in options.only]
         # Written by the main thread: a blocked terminal must not delay the link's thread.

@@ -55,8 +55,8 @@ EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 QUERY_INTERVAL = 0.5
 # s for an answer: longer than a bridge takes, whatever its light does.
 ANSWER_LIMIT = 8.0
-# The type of each service, and its request from the value of a request of the monitor. Any: they
-# differ in both.
+# The type of each service, and its request from the value of a request of the monitor,
+# untyped: they differ in both.
 SERVICES: dict[Service, tuple[type[Any], Callable[[Any], Any]]] = {
     Service.ENABLE: (SetBool, lambda on: SetBool.Request(data=on)),
     Service.REFRESH: (Trigger, lambda _: Trigger.Request()),

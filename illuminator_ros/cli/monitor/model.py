@@ -34,11 +34,11 @@ SILENCE = 6.0
 # s between two temperatures of a trend, and their number.
 TREND_STEP = 2.0
 TREND_SIZE = 60
-# Any node can publish topics like those of a light.
+# Every node can publish topics like those of a light.
 MAX_LIGHTS = 256
 
 
-# Values by name. Any: switches, numbers and texts.
+# Values by name, untyped: switches, numbers and texts.
 Values = dict[str, Any]
 
 

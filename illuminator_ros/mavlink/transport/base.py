@@ -24,6 +24,7 @@ import math
 import os
 import selectors
 import socket
+from typing import cast
 
 from ..url import HostPort
 
@@ -230,11 +231,11 @@ class StreamChannel(Channel):
         self.send((), ())
 
 
-# A family, and an address as sockets of that family have it.
-SocketAddress = tuple[int, tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes]]
+# An address as sockets of IPv4 and IPv6 have it.
+SocketName = tuple[str, int] | tuple[str, int, int, int]
 
 
-def resolve(address: HostPort, kind: socket.SocketKind) -> list[SocketAddress]:
+def resolve(address: HostPort, kind: socket.SocketKind) -> list[tuple[int, SocketName]]:
     """
     Return families and socket addresses; IPv4 first, since most MAVLink programs know only that.
 
@@ -247,4 +248,4 @@ def resolve(address: HostPort, kind: socket.SocketKind) -> list[SocketAddress]:
         reason = getattr(error, 'strerror', None) or 'not a host name'
         raise OSError(f'cannot resolve {address.host!r}: {reason}') from None
     found.sort(key=lambda entry: entry[0] != socket.AF_INET)
-    return [(family, sockaddr) for family, _, _, _, sockaddr in found]
+    return [(family, cast(SocketName, sockaddr)) for family, _, _, _, sockaddr in found]

@@ -22,9 +22,9 @@ import errno
 import ipaddress
 import selectors
 import socket
-from typing import Any
+from typing import cast
 
-from .base import Channel, ChannelLost, Peer, resolve
+from .base import Channel, ChannelLost, Peer, resolve, SocketName
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
@@ -121,8 +121,15 @@ class UdpChannel(Channel):
             raise lost
 
     def _heard_of(self, peer: object, datagrams: list[bytes]) -> Iterator[tuple[Peer, bytes]]:
-        if datagrams and (self._hears_all or _same_host(peer, self._remote)):
+        if datagrams and (self._hears_all or self._is_of_remote(cast(SocketName, peer)[0])):
             yield peer, b''.join(datagrams)
+
+    def _is_of_remote(self, host: str) -> bool:
+        assert self._remote is not None
+        # Each loopback address, such as 127.0.0.2, is this machine.
+        return host == self._remote[0] or all(
+            ipaddress.ip_address(one.partition('%')[0]).is_loopback
+            for one in (host, self._remote[0]))
 
     def peers(self, now: float) -> Sequence[Peer]:
         """See :meth:`Channel.peers`."""
@@ -154,10 +161,10 @@ class UdpChannel(Channel):
                     self.dropped += end - begin
             begin = end
 
-    def _sent(self, datagram: bytes, peer: Any) -> bool:
+    def _sent(self, datagram: bytes, peer: Peer) -> bool:
         """Send to one peer; return False if the datagram was dropped."""
         try:
-            self._socket.sendto(datagram, peer)
+            self._socket.sendto(datagram, cast(SocketName, peer))
         except (BlockingIOError, ConnectionError):
             return False
         except OSError as error:
@@ -184,11 +191,3 @@ def _ends(frames: Sequence[bytes]) -> Iterator[int]:
             size = 0
         size += len(frame)
     yield len(frames)
-
-
-def _same_host(peer: Any, remote: Any) -> bool:
-    if peer[0] == remote[0]:
-        return True
-    # Any loopback address, such as 127.0.0.2, is this machine.
-    return (ipaddress.ip_address(peer[0].partition('%')[0]).is_loopback
-            and ipaddress.ip_address(remote[0].partition('%')[0]).is_loopback)

@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine, Generator
 from dataclasses import dataclass
 import math
-from typing import Any
 
 
 class Interrupted(BaseException):
@@ -41,7 +40,7 @@ class _Wait:
 
 
 # A coroutine that awaits :class:`_Wait`, by way of others.
-Main = Coroutine[Any, Any, None]
+Main = Coroutine[_Wait, None, None]
 
 
 class CoroutineRunner:

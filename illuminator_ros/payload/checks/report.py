@@ -19,10 +19,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 import json
-from typing import Any
 from xml.etree import ElementTree
 
-from .requirement import Requirement, Result, Verdict
+from .requirement import AnyRequirement, Result, Verdict
 from .specification import HEARTBEAT
 from ... import __version__
 
@@ -113,7 +112,7 @@ class Table:
         return [text for one in held for text in lines(one, verbose=self._verbose)]
 
 
-def catalogue(requirements: Iterable[Requirement[Any]], kind: str) -> list[str]:
+def catalogue(requirements: Iterable[AnyRequirement], kind: str) -> list[str]:
     """Return all requirements on a kind of device, a line each."""
     notes = {(False, False): '', (True, False): f', changes the {kind}',
              (True, True): ', needs your consent'}

@@ -121,6 +121,10 @@ def requirement(
         name, title, specification, section, check, changes, **flags)
 
 
+# For the runner and the reports, which do not use the tester.
+AnyRequirement = Requirement[Any]
+
+
 @dataclass(frozen=True)
 class Result:
     """
@@ -132,7 +136,7 @@ class Result:
     :param reached: whether there was a device to check.
     """
 
-    requirement: Requirement[Any]
+    requirement: AnyRequirement
     verdict: Verdict
     detail: str = ''
     exchange: list[str] = field(default_factory=list)
@@ -190,3 +194,7 @@ class PayloadChecks(Generic[T]):
         """Return a session with a device, from our address."""
         return Session(
             address, self.messages, self.is_device, self.describe, target, self.component)
+
+
+# For the command line, which does not use the tester.
+AnyChecks = PayloadChecks[Any]
