@@ -99,6 +99,24 @@ def test_a_run_ends_with_its_verdict_and_its_reports_agree(
     assert len(suite.findall('testcase/failure')) == 1
 
 
+def test_a_camera_is_checked_in_mavlink_1_and_takes_no_image_without_consent(
+        url: str, start: Start, simulate: Start) -> None:
+    camera = simulate('--payload', 'rededge', '--fault', 'extension')
+    only = [text for name in ('ping', 'capture-feedback', 'mavlink-1', 'lengths')
+            for text in ('--only', name)]
+    arguments = (CONFORMANCE, '--payload', 'rededge', f'udpout://{url}', *only)
+    without = start(*arguments)
+    assert without.wait() == 0, without.log
+    assert '3 passed, 0 failed, 1 skipped' in without.log
+    assert camera.count('1 image ') == 0
+
+    consenting = start(*arguments, '--yes')
+    assert consenting.wait() == 1
+    assert 'CAMERA_FEEDBACK with 47 bytes' in consenting.log
+    assert 'as it was, besides its new images' in consenting.log
+    camera.wait_for('1 image ')
+
+
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_restores_the_light_and_ends_with_status_1(
         url: str, start: Start, simulate: Start, number: int) -> None:
