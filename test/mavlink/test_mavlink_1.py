@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastcrc.crc16 import mcrf4xx
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.component import Component, Payload
@@ -37,24 +36,9 @@ import pytest
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, Talker
 from support.simulated_link import SimulatedLink
+from support.strict_mavlink_1 import parse_strictly
 
 PEER = ('127.0.0.1', 14550)
-# Payload length and CRC_EXTRA by message id, from the definition of MAVLink 1's common messages.
-STRICT = {0: (9, 50), 75: (35, 158), 76: (33, 152), 77: (3, 143)}
-
-
-def parse_strictly(data: bytes) -> list[tuple[int, bytes]]:
-    """Return id and payload of MAVLink 1 frames; an error for anything else."""
-    found = []
-    while data:
-        stx, length, _, _, _, message_id = data[:6]
-        assert (stx, length) == (0xFE, STRICT[message_id][0])
-        body, checksum = data[1:6 + length], data[6 + length:8 + length]
-        assert mcrf4xx(body + bytes((STRICT[message_id][1],))) == int.from_bytes(
-            checksum, 'little')
-        found.append((message_id, data[6:6 + length]))
-        data = data[8 + length:]
-    return found
 
 
 class Talker1(Talker):

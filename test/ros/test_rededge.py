@@ -1,0 +1,288 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The node over a serial line, against a camera that is none of ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import math
+import random
+import threading
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import (
+    Quaternion,
+    QuaternionStamped,
+    Twist,
+    TwistStamped,
+    Vector3,
+)
+from illuminator_ros.mavlink.messages import Address
+import pytest
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
+from std_msgs.msg import Bool, Header, UInt32
+from std_srvs.srv import Trigger
+from support.fake_camera import FakeCamera, running_camera
+from support.frames import heartbeat_frame
+from support.processes import ended, Program, python, run
+from support.ros import Parameters, Ros, STREAM
+from support.waiting import eventually
+
+MODULE = 'illuminator_ros.rededge'
+EXACT_LENGTHS = {0: 9, 2: 12, 4: 14, 24: 30, 25: 101, 30: 28, 33: 28, 155: 13, 158: 14}
+
+
+@contextlib.contextmanager
+def running_node(ros: Ros, camera: FakeCamera, **parameters: Any) -> Iterator[Program]:
+    """Run the node; it must end as it promises."""
+    given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
+    with ended(python(MODULE, f'serial://{camera.device}:57600', '--ros-args', *given,
+                      env={'ROS_DOMAIN_ID': str(ros.domain)})) as node:
+        node.wait_for('/100 connected')
+        yield node
+
+
+class Robot:
+    """Publishes what a robot knows, each 50 ms, in a thread of its own."""
+
+    def __init__(self, ros: Ros) -> None:
+        self.clock = ros.node.get_clock()
+        self.velocity = True
+        self.mount = False
+        self.position: dict[str, Any] = {'latitude': 47.0, 'longitude': 8.0, 'altitude': 500.0}
+        self.stamp: Callable[[], Time] = lambda: self.clock.now().to_msg()
+        self._publishers = {
+            name: ros.publisher(cls, f'/rededge/{name}', '/rededge') for name, cls in (
+                ('fix', NavSatFix), ('velocity', TwistStamped), ('satellites', UInt32),
+                ('imu', Imu))}
+        self._ros = ros
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+
+    def publish(self, name: str, message: Any) -> None:
+        self._publishers[name].publish(message)
+
+    def _run(self) -> None:
+        while not self._ended.wait(0.05):
+            header = Header(stamp=self.stamp(), frame_id='base_link')
+            if self.velocity:
+                self.publish('velocity', TwistStamped(header=header, twist=Twist(
+                    linear=Vector3(x=3.0, y=-4.0, z=0.0))))
+                self.publish('satellites', UInt32(data=9))
+            self.publish('fix', NavSatFix(
+                header=header, status=NavSatStatus(status=0), **self.position))
+            # Nose to the north-west, rolled to the right.
+            self.publish('imu', Imu(header=header, orientation=Quaternion(
+                w=0.3826834, x=0.0, y=0.0, z=0.9238795)))
+            if 'mount' in self._publishers:
+                # It looks ahead and 45 degrees down.
+                self.publish('mount', QuaternionStamped(header=header, quaternion=Quaternion(
+                    w=math.cos(math.pi / 8), x=0.0, y=math.sin(math.pi / 8), z=0.0)))
+
+    def add_mount(self) -> None:
+        publisher = self._ros.publisher(QuaternionStamped, '/rededge/mount', '/rededge')
+        self._publishers = {**self._publishers, 'mount': publisher}
+
+    def __enter__(self) -> Robot:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+
+def findings(ros: Ros) -> Callable[[], str]:
+    """Return a function that returns the newest message of ``rededge: camera``."""
+    record = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+
+    def newest() -> str:
+        found = [status.message for array in record.messages for status in array.status
+                 if status.name == 'rededge: camera']
+        return found[-1] if found else ''
+
+    return newest
+
+
+def call(ros: Ros, service: str) -> Trigger.Response:
+    response: Trigger.Response = ros.call(
+        Trigger, f'/rededge/{service}', Trigger.Request(), node='/rededge')
+    return response
+
+
+def test_the_camera_gets_all_that_ros_knows_in_frames_of_mavlink_1_re_1_re_2_re_3_re_4(
+        own_ros: Ros) -> None:
+    with (running_camera() as camera,
+          running_node(own_ros, camera, send_gps_status='true', geoid_separation=48.0),
+          Robot(own_ros) as robot):
+        # Whatever it receives: noise, and MAVLink 2.
+        camera.send(random.Random(1).randbytes(500) + heartbeat_frame(Address(9, 100)))
+        position = camera.wait('GPS_RAW_INT', lambda one: one.satellites_visible == 9)
+        attitude, gps_status = camera.wait('ATTITUDE'), camera.wait('GPS_STATUS')
+        mount = camera.wait('MOUNT_STATUS')
+        assert call(own_ros, 'ping').success
+        assert call(own_ros, 'capture').success
+
+        assert (position.lat, position.lon, position.alt, position.fix_type) == (
+            470000000, 80000000, 452000, 3)
+        assert (position.vel, position.cog) == (500, 14313)
+        assert abs(position.time_usec - robot.clock.now().nanoseconds / 1e3) < 30e6
+        assert math.degrees(attitude.yaw) == pytest.approx(-45, abs=0.01)
+        assert (mount.target_component, mount.pointing_a) == (100, 0)
+        assert gps_status.satellites_visible == 9
+        assert {(one.system, one.component) for one in camera.frames} == {(1, 191)}
+        assert {one.message_id: len(one.payload) for one in camera.frames} == {
+            id_: size for id_, size in EXACT_LENGTHS.items() if id_ not in (2, 33)}
+
+
+def test_fused_position_goes_with_system_time_and_alone_re_17_re_19(own_ros: Ros) -> None:
+    with (running_camera() as camera,
+          running_node(own_ros, camera, position_source='fused'), Robot(own_ros)):
+        position = camera.wait('GLOBAL_POSITION_INT')
+        assert (position.vx, position.vy, position.hdg) == (-400, 300, 65535)
+        camera.wait('GLOBAL_POSITION_INT')
+        ids = [one.message_id for one in camera.frames if one.message_id in (2, 24, 33)]
+        assert ids[:4] == [2, 33, 2, 33]
+        assert all(len(one.payload) == EXACT_LENGTHS[one.message_id] for one in camera.frames)
+
+
+def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) -> None:
+    with (running_camera(feedback={'yaw': 90.0}) as camera,
+          running_node(own_ros, camera, geoid_separation=48.0)):
+        connected = own_ros.subscribe(Bool, '/rededge/connected')
+        fix = own_ros.subscribe(NavSatFix, '/rededge/image/fix', STREAM)
+        attitude = own_ros.subscribe(QuaternionStamped, '/rededge/image/attitude', STREAM)
+        index = own_ros.subscribe(UInt32, '/rededge/image/index', STREAM)
+        connected.wait_value(True)
+        ping, image, panel = (call(own_ros, name) for name in ('ping', 'capture', 'capture_panel'))
+
+        assert ping.message.endswith(' ms round trip')
+        assert [one.success for one in (ping, image, panel)] == [True] * 3
+        assert [one.message.partition(',')[0] for one in (image, panel)] == [
+            'image 1 taken', 'image 2 taken']
+        assert [one.shot for one in camera.messages('DIGICAM_CONTROL')] == [1, 2]
+        index.wait_value(2)
+        eventually(lambda: len(fix.messages) == len(attitude.messages) == 2)
+        [found, _] = fix.messages
+        assert (found.latitude, found.longitude, found.altitude) == (47.0, 8.0, 500.0)
+        [turned, _] = (one.quaternion for one in attitude.messages)
+        # It looks down, and the top of the image is to the east.
+        assert attitude.messages[0].header.frame_id == 'map'
+        assert [abs(round(value, 3)) for value in (turned.w, turned.x, turned.y, turned.z)] == [
+            0.707, 0.0, 0.707, 0.0]
+
+        camera.answers = False
+        silent = [call(own_ros, name) for name in ('ping', 'capture')]
+        assert [(one.success, one.message) for one in silent] == [
+            (False, 'no reply to 2 PINGs'), (False, 'no answer to DIGICAM_CONTROL within 5.00 s')]
+
+
+def test_fixed_mount_is_set_at_run_time_and_gives_way_to_the_topic_re_23_re_27(
+        own_ros: Ros) -> None:
+    with running_camera() as camera, running_node(own_ros, camera, mount_roll=5):
+        parameters = Parameters(own_ros, '/rededge')
+        camera.wait('MOUNT_STATUS', lambda one: one.pointing_b == 500)
+        [accepted, refused] = parameters.set(mount_pitch=12.5, mount_yaw=181.0)
+        assert (accepted.successful, refused.successful) == (True, False)
+        assert 'mount_yaw: 181.0 degrees is out of range' in refused.reason
+        camera.wait('MOUNT_STATUS', lambda one: one.pointing_a == 1250)
+        assert parameters.get('mount_roll', 'mount_pitch', 'mount_yaw') == [5.0, 12.5, 0.0]
+
+        with Robot(own_ros) as robot:
+            robot.add_mount()
+            camera.wait('MOUNT_STATUS', lambda one: (
+                one.pointing_a, one.pointing_b, one.pointing_c) == (4500, 0, 0))
+            [refused] = parameters.set(mount_pitch=1.0)
+            assert refused.reason == 'the mount is not fixed: ~/mount has a publisher'
+        camera.frames.clear()
+        call(own_ros, 'ping')
+        # Neither a fixed mount nor an attitude without its mount.
+        assert {one.message_id for one in camera.frames} <= {0, 4, 24}
+
+
+def test_simulated_time_is_no_utc_until_a_reference_tells_it_re_14(own_ros: Ros) -> None:
+    with (running_camera() as camera,
+          running_node(own_ros, camera, use_sim_time='true', geoid_separation=0)):
+        clock = own_ros.publisher(Clock, '/clock', '/rededge')
+        reference = own_ros.publisher(TimeReference, '/rededge/time_reference', '/rededge')
+        newest, seconds = findings(own_ros), iter(range(100, 10_000))
+        now = Time(sec=next(seconds))
+
+        def stamp() -> Time:
+            nonlocal now
+            now = Time(sec=now.sec, nanosec=now.nanosec + 50_000_000) if (
+                now.nanosec < 950_000_000) else Time(sec=next(seconds))
+            clock.publish(Clock(clock=now))
+            return now
+
+        with Robot(own_ros) as robot:
+            robot.stamp = stamp
+            camera.wait('ATTITUDE')
+            eventually(lambda: 'ROS time is simulated (use_sim_time), which is not UTC'
+                       in newest())
+            assert not camera.messages('GPS_RAW_INT')
+            eventually(lambda: reference.publish(TimeReference(
+                header=Header(stamp=now), time_ref=Time(sec=now.sec + 1_700_000_000)))
+                or camera.messages('GPS_RAW_INT'))
+        assert camera.messages('GPS_RAW_INT')[0].time_usec // 1_000_000 - 1_700_000_000 < 10_000
+
+
+def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: Ros) -> None:
+    with running_camera() as camera, running_node(own_ros, camera) as node:
+        newest = findings(own_ros)
+        eventually(lambda: newest() == (
+            'nothing received on ~/fix; nothing received on ~/imu or ~/attitude; '
+            'geoid_separation is not set, so altitudes are those above the ellipsoid'))
+        with Robot(own_ros) as robot:
+            eventually(lambda: newest().startswith('geoid_separation is not set'))
+            robot.position['latitude'] = math.nan
+            eventually(lambda: 'latitude of ~/fix: nan deg is outside -90 to 90 deg' in newest())
+            node.wait_for('~/fix: latitude of ~/fix: nan deg is outside -90 to 90 deg')
+        eventually(lambda: '~/imu: nothing for' in newest())
+        camera.answers = False
+        eventually(lambda: 'PINGs without a reply: the camera does not hear us' in newest())
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    ('udpin:nowhere', "connection URL 'udpin:nowhere'"),
+    ('-p mavlink_version:=2', 'parameter mavlink_version: 2, but rededge needs 1'),
+    ('-p payloads:=[rededge,illuminator]',
+     'parameter mavlink_version: 1, but rededge needs 1, illuminator needs 2'),
+    ('-p component_id:=100', 'parameter component_id: 100 is that of the camera'),
+    ('-p mount_pitch:=200', 'mount_pitch: 200.0 degrees is out of range: -180 to 180 degrees'),
+    ('-p mount_frame:=lens', "mount_frame: 'lens' is not one of camera, optical"),
+    ('-p signing_mode:=sign', 'parameter signing_key_file: no key file is given')])
+def test_a_wrong_start_is_refused_in_one_line(ros: Ros, arguments: str, text: str) -> None:
+    given = arguments.split()
+    outcome = run(MODULE, *(['--ros-args'] if given[0] == '-p' else []), *given,
+                  env={'ROS_DOMAIN_ID': str(ros.domain)})
+    [line] = [line for line in outcome.stderr.splitlines() if not line.startswith('[')]
+    assert line.startswith('rededge: ')
+    assert text in line
+    assert outcome.returncode == 2
+
+
+def test_help_names_the_device_and_its_own_defaults() -> None:
+    shown = ' '.join(run(MODULE, '--help').stdout.split())
+    assert 'usage: rededge ' in shown
+    assert 'Makes a MicaSense camera (RedEdge, RedEdge-MX, RedEdge-P, Altum) a ROS 2 node' in shown
+    for text in ('connection_url udpin://127.0.0.1:14592', 'mavlink_version 1 ',
+                 'component_id 191 ', 'mount_yaw yaw of a fixed camera'):
+        assert text in shown
