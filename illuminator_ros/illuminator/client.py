@@ -24,6 +24,7 @@ from .events import AnyLightEvent, LightForgotten, LightFound
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
+from .mount_directions import MountDirections
 from ..mavlink.command import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, MavType, Message
@@ -47,20 +48,30 @@ class IlluminatorClient(Payload):
 
     :param commands: the command sender of the component that carries this payload.
     :param wanted: tells whether a light at an address is of interest; others are ignored.
+    :param needs_mounts: whether the messages for :attr:`mounts` are received.
     :ivar events: the events of all lights.
+    :ivar mounts: the directions of gimbals.
+    :ivar mount_moved: tells the system id of a mount that has sent its attitude.
     """
-
-    messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic)
 
     def __init__(
         self, commands: CommandSender, settings: Settings, *,
-        wanted: Callable[[Address], bool] = lambda address: True,
+        wanted: Callable[[Address], bool] = lambda address: True, needs_mounts: bool = False,
     ) -> None:
+        self.mounts = MountDirections()
+        self.mount_moved: Listeners[int] = Listeners()
         self.commands = commands
         self.settings = settings
         self.events: Listeners[AnyLightEvent] = Listeners()
         self._discovery = Discovery(
             self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
+        self._messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic,
+                          *(self.mounts.messages if needs_mounts else ()))
+
+    @property
+    def messages(self) -> Sequence[type[Message]]:
+        """See :attr:`Payload.messages`."""
+        return self._messages
 
     @property
     def lights(self) -> Mapping[Address, Light]:
@@ -125,6 +136,9 @@ class IlluminatorClient(Payload):
         elif isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR:
             if light := self._discovery.hear(source, now, proved=False):
                 light.heard(now)
+        elif isinstance(message, self.mounts.messages):
+            if self.mounts.take(source, message, now):
+                self.mount_moved.emit(source.system)
         elif light := self._discovery.get(source):
             self._discovery.changed(source)
             if isinstance(message, Heartbeat):

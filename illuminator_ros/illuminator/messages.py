@@ -21,10 +21,18 @@ from dataclasses import dataclass
 from ..mavlink.messages import define, Float, Message, UInt8, UInt32  # noqa: I101
 
 
-@define(440, 'ILLUMINATOR_STATUS')
+@define(440, 'ILLUMINATOR_STATUS', extensions=3)
 @dataclass(slots=True)
 class IlluminatorStatus(Message):
-    """https://mavlink.io/en/messages/common.html#ILLUMINATOR_STATUS."""
+    """
+    https://mavlink.io/en/messages/common.html#ILLUMINATOR_STATUS.
+
+    The last three fields are extensions of a vendor, 0 where a light does not have them.
+
+    :ivar zoom_level: %.
+    :ivar color_mode: 0 white, 1 red, 2 blue, 255 not applicable.
+    :ivar gimbal_device_id: of the gimbal that the light is on, 0 for none.
+    """
 
     uptime_ms: UInt32
     enable: UInt8
@@ -37,6 +45,9 @@ class IlluminatorStatus(Message):
     temp_c: Float
     min_strobe_period: Float
     max_strobe_period: Float
+    zoom_level: UInt8 = 0
+    color_mode: UInt8 = 0
+    gimbal_device_id: UInt8 = 0
 
 
 STATUS_ID = IlluminatorStatus.id

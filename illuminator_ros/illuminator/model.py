@@ -294,6 +294,7 @@ class Status:
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.
     :param temperature: degC, as sent: 0 may mean "not measured".
+    :param gimbal_device_id: of the gimbal that it is on, 0 if it tells none.
     """
 
     uptime_ms: int
@@ -307,6 +308,7 @@ class Status:
     temperature: float | None
     limits: Limits
     invalid: tuple[str, ...] = ()
+    gimbal_device_id: int = 0
 
     @classmethod
     def from_message(cls, message: IlluminatorStatus) -> Status:
@@ -319,7 +321,7 @@ class Status:
             return cls(
                 message.uptime_ms, message.enable == 1, _MODES[message.mode],
                 message.mode_bitmask, message.error_status, brightness, message.strobe_period,
-                duty, message.temp_c, limits)
+                duty, message.temp_c, limits, (), message.gimbal_device_id)
         invalid: list[str] = []
 
         def number(name: str, low: float, high: float) -> float | None:
@@ -342,7 +344,7 @@ class Status:
             number('brightness', 0, 100), number('strobe_period', 0, MAX_STROBE_PERIOD),
             number('strobe_duty_cycle', 0, 100),
             number('temp_c', ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C),
-            limits, tuple(invalid))
+            limits, tuple(invalid), message.gimbal_device_id)
 
     @property
     def complete(self) -> bool:

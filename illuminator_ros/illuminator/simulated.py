@@ -21,7 +21,7 @@ https://mavlink.io/en/services/illuminator.html
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import partial
 import math
 
@@ -47,12 +47,10 @@ from .thermal import ThermalModel, ThermalProperties
 from ..mavlink.messages import (
     Address,
     ComponentInformationBasic,
-    define,
     INFORMATION_ID,
     MavCmd,
     MavResult,
     Message,
-    UInt8,
 )
 from ..payload.faults import Behaviour
 from ..payload.identity import Identity
@@ -77,22 +75,6 @@ DEFAULT_DUTY_CYCLE = 50.0
 
 _number = number(-math.inf, math.inf)
 _celsius = number(-273.15, 1000.0)
-
-
-@define(STATUS_ID, 'ILLUMINATOR_STATUS', extensions=3)
-@dataclass(slots=True)
-class ExtendedIlluminatorStatus(IlluminatorStatus):
-    """
-    A vendor's ILLUMINATOR_STATUS of 38 bytes, to be sent; receivers ignore the last three.
-
-    :ivar zoom_level: %.
-    :ivar color_mode: 0 white, 1 red, 2 blue, 255 not applicable.
-    :ivar gimbal_device_id: component id or gimbal number, 0 for none.
-    """
-
-    zoom_level: UInt8
-    color_mode: UInt8
-    gimbal_device_id: UInt8
 
 
 def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Change:
@@ -188,9 +170,7 @@ class SimulatedIlluminator(SimulatedDevice):
             configuration.strobe_period, configuration.strobe_duty_cycle,
             self.thermal.reading if behaviour.measures else 0.0,
             limits.min_strobe_period, limits.max_strobe_period)
-        if behaviour.extension is not None:
-            return ExtendedIlluminatorStatus(*fields, *behaviour.extension)
-        return IlluminatorStatus(*fields)
+        return IlluminatorStatus(*fields, *(behaviour.extension or ()))
 
     def _information(self, now: float) -> ComponentInformationBasic:
         behaviour, identity = self.behaviour, self.properties.identity

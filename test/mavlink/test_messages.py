@@ -61,7 +61,7 @@ def test_status_and_information_lie_on_the_wire_as_specified() -> None:
     assert (STATUS.id, STATUS.crc_extra, INFORMATION.id, INFORMATION.crc_extra) == (
         440, 66, 396, 50)
     assert encode_payload(STATUS) == struct.pack(
-        '<IIffffffBBB', 123456, 5, 62.5, 0.25, 40.0, 71.5, 0.0625, 10.0, 1, 3, 2)
+        '<IIffffffBBBBBB', 123456, 5, 62.5, 0.25, 40.0, 71.5, 0.0625, 10.0, 1, 3, 2, 25, 1, 154)
     assert encode_payload(INFORMATION) == struct.pack(
         '<QII32s32s24s24s32s', 1 << 40, 5000, 1_600_000_000, b'Maker', b'Torch', b'1.2.3',
         b'B', b'SN-7')

@@ -15,10 +15,14 @@
 """``~/beam``: the marker that RViz and Foxglove draw."""
 
 from collections.abc import Iterator
+import math
 from pathlib import Path
 
+from illuminator_ros.payload.mount import to_mavlink, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from support.gimbals import FakeManager, served_gimbals
 from support.light import Address, ServedLight
 from support.ports import free_port
 from support.processes import Program
@@ -109,3 +113,24 @@ def test_beam_is_off_by_default_and_its_messages_are_not_imported(
         assert own_ros.node.count_publishers('/illuminator/beam') == 0
         loaded = Path(f'/proc/{bridge.pid}/maps').read_text()
         assert ('std_msgs' in loaded, 'visualization_msgs' in loaded) == (True, False)
+
+
+@pytest.mark.parametrize(('parameter', 'reported'), [(154, 0), (0, 154)])
+def test_beam_of_a_light_on_a_gimbal_points_where_the_gimbal_points(
+    own_ros: Ros, port: int, parameter: int, reported: int,
+) -> None:
+    down_left = Quaternion.from_euler(0.0, math.radians(45), math.radians(30))
+    gimbal = FakeManager(q=to_mavlink(down_left, YawFrame.VEHICLE))
+    with (running_bridge(own_ros.domain, port, beam_range=20.0, frame_id='base_link',
+                         mounted_on=parameter),
+          ServedLight(port, enable=1, gimbal_device_id=reported) as light):
+        beam = own_ros.subscribe(Marker, '/illuminator/beam')
+        with served_gimbals(port, gimbal):
+            def points_there(marker: Marker) -> bool:
+                q = marker.pose.orientation
+                return shown(marker) and Quaternion(q.w, q.x, q.y, q.z).angle_to(down_left) < 1e-3
+
+            assert beam.wait(points_there).header.frame_id == 'base_link'
+        light.report(enable=1)
+        beam.clear()
+        pass_time_until(lambda: any(map(gone, beam.messages)))

@@ -32,7 +32,7 @@ from illuminator_ros.mavlink.messages import (
 STATUS = IlluminatorStatus(
     uptime_ms=123456, enable=1, mode_bitmask=3, error_status=5, mode=2, brightness=62.5,
     strobe_period=0.25, strobe_duty_cycle=40.0, temp_c=71.5, min_strobe_period=0.0625,
-    max_strobe_period=10.0)
+    max_strobe_period=10.0, zoom_level=25, color_mode=1, gimbal_device_id=154)
 INFORMATION = ComponentInformationBasic(
     time_boot_ms=5000, capabilities=1 << 40, time_manufacture_s=1_600_000_000,
     vendor_name=b'Maker', model_name=b'Torch', software_version=b'1.2.3',

@@ -51,7 +51,8 @@ DEFINITIONS = {
     440: ('ILLUMINATOR_STATUS', 'uint32_t uptime_ms, uint8_t enable, uint8_t mode_bitmask, '
           'uint32_t error_status, uint8_t mode, float brightness, float strobe_period, '
           'float strobe_duty_cycle, float temp_c, float min_strobe_period, '
-          'float max_strobe_period'),
+          'float max_strobe_period, |, uint8_t zoom_level, uint8_t color_mode, '
+          'uint8_t gimbal_device_id'),
 }
 LIGHT = Address(1, 243)
 

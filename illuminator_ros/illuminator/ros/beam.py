@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 import math
 import time
@@ -26,6 +27,7 @@ from rclpy.node import Node
 from .parameters import BeamGeometry
 from ..events import AnyLightEvent, LightLost, StatusReceived
 from ..model import Mode, Status
+from ...payload.rotation import Quaternion
 from ...ros.node import STATE_QOS
 
 Point = tuple[float, float, float]
@@ -41,6 +43,8 @@ RED = (1.0, 0.0, 0.0)
 # of a killed bridge disappears.
 REFRESH = 1.0
 LIFETIME = 5
+# s between publications of a beam that a gimbal turns.
+TURN_INTERVAL = 0.1
 # For which a bridge that ends waits until its beam was removed.
 REMOVAL_TIMEOUT = Duration(seconds=0.05)
 
@@ -102,9 +106,17 @@ class Beam:
 
 
 class BeamPublisher:
-    """Publishes the beam of one light; for the link's thread."""
+    """
+    Publishes the beam of one light; for the link's thread.
 
-    def __init__(self, node: Node, geometry: BeamGeometry) -> None:
+    :param direction: returns the rotation of a gimbal, given its gimbal device id, relative to
+        the vehicle; None if it is not known.
+    """
+
+    def __init__(
+        self, node: Node, geometry: BeamGeometry,
+        direction: Callable[[int], Quaternion | None] = lambda device_id: None,
+    ) -> None:
         # Imported only where the beam is shown.
         from geometry_msgs.msg import Point as PointMessage
         from visualization_msgs.msg import Marker
@@ -112,11 +124,15 @@ class BeamPublisher:
         self._publisher = node.create_publisher(Marker, '~/beam', STATE_QOS)
         self._beam = Beam()
         self._due = math.inf
+        self._mounted_on = self._device_id = geometry.mounted_on
+        self._direction = direction
+        # As it was published last, and when, s.
+        self._rotation: Quaternion | None = Quaternion()
+        self._published_at = -math.inf
         self._marker = marker = Marker(
             ns=node.get_name(), type=Marker.TRIANGLE_LIST, frame_locked=True)
         # Without a stamp, and locked to its frame, it is drawn where the light is now.
         marker.header.frame_id = geometry.frame_id
-        marker.pose.orientation.w = 1.0
         marker.scale.x = marker.scale.y = marker.scale.z = 1.0
         marker.lifetime.sec = LIFETIME
         marker.points = [PointMessage(x=x, y=y, z=z)
@@ -125,14 +141,26 @@ class BeamPublisher:
     def take(self, event: AnyLightEvent) -> None:
         """Take an event of the light."""
         if isinstance(event, StatusReceived):
+            self._device_id = self._mounted_on or event.status.gimbal_device_id
             self._show(self._beam.updated(event.status))
         elif isinstance(event, LightLost):
             self._show(replace(self._beam, on=False))
 
     def poll(self) -> None:
-        """Publish a beam again that has not changed."""
+        """Publish a beam again that has not changed, or that a gimbal has turned."""
         if time.monotonic() >= self._due:
             self._publish()
+        else:
+            self.turn()
+
+    def turn(self) -> None:
+        """Publish the beam if it is visible and its direction has changed."""
+        if (self._beam.alpha and time.monotonic() >= self._published_at + TURN_INTERVAL
+                and self._current_rotation() != self._rotation):
+            self._publish()
+
+    def _current_rotation(self) -> Quaternion | None:
+        return self._direction(self._device_id) if self._device_id else Quaternion()
 
     def close(self) -> None:
         """Remove the beam, after the link's thread has ended."""
@@ -147,10 +175,17 @@ class BeamPublisher:
             self._publish()
 
     def _publish(self) -> None:
-        marker, alpha = self._marker, self._beam.alpha
+        self._rotation = rotation = self._current_rotation()
+        # A beam in a wrong direction is worse than none.
+        marker, alpha = self._marker, self._beam.alpha if rotation else 0.0
+        self._published_at = time.monotonic()
         # In real time, as viewers count it.
-        self._due = time.monotonic() + REFRESH if alpha else math.inf
+        self._due = self._published_at + REFRESH if alpha else math.inf
         marker.action = marker.ADD if alpha else marker.DELETE
         marker.color.r, marker.color.g, marker.color.b = RED if self._beam.error else WARM_WHITE
         marker.color.a = alpha
+        if rotation is not None:
+            orientation = marker.pose.orientation
+            orientation.x, orientation.y = rotation.x, rotation.y
+            orientation.z, orientation.w = rotation.z, rotation.w
         self._publisher.publish(marker)

@@ -35,6 +35,7 @@ from ..model import checked, InvalidValue, SafetyLimits
 from ..sources import DEFAULT
 from ...mavlink.messages import Address
 from ...payload.request import Result
+from ...payload.rotation import Quaternion
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.node import (
@@ -103,7 +104,8 @@ class LightNode:
         self._publishers = EventPublisher(
             node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
             check_diagnostics=host.check_diagnostics)
-        self._beam = BeamPublisher(node, geometry) if geometry.beam_range else None
+        self._beam = (BeamPublisher(node, geometry, self._direction)
+                      if geometry.beam_range else None)
         self.source = DiagnosticsSource(self.name, self.full_name, self._look)
 
     def bind(self, address: Address, now: float) -> None:
@@ -128,6 +130,15 @@ class LightNode:
         self._publishers.take(event)
         if self._beam is not None:
             self._beam.take(event)
+
+    def turn(self) -> None:
+        """Note that a gimbal of the vehicle has sent its attitude."""
+        if self._beam is not None:
+            self._beam.turn()
+
+    def _direction(self, device_id: int) -> Quaternion | None:
+        return self.address and self._client.mounts.direction(
+            self.address.system, device_id, self._host.link.clock())
 
     def poll(self) -> None:
         """Do what is due."""

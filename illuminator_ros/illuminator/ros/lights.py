@@ -70,6 +70,12 @@ class Lights(ServedPayload):
         self._names_due = math.inf
         host.diagnostics.add(self._first.source)
         client.events.subscribe(self._take)
+        client.mount_moved.subscribe(self._turn)
+
+    def _turn(self, system: int) -> None:
+        for address, node in self._nodes.items():
+            if address.system == system:
+                node.turn()
 
     def _take(self, event: events.AnyLightEvent) -> None:
         node = self._nodes.get(event.address)
@@ -204,7 +210,9 @@ class Lights(ServedPayload):
 
 def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:
     selection = parameters.Selection(values, 'illuminator')
-    return IlluminatorClient(commands, parameters.settings(values), wanted=selection.is_served)
+    return IlluminatorClient(
+        commands, parameters.settings(values), wanted=selection.is_served,
+        needs_mounts=bool(values['beam_range'] or values['mounted_on']))
 
 
 ILLUMINATOR = RosPayload(

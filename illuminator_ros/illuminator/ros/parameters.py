@@ -52,6 +52,9 @@ LIGHT_PARAMETERS = (
                   10_000.0),
     ParameterSpec('beam_angle', 0.5, 'full opening angle of the cone on ~/beam', 'rad', 0.01,
                   3.0),
+    ParameterSpec('mounted_on', 0,
+                  'gimbal device id of the gimbal that the light is on; 0 = as the light reports',
+                  low=0, high=255),
     ParameterSpec('off_on_shutdown', False, 'switch the lights off when the node ends'),
     ParameterSpec('restore_configuration', True,
                   'configure a light that has restarted as it was before'),
@@ -82,7 +85,7 @@ DEVICE_PARAMETERS = (
                   0.0, 100.0),
 )
 # Those that each node may have for itself.
-_GEOMETRY = ('frame_id', 'beam_range', 'beam_angle')
+_GEOMETRY = ('frame_id', 'beam_range', 'beam_angle', 'mounted_on')
 
 
 @dataclass(frozen=True)
@@ -92,11 +95,13 @@ class BeamGeometry:
 
     :param beam_range: the length of the beam, m; 0 for none.
     :param beam_angle: the full opening angle of the beam, rad.
+    :param mounted_on: gimbal device id of the gimbal that turns it, 0 for what the light reports.
     """
 
     frame_id: str
     beam_range: float
     beam_angle: float
+    mounted_on: int
 
     @classmethod
     def of(cls, values: Values) -> BeamGeometry:

@@ -1,0 +1,72 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The direction of the mounts that lights are on, relative to the body of their vehicle."""
+
+from __future__ import annotations
+
+from ..mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message
+from ..payload.mount import MountAttitude, YawFrame
+from ..payload.rotation import flip, Quaternion
+from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus
+
+# s for which an attitude counts.
+ATTITUDE_LIFETIME = 2.0
+# Mounts, and vehicles; more are ignored.
+MAX_MOUNTS = 32
+
+
+class MountDirections:
+    """The last attitudes of mounts and vehicles on a link; times are s."""
+
+    messages: tuple[type[Message], ...] = (GimbalDeviceAttitudeStatus, Attitude)
+
+    def __init__(self) -> None:
+        # By system and gimbal device id.
+        self._mounts: dict[tuple[int, int], tuple[MountAttitude | None, float]] = {}
+        self._vehicles: dict[int, tuple[Attitude, float]] = {}
+
+    def take(self, source: Address, message: Message, now: float) -> bool:
+        """Take a message of one of :attr:`messages`; return whether a mount has sent it."""
+        if isinstance(message, GimbalDeviceAttitudeStatus):
+            key = source.system, message.gimbal_device_id or source.component
+            if key in self._mounts or len(self._mounts) < MAX_MOUNTS:
+                try:
+                    self._mounts[key] = MountAttitude.from_status(message), now
+                except ValueError:
+                    self._mounts[key] = None, now
+                return True
+        elif (isinstance(message, Attitude) and source.component == MAV_COMP_ID_AUTOPILOT1
+                and (source.system in self._vehicles or len(self._vehicles) < MAX_MOUNTS)):
+            self._vehicles[source.system] = message, now
+        return False
+
+    def direction(self, system: int, device_id: int, now: float) -> Quaternion | None:
+        """
+        Return the rotation from the FLU axes of a mount to those of its vehicle's body.
+
+        A vehicle that sends no ATTITUDE counts as level.
+
+        :param device_id: gimbal device id of the mount.
+        :return: None if it is not known.
+        """
+        attitude, at = self._mounts.get((system, device_id), (None, now))
+        if attitude is None or now >= at + ATTITUDE_LIFETIME:
+            return None
+        vehicle, at = self._vehicles.get(system, (None, now))
+        if vehicle is None or now >= at + ATTITUDE_LIFETIME:
+            return attitude.seen_from(YawFrame.VEHICLE)
+        level = attitude.seen_from(YawFrame.VEHICLE, vehicle.yaw)
+        tilt = flip(Quaternion.from_euler(vehicle.roll, vehicle.pitch, 0.0))
+        return None if level is None else tilt.inverse() * level
