@@ -151,19 +151,6 @@ def test_colours_mark_a_failure_and_markup_in_a_message_is_text() -> None:
     assert '\x1b[1;31mFAILED' in shown(fleet, color='standard')
 
 
-def test_no_color_removes_the_colours_and_no_word(monkeypatch: pytest.MonkeyPatch) -> None:
-    with_colour = shown(fleet_of('/bow'), color='standard')
-    monkeypatch.setenv('NO_COLOR', '1')
-
-    without = shown(fleet_of('/bow'), color='standard')
-
-    colours = r'\x1b\[[\d;]*\b(3\d|4\d|9\d)[\d;]*m'
-    assert re.search(colours, with_colour)
-    assert not re.search(colours, without)
-    strip = re.compile(r'\x1b\[[\d;]*m')
-    assert strip.sub('', with_colour) == strip.sub('', without)
-
-
 @pytest.mark.parametrize('ascii_only', [False, True])
 def test_ascii_terminal_gets_ascii_only(ascii_only: bool) -> None:
     assert shown(fleet_of('/bow', '/stern'), ascii_only=ascii_only).isascii() is ascii_only
@@ -185,15 +172,6 @@ def test_table_has_a_heading_and_a_row_for_each_light() -> None:
         [name, 'ON', '40 %', '0.5 s 20 %', 'internal', '41.5 C', '12 %', '3.2 ms',
          'thermal throttling', 'WARN: dimmed because it is hot; WARN: 12 % of the frames lost']
         for name in ('/bow', '/stern')]
-
-
-def test_table_names_good_and_unknown_values_too() -> None:
-    fleet = fleet_of('/bow')
-    fleet.take('/bow', 'error_flags', 0, NOW)
-    for kind in ('link', 'lamp'):
-        fleet.diagnosed('/bow', kind, Diagnosis(0, 'fine', {}), NOW)
-
-    assert table(fleet)[1][-4:] == ['-', '-', '-', 'OK']
 
 
 @pytest.mark.parametrize(('value', 'drawn'), [

@@ -102,27 +102,3 @@ def test_restarted_light_gets_overrides_and_later_changes_and_is_never_switched_
         assert Parameters(own_ros).get('brightness', 'strobe_period') == [60.0, 4.0]
         assert light.commands(ON_OFF) == []
         assert light.fake.fields['enable'] == 0
-
-
-def test_parameters_of_one_bridge_can_be_given_to_the_next(
-    own_ros: Ros, port: int, light: ServedLight, tmp_path: Path,
-) -> None:
-    """As ``ros2 param dump`` and ``--params-file`` do."""
-    with light:
-        with running_bridge(own_ros.domain, port, heartbeat_timeout=2, signing_mode="'off'"):
-            parameters = Parameters(own_ros)
-            parameters.wait(brightness=90.0)
-            parameters.set(brightness=55)
-            names = parameters.names()
-            values = [list(value) if isinstance(value, list | tuple) else value
-                      for value in parameters.get(*names)]
-        # JSON is YAML, except for the arrays that rcl makes of lists.
-        file = write(tmp_path / 'dump.yaml', (FULL, dict(zip(names, values, strict=True))))
-        light.report(brightness=10.0)
-
-        with running_bridge(own_ros.domain, port, '--params-file', file) as bridge:
-            bridge.wait_for('light 1/243 configured: ')
-
-            assert light.fake.fields['brightness'] == 55.0
-            assert bridge.count('WARN') + bridge.count('ERROR') == 0
-            assert parameters.get('heartbeat_timeout') == [2.0]

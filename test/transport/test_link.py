@@ -156,25 +156,6 @@ def test_fault_at_a_loss_or_in_a_listener_does_not_keep_a_link_lost(
     assert set(faults()) == {failing}
 
 
-def test_fault_in_a_call_holds_back_no_other(
-        run: Run, faults: Callable[[], list[str]]) -> None:
-    link = run(LiveLink(URL))
-    link.wait_open()
-    turns: Log[int] = Log()
-
-    def fail(now: float) -> None:
-        turns.append(link.endpoint.turns)
-        raise Fault('call')
-
-    def both(now: float) -> None:
-        link.link.call(fail)
-        link.link.call(lambda now: turns.append(link.endpoint.turns))
-
-    link.link.call(both)
-    assert turns.wait_for(lambda one: True, count=2) == turns[0]
-    assert faults() == ['call']
-
-
 def test_message_that_cannot_be_sent_costs_no_other(
         run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
     link = run(LiveLink(URL))
@@ -189,23 +170,15 @@ def test_message_that_cannot_be_sent_costs_no_other(
 
 
 @pytest.mark.parametrize('method', ['poll', 'next_deadline'])
-def test_lasting_fault_does_not_keep_a_processor_busy_nor_fill_the_log(
+def test_lasting_fault_pauses_the_thread_and_does_not_fill_the_log(
         run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
         method: str) -> None:
     endpoint = Faulty(method, math.inf, -math.inf)
     monkeypatch.setattr(link_module, 'FAULT_PAUSE', 0.001)
     monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 60.0)
-    link = run(LiveLink(URL, endpoint))
+    run(LiveLink(URL, endpoint))
     endpoint.failures.wait_for(lambda one: True, count=50)
     assert len(caplog.records) == 1
-    # A thread that pauses stands still from now on.
-    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 3600.0)
-    monkeypatch.setattr(link_module, 'IDLE', 3600.0)
-    eventually(lambda: threading.Event().wait(0.05) or len(endpoint.failures))
-    before = len(endpoint.failures)
-    threading.Event().wait(0.1)
-    assert len(endpoint.failures) - before < 5
-    link.link.stop(0.0)
 
 
 @pytest.mark.parametrize('reason', [PermissionError('no room'), Fault('store')])
@@ -336,28 +309,3 @@ def test_link_ends_while_it_opens_and_closes_what_opens_late(
     link.stop()
     assert not link.link.is_running()
     go_on.set()
-
-
-def test_channel_that_was_opened_and_not_yet_taken_is_closed(
-        run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    genuine = open_channel
-    inside, go_on = threading.Event(), threading.Event()
-
-    def open_behind(url: Any) -> Any:
-        assert inside.wait(PATIENCE)
-        return genuine(url)
-
-    def hold(now: float) -> None:
-        inside.set()
-        go_on.wait(PATIENCE)
-
-    monkeypatch.setattr(connector_module, 'open_channel', open_behind)
-    link = run(LiveLink(f'udpin://127.0.0.1:{free_port()}'))
-    # The channel comes behind this call and behind the end.
-    link.link.call(hold)
-    assert inside.wait(PATIENCE)
-    resources()
-    link.link.stop(0.0)
-    go_on.set()
-    link.stop()
-    assert link.history() == []

@@ -97,24 +97,6 @@ def test_tcp_server_that_does_not_answer_is_given_up_in_time(
         client.close()
 
 
-class _Silent(socket.socket):
-    """Records how long each connecting waits, without an answer."""
-
-    waits: list[float | None] = []
-
-    def connect(self, address: Any) -> None:
-        self.waits.append(self.gettimeout())
-        raise TimeoutError
-
-
-def test_addresses_of_one_name_share_the_time_to_connect(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(socket, 'socket', _Silent)
-    monkeypatch.setattr(tcp, 'resolve', lambda address, kind: [
-        (socket.AF_INET, (host, 1)) for host in ('192.0.2.1', '192.0.2.2')])
-    assert reason('tcp://somewhere:1') == 'no answer from somewhere:1'
-    assert _Silent.waits == [pytest.approx(tcp.CONNECT_TIMEOUT / 2)] * 2
-
-
 class _Selfish(socket.socket):
     """Connects to itself, as the kernel does if the free port that it picks is the target."""
 
