@@ -16,7 +16,6 @@
 
 from collections.abc import Callable, Iterator
 import json
-import os
 from pathlib import Path
 import re
 import signal
@@ -27,7 +26,7 @@ from xml.etree import ElementTree
 import pytest
 from support.ports import free_port
 from support.processes import environment, Program, ROOT, run
-from support.terminals import conversation, on_terminal
+from support.terminals import Terminal
 from support.waiting import eventually, PATIENCE
 
 Start = Callable[..., Program]
@@ -159,11 +158,11 @@ def test_a_signal_before_a_light_is_found_speaks_of_no_restoring(url: str, start
 
 def test_a_closed_terminal_leaves_the_light_as_it_was(url: str, simulate: Start) -> None:
     simulator = simulate()
-    with on_terminal(CONFORMANCE, f'udpout://{url}', *LONG) as (process, master):
+    with Terminal(CONFORMANCE, f'udpout://{url}', *LONG) as screen:
         simulator.wait_for('ON     100 %')
-        os.close(master)
-        process.send_signal(signal.SIGHUP)
-        process.wait(PATIENCE)
+        screen.hang_up()
+        screen.send(signal.SIGHUP)
+        screen.wait()
         eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not restored')
 
 
@@ -226,19 +225,19 @@ def test_a_wrong_argument_is_named_in_one_line_with_status_2(
 
 
 @pytest.mark.parametrize(('only', 'answers', 'reply'), [
-    ('strobe', ['y'], 'PASS    strobe'),
+    ('strobe', ['y'], 'PASS strobe'),
     ('strobe', ['maybe'], "'maybe' is neither y nor n: taken as no"),
-    ('heartbeat', [], 'PASS    heartbeat')])
+    ('heartbeat', [], 'PASS heartbeat')])
 def test_a_check_that_needs_consent_asks_after_it_named_the_lights_on_the_link(
         url: str, simulate: Start, only: str, answers: list[str], reply: str) -> None:
     simulate('--light', '1/7', '--light', '1/8')
-    status, seen = conversation(
-        CONFORMANCE, f'udpout://{url}', '--target', '1/8', '--only', only,
-        '--only', 'address', answers=[('[y/N]', answer) for answer in answers])
-
-    announced, question, answered = seen.partition('May light 1/8 strobe')
-    assert 'found light 1/8' in announced
-    assert 'not checked: light 1/7' in announced
-    assert bool(question) == bool(answers)
-    assert reply in (answered or announced)
-    assert status == 0
+    with Terminal(CONFORMANCE, f'udpout://{url}', '--target', '1/8', '--only', only, '--only',
+                  'address') as screen:
+        screen.wait_for('found light 1/8')
+        screen.wait_for('not checked: light 1/7')
+        for answer in answers:
+            screen.wait_for(r'May light 1/8 strobe.*\[y/N\]')
+            screen.type(f'{answer}\n')
+        screen.wait_for(reply)
+        assert screen.wait() == 0
+    assert ('May light' in screen.raw) == bool(answers)

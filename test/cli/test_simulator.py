@@ -21,7 +21,7 @@ import sys
 import pytest
 from support.ports import free_port
 from support.processes import environment, python, ROOT
-from support.terminals import conversation
+from support.terminals import Terminal
 from support.waiting import eventually, PATIENCE
 
 
@@ -31,12 +31,13 @@ def url() -> str:
 
 
 def test_a_simulator_on_a_terminal_takes_commands_and_draws_with_escapes(url: str) -> None:
-    status, seen = conversation(
-        'illuminator_ros.simulator', url, '--light', '1/7=bow',
-        answers=[('1/7 bow', 'bow on'), ('ON ', 'quit')])
-
-    assert status == 0
-    assert '\x1b7' in seen
+    with Terminal('illuminator_ros.simulator', url, '--light', '1/7=bow') as screen:
+        screen.wait_for('1/7 bow')
+        screen.type('bow on\n')
+        screen.wait_for('ON ')
+        screen.type('quit\n')
+        assert screen.wait() == 0
+    assert '\x1b7' in screen.raw
 
 
 def test_a_simulator_on_a_pipe_takes_commands_and_prints_plain_text(url: str) -> None:

@@ -12,22 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The monitor without its terminal, in the test's process, and the terminal of one that runs."""
+"""The monitor without its terminal, in the test's process."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
-import fcntl
-import os
-import pty
-import re
-import signal
-import struct
-import subprocess
-import sys
-import termios
-import threading
 from typing import Any
 
 from illuminator_ros.cli.monitor.key_bindings import Ask
@@ -35,13 +25,11 @@ from illuminator_ros.cli.monitor.model import Light, Outcome
 from illuminator_ros.cli.monitor.run import Monitor
 from rclpy.node import Node
 from support.light import eventually
-from support.processes import environment, prepare_child, ROOT
 from support.ros import Ros
 from support.slow import CLOCK
 from support.waiting import PATIENCE
 
 # Cursor movements and colours.
-_CONTROL = re.compile(r'\x1b\[[\d;?]*[A-Za-z]')
 
 
 class Watching:
@@ -92,120 +80,6 @@ class Watching:
     def clear_gone(self) -> None:
         """Forget the lights that are gone."""
         self._monitor.graph.clear_gone()
-
-
-class Terminal:
-    """
-    A pseudo-terminal with a program of ours on it.
-
-    :param shell: script of a shell with job control, which runs the program as ``"$@"``.
-    """
-
-    def __init__(self, module: str, *arguments: str, size: tuple[int, int] = (24, 100),
-                 env: dict[str, str] | None = None, shell: str = 'exec "$@"') -> None:
-        self._master, self._slave = pty.openpty()
-        self.resize(*size)
-        self.before = termios.tcgetattr(self._slave)
-        given = {'TERM': 'xterm-256color', 'LANG': 'C.UTF-8', 'COLUMNS': '', 'LINES': '',
-                 **(env or {})}
-        self._process = subprocess.Popen(
-            ['sh', '-mc', shell, 'sh', sys.executable, '-m', 'support.slow_program', module,
-             *arguments], cwd=ROOT, env=environment({**CLOCK.environment, **given}),
-            stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
-            preexec_fn=_own_terminal)
-        self._grown = threading.Condition()
-        self._raw = b''
-        self._gone = False
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        while not self._gone:
-            try:
-                data = os.read(self._master, 65536)
-            except OSError:
-                return
-            with self._grown:
-                self._raw += data
-                self._grown.notify_all()
-
-    @property
-    def raw(self) -> str:
-        """All that was written so far."""
-        return self._raw.decode('utf-8', errors='replace')
-
-    def resize(self, lines: int, columns: int) -> None:
-        """Have another size."""
-        fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
-
-    def type(self, text: str) -> None:  # noqa: A003
-        """Press keys."""
-        os.write(self._master, text.encode())
-
-    def forget(self) -> None:
-        """Forget what was written so far."""
-        with self._grown:
-            self._raw = b''
-
-    def wait_for(self, pattern: str, timeout: float = PATIENCE) -> None:
-        """Wait until text like this has been written, spaces being as good as any number."""
-        def found() -> bool:
-            return bool(re.search(pattern, ' '.join(_CONTROL.sub('', self.raw).split())))
-
-        with self._grown:
-            assert self._grown.wait_for(found, timeout), f'no {pattern!r} in {self.raw[-3000:]}'
-
-    def send(self, number: int) -> None:
-        """Send a signal to the program."""
-        self._process.send_signal(number)
-
-    def hang_up(self) -> None:
-        """Be gone, as a window that is closed."""
-        self._gone = True
-        # The answer to the key ends the reader, which holds the terminal open.
-        self.type('?')
-        self._reader.join(PATIENCE)
-        os.close(self._slave)
-        os.close(self._master)
-
-    def wait(self) -> int:
-        """Wait for the end and return the exit status."""
-        return self._process.wait(PATIENCE)
-
-    @property
-    def restored(self) -> bool:
-        """Whether the terminal behaves as it did before, and shows what it showed."""
-        now = termios.tcgetattr(self._slave)
-        raw = self.raw
-        # A missing sequence may still arrive.
-        return now == self.before and raw.rfind('\x1b[?1049l') > raw.rindex(
-            '\x1b[?1049h') and raw.rfind('\x1b[?25h') > raw.rindex('\x1b[?25l')
-
-    def close(self) -> None:
-        """End it all."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGKILL)
-            self._process.wait(PATIENCE)
-        if not self._gone:
-            os.close(self._slave)
-            self._reader.join(PATIENCE)
-            os.close(self._master)
-
-
-def _own_terminal() -> None:
-    """Have the keys of the terminal send signals to this program, and end it with its parent."""
-    prepare_child()
-    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-
-
-@contextlib.contextmanager
-def terminal(*arguments: str, **how: Any) -> Iterator[Terminal]:
-    """Run the monitor on a terminal."""
-    made = Terminal('illuminator_ros.monitor', *arguments, **how)
-    try:
-        yield made
-    finally:
-        made.close()
 
 
 @contextlib.contextmanager

@@ -16,48 +16,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-import contextlib
+from collections.abc import Mapping
+import fcntl
 import os
 import pty
+import re
+import signal
+import struct
 import subprocess
 import sys
+import termios
+import threading
 
 from support.processes import environment, prepare_child, ROOT
 from support.waiting import PATIENCE
 
-
-@contextlib.contextmanager
-def on_terminal(*arguments: str) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """Run ``python -m ARGUMENTS`` on a terminal; return the process and the other side of it."""
-    master, slave = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, '-m', *arguments], stdin=slave, stdout=slave, stderr=slave, cwd=ROOT,
-        env=environment(), start_new_session=True, preexec_fn=prepare_child)
-    os.close(slave)
-    try:
-        yield process, master
-    finally:
-        process.kill()
-        process.wait()
-        with contextlib.suppress(OSError):
-            os.close(master)
+_CONTROL = re.compile(r'\x1b\[[\d;?]*[A-Za-z]')
 
 
-def conversation(*arguments: str, answers: Iterable[tuple[str, str]]) -> tuple[int, str]:
+class Terminal:
     """
-    Run ``python -m ARGUMENTS`` on a terminal; return its exit status and its output.
+    A pseudo-terminal with ``python -m MODULE ARGUMENTS`` on it.
 
-    :param answers: lines to type, each after a text that must have been printed.
+    :param shell: script of a shell with job control, which runs the program as ``"$@"``.
     """
-    with on_terminal(*arguments) as (process, master):
-        seen = b''
-        for awaited, line in answers:
-            while awaited.encode() not in seen:
-                seen += os.read(master, 4096)
-            os.write(master, f'{line}\n'.encode())
-        # Reading fails when the program has closed its terminal.
-        with contextlib.suppress(OSError):
-            while data := os.read(master, 4096):
-                seen += data
-        return process.wait(PATIENCE), seen.decode()
+
+    def __init__(self, *module: str, size: tuple[int, int] = (24, 100),
+                 env: Mapping[str, str] | None = None, shell: str = 'exec "$@"') -> None:
+        self._master, self._slave = pty.openpty()
+        self.resize(*size)
+        self.before = termios.tcgetattr(self._slave)
+        given = {'TERM': 'xterm-256color', 'LANG': 'C.UTF-8', 'COLUMNS': '', 'LINES': '',
+                 **(env or {})}
+        self._process = subprocess.Popen(
+            ['sh', '-mc', shell, 'sh', sys.executable, '-m', *module], cwd=ROOT,
+            env=environment(given), stdin=self._slave, stdout=self._slave, stderr=self._slave,
+            start_new_session=True, preexec_fn=_own_terminal)
+        self._grown = threading.Condition()
+        self._raw = b''
+        self._gone = False
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        while not self._gone:
+            try:
+                data = os.read(self._master, 65536)
+            except OSError:
+                return
+            with self._grown:
+                self._raw += data
+                self._grown.notify_all()
+
+    @property
+    def raw(self) -> str:
+        """All that was written so far."""
+        return self._raw.decode('utf-8', errors='replace')
+
+    def resize(self, lines: int, columns: int) -> None:
+        """Have another size."""
+        fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
+
+    def type(self, text: str) -> None:  # noqa: A003
+        """Press keys."""
+        os.write(self._master, text.encode())
+
+    def forget(self) -> None:
+        """Forget what was written so far."""
+        with self._grown:
+            self._raw = b''
+
+    def wait_for(self, pattern: str, timeout: float = PATIENCE) -> None:
+        """Wait until text like this has been written, spaces being as good as any number."""
+        def found() -> bool:
+            return bool(re.search(pattern, ' '.join(_CONTROL.sub('', self.raw).split())))
+
+        with self._grown:
+            assert self._grown.wait_for(found, timeout), f'no {pattern!r} in {self.raw[-3000:]}'
+
+    def send(self, number: int) -> None:
+        """Send a signal to the program."""
+        self._process.send_signal(number)
+
+    def hang_up(self) -> None:
+        """Be gone, as a window that is closed."""
+        self._gone = True
+        # The answer to the key ends the reader, which holds the terminal open.
+        self.type('?')
+        self._reader.join(PATIENCE)
+        os.close(self._slave)
+        os.close(self._master)
+
+    def wait(self) -> int:
+        """Wait for the end and return the exit status."""
+        return self._process.wait(PATIENCE)
+
+    @property
+    def restored(self) -> bool:
+        """Whether the terminal behaves as it did before, and shows what it showed."""
+        now = termios.tcgetattr(self._slave)
+        raw = self.raw
+        # A missing sequence may still arrive.
+        return now == self.before and raw.rfind('\x1b[?1049l') > raw.rindex(
+            '\x1b[?1049h') and raw.rfind('\x1b[?25h') > raw.rindex('\x1b[?25l')
+
+    def __enter__(self) -> Terminal:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGKILL)
+            self._process.wait(PATIENCE)
+        if not self._gone:
+            os.close(self._slave)
+            self._reader.join(PATIENCE)
+            os.close(self._master)
+
+
+def _own_terminal() -> None:
+    """Have the keys of the terminal send signals to this program, and end it with its parent."""
+    prepare_child()
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)

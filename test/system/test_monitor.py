@@ -19,12 +19,14 @@ import re
 import signal
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 from support.light import eventually, free_port, ServedLight
-from support.monitors import terminal
 from support.processes import environment, ROOT, run
 from support.ros import Ros, running_bridge
+from support.slow import CLOCK
+from support.terminals import Terminal
 
 MONITOR = 'illuminator_ros.monitor'
 
@@ -33,9 +35,15 @@ def domain(ros: Ros) -> dict[str, str]:
     return {'ROS_DOMAIN_ID': str(ros.domain)}
 
 
+def monitor(ros: Ros, **how: Any) -> Terminal:
+    """Run the monitor on a terminal, by the slow clock."""
+    return Terminal('support.slow_program', MONITOR, env={**CLOCK.environment, **domain(ros)},
+                    **how)
+
+
 def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
     with (running_bridge(own_ros.domain, port), ServedLight(port) as light,
-          terminal(env=domain(own_ros)) as screen):
+          monitor(own_ros) as screen):
         screen.wait_for('/illuminator off')
 
         screen.type(' ')
@@ -49,7 +57,7 @@ def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
 @pytest.mark.parametrize('way', [
     'q', '\x03', 'SIGTERM', 'SIGQUIT', 'SIGHUP'])
 def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
-    with terminal(env=domain(own_ros)) as screen:
+    with monitor(own_ros) as screen:
         screen.wait_for('no lights in this ROS graph yet')
 
         if way.startswith('SIG'):
@@ -71,7 +79,7 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
     own_ros: Ros, way: str, job: str,
 ) -> None:
     shell = f'{job} & echo pid $!; fg; echo in the shell; read line; fg'
-    with terminal(env=domain(own_ros), shell=shell) as screen:
+    with monitor(own_ros, shell=shell) as screen:
         screen.wait_for('no lights in this ROS graph yet')
 
         if way == '\x1a':
@@ -91,7 +99,7 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
 
 
 def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> None:
-    with terminal(env=domain(own_ros)) as screen:
+    with monitor(own_ros) as screen:
         screen.wait_for('no lights in this ROS graph yet')
 
         screen.hang_up()
@@ -100,7 +108,7 @@ def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> No
 
 
 def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
-    with terminal(env=domain(own_ros), size=(24, 100)) as screen:
+    with monitor(own_ros, size=(24, 100)) as screen:
         screen.wait_for('a all off')
 
         screen.forget()
