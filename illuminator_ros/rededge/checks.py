@@ -82,7 +82,7 @@ with_consent = partial(requires, needs_consent=True)
 
 
 class Capture(NamedTuple):
-    """What the camera reported of an image, None for what it did not."""
+    """The messages that reported an image; None for one that did not come."""
 
     status: CameraStatus | None
     feedback: CameraFeedback | None
@@ -119,7 +119,7 @@ class CameraTester:
         Return the answer to a PING request.
 
         :param sequence: its sequence number, by default a new one.
-        :param sender: its address, by default that of the session.
+        :param sender: its address, by default the session's.
         :raises Failed: if none of several requests is answered, or one is answered late.
         """
         for _ in range(PING_ATTEMPTS):
