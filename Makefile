@@ -32,7 +32,7 @@ test: check
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \
 		test/monitor test/conformance test/docs/test_links.py test/docs/test_tool_pages.py \
-		test/docs/test_design_page.py test/cli
+		test/docs/test_design_page.py test/cli test/rededge
 
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .

@@ -51,6 +51,8 @@ from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
 
 # Until the camera hears a host.
 DEFAULT_SYSTEM_ID = 255
+# s between images.
+SHORTEST_INTERVAL = 0.05
 # s from an image to its CAMERA_FEEDBACK.
 FEEDBACK_DELAY = 0.2
 # mm
@@ -239,6 +241,13 @@ def _angles(rotation: Quaternion) -> tuple[float, float, float]:
     return roll, pitch, yaw % 360
 
 
+def _interval(text: str) -> float:
+    value = number(0, 3600)(text)
+    if 0 < value < SHORTEST_INTERVAL:
+        raise ValueError(f'{text} is shorter than {SHORTEST_INTERVAL:g}')
+    return value
+
+
 def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulated.Change:
     if words not in ([], ['panel']):
         raise ValueError(f'{words[0]!r} is not panel')
@@ -253,7 +262,7 @@ COMMANDS: tuple[simulated.ConsoleCommand[SimulatedRedEdge, simulated.Change], ..
                              _capture, (0, 1)),
     simulated.ConsoleCommand(
         'interval S', 'take an image every S seconds; 0 ends it', lambda camera, words, now:
-        partial(camera.set_interval, number(0, 3600)(words[0]), now), (1,)),
+        partial(camera.set_interval, _interval(words[0]), now), (1,)),
     simulated.ConsoleCommand(
         'own-gps PLACE', 'LAT,LON,ALT of its own GPS, or none', lambda camera, words, now:
         partial(camera.set_own_gps, read_place(words[0])), (1,)),
@@ -513,7 +522,7 @@ def read_place(text: str) -> Place | None:
 # Over a field near Zurich.
 DEFAULT_PLACE = '47.397742,8.545594,488'
 SETTINGS: Mapping[str, Setting] = {
-    'interval': Setting('S', 'take an image every S seconds (default: 0, none)', number(0, 3600)),
+    'interval': Setting('S', 'take an image every S seconds (default: 0, none)', _interval),
     'validity': Setting('S', 'time for which injected state is used (default: 5; firmware before '
                         '1.3.0 had 30)', number(0.001, 3600)),
     'own_gps': Setting('LAT,LON,ALT', "position of the camera's own GPS, above mean sea level, or "
