@@ -32,5 +32,6 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         'gimbal', ros='illuminator_ros.gimbal.ros.gimbals:GIMBAL',
         simulated='illuminator_ros.gimbal.simulated_device:SIMULATED'),
     PayloadType(
-        'gimbal_manager', simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED'),
+        'gimbal_manager', ros='illuminator_ros.gimbal.ros.manager_node:GIMBAL_MANAGER',
+        simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED'),
 )}

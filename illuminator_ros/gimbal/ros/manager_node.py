@@ -1,0 +1,314 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node of a gimbal manager: the interface of a gimbal, and the manager's own part."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+import functools
+import math
+
+from geometry_msgs.msg import QuaternionStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, NavSatFix
+from std_msgs.msg import Header
+
+from .conversions import Frames, quaternion_message, read_place
+from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
+from ..manager import (
+    AddressShared,
+    DemandRefused,
+    GimbalManager,
+    ManagerEvent,
+    ManagerSettings,
+    ReferenceLost,
+    SetpointClipped,
+    SetpointSent,
+)
+from ..manager_client import ManagerWithClient
+from ..manager_control import ControlChanged, ControlSettings, Role
+from ..manager_presence import ManagerState, StateChanged
+from ..manager_setpoint import GeoPoint, Range
+from ...mavlink.command import CommandSender
+from ...mavlink.messages import Address
+from ...payload.arbitration import Cause, Policy
+from ...payload.mount import from_mavlink, to_mavlink, YawFrame
+from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
+from ...payload.vehicle import GimbalDeviceAttitudeStatus
+from ...ros.diagnostics import ERROR, Finding, LinkSnapshot, Report, Value, WARN
+from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
+from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication, STREAM_QOS
+from ...ros.parameters import ParameterError, ParameterSpec, Values
+from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+
+# The name of ROS in the lists of players.
+ROS = 'ros'
+_AXES = ('roll', 'pitch', 'yaw')
+_RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
+
+MANAGER_PARAMETERS = (
+    ParameterSpec('policy', Policy.HOLD.value, 'when a player takes control from another one',
+                  choices=tuple(policy.value for policy in Policy)),
+    ParameterSpec('priority', [], 'players, the highest first: sysid/compid, or ros'),
+    ParameterSpec('overruling', [], 'players that take control under each policy'),
+    ParameterSpec('lease', 3.0, 'silence after which a player loses control', 's', 0.1, 3600.0),
+    ParameterSpec('nudge_limit', 0.175, 'largest angle that secondary control adds', 'rad', 0.0,
+                  math.pi),
+    *(ParameterSpec(f'{axis}_{end}', round(limits[index], 3),
+                    f'{word} of a gimbal without MAVLink', 'rad', -2 * math.pi, 2 * math.pi)
+      for axis, limits in zip(_AXES, _RANGES, strict=True)
+      for index, (end, word) in enumerate((
+          ('min', f'smallest {axis}'), ('max', f'largest {axis}')))),
+)
+
+
+def _players(values: Values, name: str, ros: Address) -> tuple[Address, ...]:
+    """
+    Return the players that a parameter lists.
+
+    :raises ParameterError: if an entry is wrong.
+    """
+    players = []
+    for entry in values[name]:
+        system, slash, component = entry.partition('/')
+        try:
+            player = ros if entry == ROS else Address(int(system), int(component))
+        except ValueError:
+            player = Address(0, 0)
+        if not all(1 <= id_ <= 255 for id_ in player):
+            raise ParameterError(f'{name}: {entry!r} is neither sysid/compid nor {ROS!r}')
+        players.append(player)
+    return tuple(players)
+
+
+def manager_settings(values: Values, ros: Address) -> ManagerSettings:
+    """
+    Return the settings of the manager.
+
+    :param ros: the address of ROS as a player.
+    :raises ParameterError: if a parameter is wrong.
+    """
+    ranges = []
+    for axis in _AXES:
+        # With the signs of ROS: pitch down and yaw left are positive.
+        low, high = values[f'{axis}_min'], values[f'{axis}_max']
+        if low > high:
+            raise ParameterError(f'{axis}_min: {low} rad is above {axis}_max: {high} rad')
+        ranges.append(Range(low, high) if axis == 'roll' else Range(-high + 0.0, -low + 0.0))
+    roll, pitch, yaw = ranges
+    return ManagerSettings(
+        ControlSettings(
+            Policy(values['policy']), _players(values, 'priority', ros),
+            frozenset(_players(values, 'overruling', ros)), values['lease']),
+        values['gimbal_device_id'], values['nudge_limit'], (roll, pitch, yaw))
+
+
+class ManagerNode(ServedPayload):
+    """
+    Serves a manager with one node, for the link's thread.
+
+    :raises ParameterError: if a parameter is wrong.
+    """
+
+    def __init__(self, both: ManagerWithClient, host: Host) -> None:
+        self._both = both
+        self._manager = manager = both.manager
+        self._host = host
+        self._log = host.log
+        self._frames = Frames.of(host.values)
+        self._clock = host.node.get_clock()
+        self._gimbals = Gimbals(both.client, host)
+        self._interface = NodeInterface(
+            host.node, host.link, host.log,
+            publications=() if manager.has_mavlink else (
+                Publication('device/setpoint', QuaternionStamped, STREAM_QOS),),
+            commands=tuple(self._topics()))
+        self._source = DiagnosticsSource(
+            host.node.get_name(), host.node.get_fully_qualified_name(), self._look)
+        host.diagnostics.add(self._source)
+        manager.events.subscribe(self._take)
+
+    def _topics(self) -> list[AnyCommand]:
+        separation: float = self._host.values['geoid_separation']
+        topics: list[AnyCommand] = [
+            CommandTopic('imu', Imu, self._take_imu, _read_imu),
+            CommandTopic('odometry', Odometry, self._take_odometry, _read_odometry),
+            CommandTopic('fix', NavSatFix, self._take_place,
+                         lambda message: read_place(message, separation))]
+        if not self._manager.has_mavlink:
+            topics.append(CommandTopic(
+                'device/attitude', QuaternionStamped, self._take_attitude,
+                self._frames.read_attitude))
+        return topics
+
+    # The vehicle and the device
+
+    def _take_imu(self, value: tuple[Quaternion, float], now: float) -> None:
+        self._manager.vehicle.set_attitude(*value, now)
+        self._manager.vehicle_changed(now)
+
+    def _take_odometry(self, value: tuple[Quaternion, float, Vector], now: float) -> None:
+        attitude, yaw_rate, velocity = value
+        self._manager.vehicle.set_velocity(velocity, now)
+        self._take_imu((attitude, yaw_rate), now)
+
+    def _take_place(self, place: Vector, now: float) -> None:
+        self._manager.vehicle.set_position(GeoPoint(*place), now)
+
+    def _take_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
+        rotation, frame = value
+        heading = self._manager.vehicle.heading(now)
+        self._both.take_attitude(GimbalDeviceAttitudeStatus(
+            0, 0, int(now * 1000) & 0xFFFFFFFF, int(frame.flag), to_mavlink(rotation, frame),
+            math.nan, math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan),
+            now)
+
+    # Events
+
+    def _take(self, event: ManagerEvent) -> None:
+        if isinstance(event, SetpointSent):
+            self._publish(event)
+        elif isinstance(event, StateChanged):
+            self._state_changed(event)
+        elif isinstance(event, ControlChanged):
+            self._log.info(_control_text(event, self._manager.settings.control.lease))
+        elif isinstance(event, DemandRefused):
+            more = f' ({event.unreported} more)' if event.unreported else ''
+            self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}{more}',
+                              f'refused {event.player}')
+        elif isinstance(event, SetpointClipped):
+            for one in event.clipped:
+                self._log.warning(
+                    f'the setpoint is clipped: {one.axis} {one.asked:.3f} rad in MAVLink is '
+                    f'beyond the limit {one.limit:.3f} rad', f'clipped {one.axis}')
+        elif isinstance(event, AddressShared):
+            self._log.error(f'{event.player} has control, and two different senders use that '
+                            'address: require signing, or give one another address', 'shared')
+        elif isinstance(event, ReferenceLost):
+            self._log.warning(f'the {event.unknown} of the vehicle is unknown: the gimbal does '
+                              'not follow its setpoint', f'lost {event.unknown}')
+
+    def _publish(self, event: SetpointSent) -> None:
+        setpoint = event.setpoint
+        if self._manager.has_mavlink:
+            return
+        # Neutral and retracted are the same for a gimbal that has an attitude only.
+        attitude = setpoint.attitude or Quaternion()
+        header = Header(stamp=self._clock.now().to_msg(),
+                        frame_id=self._frames.name(setpoint.frame))
+        self._interface.publish('device/setpoint', quaternion_message(
+            header, from_mavlink((attitude.w, attitude.x, attitude.y, attitude.z),
+                                 setpoint.frame)))
+
+    def _state_changed(self, event: StateChanged) -> None:
+        device = f'gimbal {event.device or event.device_id}'
+        if event.after is ManagerState.INACTIVE:
+            self._log.error(f'{event.other} manages {device} too: this manager is inactive; '
+                            'end one of the two', 'state')
+        elif event.after is ManagerState.ACTIVE:
+            self._log.info(f'{device} is managed', 'state')
+        elif event.after is ManagerState.NO_DEVICE:
+            self._log.warning(f'{device} is lost', 'state')
+        self._host.check_diagnostics()
+
+    # The bridge's calls
+
+    def poll(self, now: float) -> None:
+        """See :meth:`ServedPayload.poll`."""
+        self._gimbals.poll(now)
+
+    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+        """See :meth:`ServedPayload.shut_down`."""
+        return self._gimbals.shut_down(now, report)
+
+    # Diagnostics
+
+    def _look(self, now: float) -> MakeReports:
+        holder = self._manager.control.holder(Role.PRIMARY)
+        ways = self._host.link.way_count(holder, now) if holder else 0
+        return functools.partial(_reports, findings=findings(self._manager, ways), values=_values(
+            self._manager, now))
+
+
+def findings(manager: GimbalManager, ways: int) -> list[Finding]:
+    """
+    Return the findings on a manager.
+
+    :param ways: over how many peers the player in primary control is heard.
+    """
+    found: list[Finding] = []
+    if manager.state is ManagerState.INACTIVE:
+        found.append((ERROR, f'{manager.other} manages the gimbal too: inactive'))
+    elif manager.state is not ManagerState.ACTIVE:
+        found.append((WARN, manager.state.value))
+    if ways > 1:
+        found.append((WARN, f'{manager.control.holder(Role.PRIMARY)} has control and is heard '
+                            f'over {ways} peers: another sender may use its address'))
+    return found
+
+
+def _reports(
+    link: LinkSnapshot, *, findings: list[Finding], values: dict[str, Value],
+) -> list[Report]:
+    return [Report('manager', f'manager {values["gimbal_device_id"]}', findings, 'active',
+                   lambda: values)]
+
+
+def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
+    control, settings = manager.control, manager.settings.control
+    since = control.since(Role.PRIMARY)
+    return {
+        'state': manager.state.value,
+        'gimbal_device_id': manager.device_id,
+        'policy': settings.policy.value,
+        **{f'{role.value}_control': str(control.holder(role) or 'none') for role in Role},
+        **({'control_s_ago': now - since} if math.isfinite(since) else {}),
+        'other_manager': str(manager.other or 'none')}
+
+
+def _control_text(event: ControlChanged, lease: float) -> str:
+    before, after = event.before or 'none', event.after or 'none'
+    why = (f'{event.before} was silent for {lease:g} s' if event.cause is Cause.SILENCE
+           else f'by {event.by}')
+    return f'{event.role.value} control: {before} -> {after}, {why}'
+
+
+def _read_imu(message: Imu) -> tuple[Quaternion, float]:
+    """Return the attitude and the yaw rate, NED and FRD; ValueError if there is none."""
+    if message.orientation_covariance[0] == -1:
+        raise ValueError('the message has no orientation')
+    q = message.orientation
+    return (ned_frd(Quaternion(q.w, q.x, q.y, q.z).normalized()),
+            -float(message.angular_velocity.z))
+
+
+def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
+    """Return attitude, yaw rate and velocity, NED and FRD; the twist has the child's frame."""
+    q, linear = message.pose.pose.orientation, message.twist.twist.linear
+    rotation = Quaternion(q.w, q.x, q.y, q.z).normalized()
+    velocity = enu_ned(rotation.rotate((linear.x, linear.y, linear.z)))
+    return ned_frd(rotation), -float(message.twist.twist.angular.z), velocity
+
+
+def _make(commands: CommandSender, values: Values) -> ManagerWithClient:
+    return ManagerWithClient(commands, manager_settings(values, commands.address),
+                             settings(values))
+
+
+GIMBAL_MANAGER = RosPayload(
+    'gimbal_manager', _make, ManagerNode, (*GIMBAL_PARAMETERS, *MANAGER_PARAMETERS),
+    summary='the manager of a gimbal, which obeys one player at a time', examples=(
+        'ros2 run illuminator_ros gimbal_manager --ros-args -p gimbal_device_id:=154',
+        'ros2 service call /gimbal_manager/take_control std_srvs/srv/Trigger'))

@@ -1,0 +1,223 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node of a gimbal manager: ROS as a player, as the driver of a gimbal, and as the vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import math
+from typing import Any
+
+from illuminator_ros.gimbal.messages import GimbalManagerStatus
+from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.url import parse_url
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
+from geometry_msgs.msg import QuaternionStamped, Twist, TwistWithCovariance, Vector3  # noqa: E402
+from illuminator_ros.gimbal.ros.manager_node import (
+    MANAGER_PARAMETERS,  # noqa: E402
+    manager_settings,  # noqa: E402
+)
+from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
+from illuminator_ros.ros.parameters import ParameterError  # noqa: E402
+from nav_msgs.msg import Odometry  # noqa: E402
+from sensor_msgs.msg import Imu  # noqa: E402
+from std_msgs.msg import Bool, Header, String  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+from support.fixtures import own_ros, private_home  # noqa: E402, F401
+from support.gimbal_manager import DEVICE, OURS  # noqa: E402
+from support.ports import free_port  # noqa: E402
+from support.processes import ended, Program  # noqa: E402
+from support.ros import Ros, start_bridge, STREAM  # noqa: E402
+from support.waiting import eventually  # noqa: E402
+
+NODE = '/gimbal_manager'
+VEHICLE = Header(frame_id='base_link_stabilized')
+
+
+@contextlib.contextmanager
+def device(port: int) -> Iterator[SimulatedGimbal]:
+    """Serve a simulated gimbal over UDP."""
+    gimbal = SimulatedGimbal(GimbalProperties(DEVICE))
+    with served(port, SimulatedComponents([Description(DEVICE, gimbal)], 0.0)):
+        yield gimbal
+
+
+@contextlib.contextmanager
+def served(port: int, endpoint: Endpoint) -> Iterator[None]:
+    url = f'udpout://127.0.0.1:{port}'
+    link = Link(parse_url(url), endpoint, label=url)
+    link.start()
+    try:
+        yield
+    finally:
+        link.stop()
+
+
+@contextlib.contextmanager
+def manager(ros: Ros, port: int, **parameters: Any) -> Iterator[Program]:
+    with ended(start_bridge(ros.domain, port, '-r', f'__node:={NODE[1:]}',
+                            payloads='[gimbal_manager]', **parameters)) as program:
+        yield program
+
+
+def trigger(ros: Ros, name: str) -> Trigger.Response:
+    answer: Trigger.Response = ros.call(Trigger, f'{NODE}/{name}', Trigger.Request())
+    return answer
+
+
+def turned(roll: float, pitch: float, yaw: float) -> QuaternionMessage:
+    """Return a rotation, deg."""
+    q = Quaternion.from_euler(*map(math.radians, (roll, pitch, yaw)))
+    return QuaternionMessage(w=q.w, x=q.x, y=q.y, z=q.z)
+
+
+def report(ros: Ros, text: str) -> DiagnosticStatus:
+    """Return the status of the manager with a text in its message."""
+    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+
+    def wanted(array: Any) -> list[DiagnosticStatus]:
+        return [one for one in array.status
+                if one.name.endswith('manager') and text in one.message]
+
+    return wanted(recorder.wait(wanted))[0]
+
+
+@pytest.mark.timeout(180)
+def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
+        own_ros: Ros) -> None:  # noqa: F811
+    port = free_port()
+    with manager(own_ros, port) as program, device(port) as gimbal:
+        own_ros.subscribe(Bool, f'{NODE}/connected').wait_value(True)
+        program.wait_for('gimbal 1/154 is managed')
+        answer = trigger(own_ros, 'take_control')
+        assert answer.success, answer.message
+        own_ros.subscribe(String, f'{NODE}/controller').wait_value(
+            f'primary {OURS}, secondary none')
+        own_ros.publisher(QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
+            QuaternionStamped(header=VEHICLE, quaternion=turned(0, 20, 10)))
+        # ROS: pitch down and yaw left are positive.
+        eventually(lambda: [round(math.degrees(one)) for one in gimbal.mount.motion.angles] == [
+            0, -20, -10])
+
+        # The vehicle heads north, 10 m/s; ROS counts yaw from the east.
+        imu = Imu(orientation=turned(0, 0, 90), angular_velocity=Vector3(z=0.0))
+        odometry = Odometry(twist=TwistWithCovariance(twist=Twist(linear=Vector3(x=10.0))))
+        odometry.pose.pose.orientation = imu.orientation
+        publishers = [(own_ros.publisher(type(one), f'{NODE}/{name}', NODE), one)
+                      for name, one in (('imu', imu), ('odometry', odometry))]
+
+        def north_is_known() -> bool:
+            for publisher, message in publishers:
+                publisher.publish(message)
+            return gimbal.mount.motion.heading_known(gimbal.mount.motion.now)
+
+        eventually(north_is_known)
+        assert own_ros.call(
+            SetBool, f'{NODE}/set_yaw_lock', SetBool.Request(data=True)).success
+        status = report(own_ros, 'active')
+        assert status.level == DiagnosticStatus.OK
+        assert {one.key: one.value for one in status.values}['primary_control'] == str(OURS)
+        assert program.end() == 0
+
+
+@pytest.mark.timeout(180)
+def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:  # noqa: F811
+    port = free_port()
+    # The link is open once a peer is heard.
+    with manager(own_ros, port, gimbal_device_id=1, pitch_max=0.5, auto_take_control='true'), \
+            device(port):
+        setpoint = own_ros.subscribe(QuaternionStamped, f'{NODE}/device/setpoint', STREAM)
+        attitude = own_ros.subscribe(QuaternionStamped, f'{NODE}/attitude', STREAM)
+        own_ros.subscribe(Bool, f'{NODE}/in_control').wait_value(True)
+        own_ros.publisher(QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
+            QuaternionStamped(header=VEHICLE, quaternion=turned(0, 60, 10)))
+
+        message = setpoint.wait()
+        q = message.quaternion
+        assert message.header.frame_id == 'base_link_stabilized'
+        assert Quaternion(q.w, q.x, q.y, q.z).euler() == pytest.approx(
+            (0.0, 0.5, math.radians(10)), abs=1e-5)
+        reported = QuaternionStamped(header=VEHICLE, quaternion=turned(0, 5, 5))
+        driver = own_ros.publisher(QuaternionStamped, f'{NODE}/device/attitude', NODE)
+        eventually(lambda: driver.publish(reported) or any(
+            abs(one.quaternion.y - reported.quaternion.y) < 1e-6 for one in attitude.messages))
+
+
+class Other(Endpoint):
+    """Another manager of the device."""
+
+    messages = ()
+    sends = (GimbalManagerStatus,)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._due = 0.0
+
+    def link_opened(self, now: float) -> None:
+        self._due = now
+
+    def receive(self, source: Address, message: object, now: float) -> None:
+        raise AssertionError
+
+    def poll(self, now: float) -> None:
+        if now >= self._due:
+            self._due = now + 0.2
+            self.outgoing.append((
+                Address(1, 191), GimbalManagerStatus(0, 0, DEVICE.component, 0, 0, 0, 0)))
+
+    def next_deadline(self) -> float:
+        return self._due
+
+
+@pytest.mark.timeout(180)
+def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:  # noqa: F811
+    port = free_port()
+    with manager(own_ros, port) as program, device(port), served(port, Other()):
+        program.wait_for('[ERROR]')
+        program.wait_for('1/191 manages gimbal 1/154 too: this manager is inactive')
+        assert report(own_ros, '1/191 manages').level == DiagnosticStatus.ERROR
+        assert not trigger(own_ros, 'take_control').success
+
+
+DEFAULTS = {one.name: one.default for one in MANAGER_PARAMETERS} | {'gimbal_device_id': 0}
+
+
+def test_parameters_give_the_settings_of_the_manager() -> None:
+    settings = manager_settings(
+        {**DEFAULTS, 'priority': ['255/190', 'ros'], 'overruling': ['1/1'], 'policy': 'priority',
+         'pitch_min': -0.2, 'pitch_max': 1.5}, OURS)
+
+    assert settings.control.priority == (Address(255, 190), OURS)
+    assert settings.control.overruling == {Address(1, 1)}
+    # MAVLink: pitch up is positive.
+    assert settings.ranges[1] == (-1.5, 0.2)
+
+
+@pytest.mark.parametrize(('name', 'value'), [
+    ('priority', ['255']), ('priority', ['0/1']), ('overruling', ['1/256']),
+    ('overruling', ['pilot']), ('pitch_min', 2.0)])
+def test_wrong_parameters_are_named(name: str, value: object) -> None:
+    with pytest.raises(ParameterError, match=name):
+        manager_settings({**DEFAULTS, name: value}, OURS)
