@@ -30,8 +30,10 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
                 checks='illuminator_ros.rededge.checks:CHECKS'),
     PayloadType(
         'gimbal', ros='illuminator_ros.gimbal.ros.gimbals:GIMBAL',
-        simulated='illuminator_ros.gimbal.simulated_device:SIMULATED'),
+        simulated='illuminator_ros.gimbal.simulated_device:SIMULATED',
+        checks='illuminator_ros.gimbal.checks.device:CHECKS'),
     PayloadType(
         'gimbal_manager', ros='illuminator_ros.gimbal.ros.manager_node:GIMBAL_MANAGER',
-        simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED'),
+        simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED',
+        checks='illuminator_ros.gimbal.checks.manager:CHECKS'),
 )}

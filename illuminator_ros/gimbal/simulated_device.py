@@ -203,6 +203,9 @@ class SimulatedMount:
         flags = self.flags(behaviour)
         if behaviour.names_frame:
             flags |= frame.flag
+        elif known:
+            # In older devices YAW_LOCK is the frame, too.
+            frame = yaw_frame(flags)
         if behaviour.accepts_earth_always or known and (
                 motion.mechanics.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME):
             flags |= MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME

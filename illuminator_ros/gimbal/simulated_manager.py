@@ -118,8 +118,9 @@ class ManagerBehaviour(GimbalBehaviour):
     shows_flags: bool = True
 
 
+# Any kind of component may be a manager, so that no heartbeat type is wrong.
 FAULTS = FaultTable({
-    **GIMBAL_FAULTS,
+    **{name: fault for name, fault in GIMBAL_FAULTS.items() if name not in ('type', 'autopilot')},
     'stale-control': Fault('frozen_control', 'reports the control of its start'),
 })
 

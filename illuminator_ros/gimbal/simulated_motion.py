@@ -123,7 +123,7 @@ class _Axis:
     :ivar angle: rad; velocity: rad/s.
     :ivar target: in the reference of the axis, rad; it turns at ``rate``, rad/s.
     :ivar speed: at which the axis approaches the target, rad/s.
-    :ivar beyond: whether the target is out of range.
+    :ivar stopped: whether it is at the end of its range, and its target is beyond.
     """
 
     angle: float = 0.0
@@ -131,20 +131,20 @@ class _Axis:
     target: float = 0.0
     rate: float = 0.0
     speed: float = 0.0
-    beyond: bool = False
+    stopped: bool = False
 
     def advance(self, seconds: float, goal: float, span: Range, *, endless: bool) -> None:
         """Approach a goal, rad, for some time."""
         within = goal if endless else span.clip(goal)
-        self.beyond = abs(within - goal) > RESOLUTION
         error = wrapped(within - self.angle) if endless else within - self.angle
         # A target that turns is followed at its rate.
         step = math.copysign(min(abs(error), max(self.speed, abs(self.rate)) * seconds), error)
         self.velocity = step / seconds
         self.angle = wrapped(self.angle + step) if endless else self.angle + step
-        if self.beyond and abs(within - self.angle) < RESOLUTION:
-            # A target that turns on at the stop would take as long to return.
-            self.target += self.angle - goal if self.rate else 0.0
+        self.stopped = within != goal and abs(within - self.angle) < RESOLUTION
+        if self.stopped and self.rate:
+            # Otherwise it would take as long to return as it was driven against the stop.
+            self.target += self.angle - goal
 
 
 @dataclass
@@ -280,9 +280,9 @@ class GimbalMotion:
         return any(abs(rate) > self.mechanics.drift * 1.5 + RESOLUTION for rate in self.rates)
 
     def limits(self) -> ErrorFlags:
-        """Return the flags of the axes whose setpoint is out of their range."""
+        """Return the flags of the axes that the end of their range has stopped."""
         return ErrorFlags(sum(flag for flag, axis in zip(_AT_LIMIT, self._axes, strict=True)
-                              if axis.beyond))
+                              if axis.stopped))
 
     def attitude(self, frame: YawFrame) -> Quaternion:
         """Return the attitude in MAVLink's axes; the earth frame needs the heading."""

@@ -238,9 +238,10 @@ def result_name(result: int) -> str:
 
 
 def command_name(command: int) -> str:
-    """Return the name of a MAV_CMD that this package knows; any int is accepted."""
+    """Return the name of a MAV_CMD that this package knows, or of a payload's enum."""
     try:
-        return f'MAV_CMD_{MavCmd(command).name}'
+        one = command if isinstance(command, IntEnum) else MavCmd(command)
+        return f'MAV_CMD_{one.name}'
     except ValueError:
         return f'MAV_CMD {command}'
 

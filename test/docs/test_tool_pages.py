@@ -20,6 +20,8 @@ from typing import Any
 
 from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
+from illuminator_ros.gimbal import simulated_device, simulated_manager
+from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
@@ -41,6 +43,8 @@ SIMULATOR = (DOC / 'simulator.md').read_text()
 
 @pytest.mark.parametrize(('heading', 'requirements', 'consent'), [
     ('requirement', REQUIREMENTS, 'dazzles'),
+    ('requirement on a gimbal', device.REQUIREMENTS, 'moves'),
+    ('requirement on a gimbal manager', manager.REQUIREMENTS, 'moves'),
     ('requirement on a camera', CAMERA_REQUIREMENTS, 'images')])
 def test_the_requirements_are_listed_in_order_with_their_sections_and_counted(
     heading: str, requirements: Sequence[Requirement[Any]], consent: str,
@@ -63,8 +67,20 @@ def settings(of: SimulatedType[Any]) -> list[list[str]]:
             for name, setting in of.all_settings.items()]
 
 
+def of_both(device: list[list[str]], manager: list[list[str]]) -> list[list[str]]:
+    """Return the rows of gimbal devices and managers, with the one that alone has a row."""
+    return [*([*row, '' if row in manager else 'device'] for row in device),
+            *([*row, 'manager'] for row in manager if row not in device)]
+
+
 @pytest.mark.parametrize(('heading', 'rows'), [
     ('fault', faults(FAULTS)),
+    ('fault of a gimbal', of_both(
+        faults(simulated_device.FAULTS), faults(simulated_manager.FAULTS))),
+    ('setting of a gimbal', of_both(*(
+        [row for row in settings(one) if row[0] != '`fault`']
+        for one in (simulated_device.SIMULATED, simulated_manager.SIMULATED)))),
+    ('command of a gimbal', [[f'`{one.usage}`', one.help] for one in simulated_device.COMMANDS]),
     ('fault of a camera', faults(CAMERA.device.faults)),
     ('profile', [[f'`{name}`', profile.description] for name, profile in PROFILES.items()]),
     ('setting', settings(SIMULATED)),

@@ -433,7 +433,8 @@ def _judge(seen: list[Status], seconds: float) -> str:
 # All of them
 
 REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
-    component.heartbeat, component.heartbeat_type(messages.MavType.ILLUMINATOR, 'an illuminator'),
+    component.heartbeat, component.heartbeat_type(
+        messages.MavType.ILLUMINATOR, 'ILLUMINATOR', 'an illuminator'),
     component.heartbeat_autopilot, component.address,
     component.status_stream(IlluminatorStatus, ILLUMINATOR, 'Message/Command/Enum Summary'),
     component.sent_on_request(

@@ -173,6 +173,7 @@ class PayloadChecks(Generic[T]):
     :param mavlink_version: 1 or 2, which the device needs; None if both will do.
     :param component: the component id that alone identifies a device, see :class:`Session`.
     :param traces: what the checks leave, although they restore the device.
+    :param discovery: a message that is requested of all components until a device is found.
     """
 
     payload: str
@@ -189,11 +190,13 @@ class PayloadChecks(Generic[T]):
     mavlink_version: int | None = None
     component: int | None = None
     traces: str = ''
+    discovery: type[Message] | None = None
 
     def session(self, address: Address, target: Address | None = None) -> Session:
         """Return a session with a device, from our address."""
         return Session(
-            address, self.messages, self.is_device, self.describe, target, self.component)
+            address, self.messages, self.is_device, self.describe, target, self.component,
+            self.discovery)
 
 
 # For the command line, which does not use the tester.

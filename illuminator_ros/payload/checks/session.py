@@ -51,6 +51,7 @@ SETTLE_TIME = 0.05
 NO_ANSWER_TIME = 0.7
 LOST_TIMEOUT = 5.0
 REJECTION_PAUSE = 0.3
+DISCOVERY_INTERVAL = 1.0
 
 ATTEMPTS = 4
 REJECTIONS = 12
@@ -206,6 +207,7 @@ class Session(Endpoint):
     :param target: the device; None selects the first that is heard.
     :param component: the component id that alone identifies the device, whose system id changes;
         None if its address stays the same.
+    :param discovery: a message that is requested of all components until the device is found.
     :ivar found: the present address of the device, once it is heard.
     :ivar heard: all senders.
     :ivar devices: the senders that are devices of this payload.
@@ -221,6 +223,7 @@ class Session(Endpoint):
         self, address: Address, payload_messages: Sequence[type[Message]],
         is_device: Callable[[Message], bool], describe: Callable[[Message], str],
         target: Address | None, component: int | None = None,
+        discovery: type[Message] | None = None,
     ) -> None:
         super().__init__()
         self.address = address
@@ -239,6 +242,7 @@ class Session(Endpoint):
             cls: History() for cls in self.messages}
         self._component = component
         self._is_device = is_device
+        self._discovery = discovery
         self._describe = describe
         self._began: float | None = None
         self._last_heard = -math.inf
@@ -348,8 +352,11 @@ class Session(Endpoint):
 
     def send(self, message: Message, sender: Address | None = None) -> None:
         """Send a message from an address, by default our own."""
+        self._give(message, self._describe(message) or message.name, sender)
+
+    def _give(self, message: Message, text: str, sender: Address | None) -> None:
         self.outgoing.append((sender or self.address, message))
-        self._note('>', self._describe(message) or message.name)
+        self._note('>', text + (f' from {sender}' if sender else ''))
 
     def check_presence(self) -> None:
         """
@@ -364,12 +371,18 @@ class Session(Endpoint):
 
     async def find(self, timeout: float, listen: float) -> None:
         """
-        Wait for the device, then listen without sending a command.
+        Wait for the device, ask for it if there is a discovery message, then only listen.
 
         :param timeout: s to wait for the device.
         :param listen: s to listen; :attr:`idle_until` is the end of it.
         """
-        if await self.runner.until(lambda: self.found, timeout):
+        end = self.now + timeout
+        while self.found is None and self.now < end:
+            if self._discovery is not None:
+                self._send(Transaction(MavCmd.REQUEST_MESSAGE, (self._discovery.id,), False),
+                           Address(0, 0))
+            await self.runner.until(lambda: self.found, min(DISCOVERY_INTERVAL, end - self.now))
+        if self.found is not None:
             await self.runner.sleep(listen)
             self.idle_until = self.now
 
@@ -384,20 +397,23 @@ class Session(Endpoint):
 
     async def command(
         self, command: int, *params: float, as_int: bool = False, confirmation: int = 0,
-        target: Address | None = None,
+        target: Address | None = None, sender: Address | None = None,
     ) -> Transaction:
         """
         Send a command, repeatedly while it is not acknowledged or temporarily rejected.
 
         :param as_int: whether it is sent as COMMAND_INT.
         :param target: None for the device.
+        :param sender: the address that sends it, None for ours.
         :raises DeviceLost: if the device has stopped sending.
         """
         for _ in range(REJECTIONS):
-            # Requirements of their own cover COMMAND_INT and other targets.
-            one = self._begin(command, params, expected=not as_int and target is None)
+            # Requirements of their own cover COMMAND_INT and other addresses.
+            one = self._begin(
+                command, params, expected=not as_int and target is None and sender is None)
             for attempt in range(ATTEMPTS):
-                self._send(one, target or self.device, confirmation + attempt, as_int=as_int)
+                self._send(one, target or self.device, confirmation + attempt, as_int=as_int,
+                           sender=sender)
                 if await self._answered(one):
                     break
                 self.check_presence()
@@ -432,6 +448,7 @@ class Session(Endpoint):
 
     def _send(
         self, one: Transaction, target: Address, confirmation: int = 0, *, as_int: bool = False,
+        sender: Address | None = None,
     ) -> None:
         values = [*map(float, one.params), *[0.0] * (7 - len(one.params))]
         message = messages.CommandInt(
@@ -439,9 +456,8 @@ class Session(Endpoint):
         ) if as_int else messages.CommandLong(
             *target, one.command, min(confirmation, 255), *values)
         one.sent.append(self.now)
-        self.outgoing.append((self.address, message))
-        self._note('>', f'{message.name} to {target}: {one.text}'
-                   + (f', confirmation {confirmation}' if confirmation else ''))
+        self._give(message, f'{message.name} to {target}: {one.text}'
+                   + (f', confirmation {confirmation}' if confirmation else ''), sender)
         one.lines.append(self.log[-1])
 
     async def _acknowledged(self, one: Transaction, timeout: float) -> bool:

@@ -1,0 +1,333 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The checks of a gimbal device.
+
+They play its gimbal manager: the component ``--manager`` of the device's system announces itself
+with GIMBAL_MANAGER_STATUS and commands the device.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .attitude import (
+    command_int,
+    CONTENT,
+    continuous,
+    earth_yaw,
+    failures_at_rest,
+    information_static,
+    limits,
+    MOTION,
+    moves,
+    pitch_axis,
+    STATUS,
+    uptime,
+)
+from .tester import (
+    angles_of,
+    describe,
+    free_address,
+    GIMBAL,
+    GimbalTester,
+    LEVEL,
+    NAN,
+    Pose,
+    PROPOSAL,
+    radians,
+    STEP,
+    TOLERANCE,
+    UNSET,
+)
+from .. import messages as gimbal
+from ..messages import Capabilities, GimbalCommand
+from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, MavType, Message
+from ...payload.checks import component_requirements as component
+from ...payload.checks.requirement import (
+    Conditions,
+    Option,
+    PayloadChecks,
+    Requirement,
+    requirement,
+)
+from ...payload.checks.session import Failed, Session, Skipped
+from ...payload.checks.specification import MESSAGES, ROUTING
+from ...payload.mount import MountFlags
+from ...payload.rotation import Quaternion
+from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
+
+# s
+ANNOUNCE_INTERVAL = 0.4
+# MAV_COMP_ID_ONBOARD_COMPUTER
+MANAGER_ID = 191
+VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
+
+
+class DeviceTester(GimbalTester):
+    """
+    Plays the gimbal manager of a device.
+
+    :ivar heading: that is sent to the device with each announcement, degrees; None sends none.
+    """
+
+    information = gimbal.GimbalDeviceInformation
+    status = AttitudeStatus
+
+    def __init__(self, session: Session, conditions: Conditions) -> None:
+        super().__init__(session, conditions)
+        self.heading: float | None = None
+
+    @property
+    def manager(self) -> Address:
+        """Return the address of the manager that is played."""
+        return Address(self.session.device.system,
+                       int(self.conditions.options.get('manager', MANAGER_ID)))
+
+    def announce(self, manager: Address) -> None:
+        """Announce a manager of the device."""
+        self.session.send(heartbeat(MavType.ONBOARD_CONTROLLER), manager)
+        self.session.send(gimbal.GimbalManagerStatus(
+            0, int(LEVEL), self.session.device.component, *manager, 0, 0), manager)
+        if self.heading is not None:
+            q = Quaternion.from_euler(0.0, 0.0, math.radians(self.heading))
+            self.session.send(gimbal.AutopilotStateForGimbalDevice(
+                *self.session.device, int(self.session.now * 1e6), (q.w, q.x, q.y, q.z), 0,
+                NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5), manager)
+
+    async def prepare(self) -> None:
+        """See :class:`GimbalTester`."""
+        await self.pause(2 * ANNOUNCE_INTERVAL)
+
+    async def pause(self, seconds: float) -> None:
+        """See :class:`GimbalTester`."""
+        end = self.session.now + seconds
+        while (left := end - self.session.now) > 0:
+            self.announce(self.manager)
+            await self.session.runner.sleep(min(ANNOUNCE_INTERVAL, left))
+
+    def point(
+        self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
+        rates: tuple[float, float, float] = UNSET, sender: Address | None = None,
+        target: Address | None = None,
+    ) -> None:
+        """See :class:`GimbalTester`; the manager sends it if no other address is given."""
+        self.session.send(gimbal.GimbalDeviceSetAttitude(
+            *(target or self.session.device), flags, angles_of(pose), *radians(rates)),
+            sender or self.manager)
+
+
+# GIMBAL_DEVICE_INFORMATION and GIMBAL_DEVICE_ATTITUDE_STATUS
+
+@requirement('status-to-all', 'sends its attitude to all components (GM-20)', GIMBAL,
+             'Gimbal Device Broadcast/Status Messages', whole_run=True)
+async def status_to_all(tester: DeviceTester) -> str:
+    """Read the target fields."""
+    received = [one for _, one in tester.session.received(AttitudeStatus)]
+    if not received:
+        raise Skipped('none was received')
+    return component.none_of([
+        Failed(f'to {one.target_system}/{one.target_component}', []) for one in received
+        if (one.target_system, one.target_component) != (0, 0)], len(received), 'statuses')
+
+
+@requirement('device-id', 'leaves gimbal_device_id 0, as it is a component of its own', MESSAGES,
+             'GIMBAL_DEVICE_INFORMATION')
+async def device_id(tester: DeviceTester) -> None:
+    """Read it in INFORMATION and in the status."""
+    information = await tester.session.request(gimbal.GimbalDeviceInformation)
+    if information is None:
+        raise Skipped('no GIMBAL_DEVICE_INFORMATION was received')
+    found = {information.gimbal_device_id, *(
+        one.gimbal_device_id for _, one in tester.session.received(AttitudeStatus))}
+    if found != {0}:
+        raise Failed(f'gimbal_device_id {", ".join(map(str, sorted(found)))}')
+
+
+@requirement('north-needs-heading', 'accepts yaw relative to north only with a heading from the '
+             'vehicle (GM-3)', MESSAGES, 'GIMBAL_DEVICE_CAP_FLAGS')
+async def north_needs_heading(tester: DeviceTester) -> None:
+    """Read the statuses before the first command, while nothing sends it a heading."""
+    unknown = [one for _, one in tester.session.idle(AttitudeStatus)
+               if math.isnan(one.delta_yaw)]
+    if not unknown:
+        raise Skipped('it knows the heading')
+    if any(one.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME for one in unknown):
+        raise Failed('it reports ACCEPTS_YAW_IN_EARTH_FRAME, and delta_yaw is NaN')
+
+
+# Setpoints, and their senders
+
+@moves('setpoint', 'turns to an attitude that its manager commands', GIMBAL,
+       'Control of a Gimbal Device')
+async def setpoint(tester: DeviceTester) -> str:
+    """Turn down and right, then back."""
+    await tester.begin()
+    for pitch, yaw in ((-2 * STEP, STEP), (-STEP, 0.0)):
+        target = await tester.target(pitch, yaw)
+        tester.point(target)
+        await tester.reach(target)
+    return str(await tester.pose())
+
+
+async def _ignores(tester: DeviceTester, cause: str, *sources: Address) -> None:
+    before = await tester.begin()
+    for source in sources:
+        tester.point(await tester.target(-2 * STEP, STEP), sender=source)
+    await tester.stays(before, cause)
+
+
+@moves('only-manager', 'ignores setpoints of components that are not its manager (GM-19)', GIMBAL,
+       'Gimbal Manager and Gimbal Device')
+async def only_manager(tester: DeviceTester) -> None:
+    """Send setpoints from our own address and from another component of its system."""
+    await _ignores(tester, 'a setpoint of a component that is not its manager',
+                   tester.session.address, free_address(tester.session))
+
+
+@moves('one-manager', 'keeps its manager while another component announces itself (GM-18)',
+       PROPOSAL, 'Proposed Architecture')
+async def one_manager(tester: DeviceTester) -> None:
+    """Announce a second manager, and send setpoints from it."""
+    before, other = await tester.begin(), free_address(tester.session)
+    tester.announce(other)
+    await tester.pause(2 * ANNOUNCE_INTERVAL)
+    tester.announce(other)
+    await _point_from(tester, other)
+    await tester.stays(before, f'a setpoint of the second manager {other}')
+
+
+async def _point_from(tester: DeviceTester, source: Address) -> None:
+    tester.point(await tester.target(-2 * STEP, STEP), sender=source)
+
+
+@moves('manager-set', 'ignores the messages and commands to gimbal managers (GM-19)', MESSAGES,
+       'GIMBAL_MANAGER_SET_PITCHYAW')
+async def manager_set(tester: DeviceTester) -> None:
+    """Send each of them from its manager."""
+    session, before = tester.session, await tester.begin()
+    pose, device, own = await tester.target(-2 * STEP, STEP), session.device, tester.manager
+    pitch, yaw = math.radians(pose.pitch), math.radians(pose.yaw)
+    ids = (*device, int(LEVEL), device.component)
+    for message in (
+            gimbal.GimbalManagerSetAttitude(*ids, angles_of(pose), *UNSET),
+            gimbal.GimbalManagerSetPitchyaw(*ids, pitch, yaw, NAN, NAN),
+            gimbal.GimbalManagerSetManualControl(*ids, -0.5, 0.5, NAN, NAN),
+            CommandLong(*device, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,
+                        pose.yaw, NAN, NAN, float(LEVEL), 0.0, float(device.component))):
+        session.send(message, own)
+    await tester.stays(before, 'messages to gimbal managers')
+
+
+@moves('other-target', 'ignores setpoints for other components and systems', ROUTING,
+       'Routing Detail')
+async def other_target(tester: DeviceTester) -> None:
+    """Send setpoints to addresses that do not exist."""
+    before, device = await tester.begin(), tester.session.device
+    system = next(n for n in range(240, 0, -1)
+                  if n not in {one.system for one in tester.session.heard})
+    for target in (free_address(tester.session, 200), Address(system, device.component)):
+        tester.point(await tester.target(-2 * STEP, STEP), target=target)
+    await tester.stays(before, 'setpoints for other addresses')
+
+
+# Yaw relative to north
+
+async def _with_heading(tester: DeviceTester, heading: float) -> None:
+    await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+    if any(not math.isnan(one.delta_yaw) for _, one in tester.session.idle(AttitudeStatus)):
+        raise Skipped('another component sends it a heading')
+    await tester.begin()
+    tester.heading = heading
+    await tester.pause(2 * ANNOUNCE_INTERVAL)
+
+
+@moves('earth-frame', 'takes and reports yaw relative to north (GM-2)', MESSAGES,
+       'GIMBAL_DEVICE_SET_ATTITUDE')
+async def earth_frame(tester: DeviceTester) -> str:
+    """Send a heading of 40 degrees, and command a yaw of 55 degrees."""
+    try:
+        await _with_heading(tester, 40.0)
+        tester.point(Pose(0.0, -STEP, 40.0 + STEP), flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
+        target = Pose(0.0, -STEP, STEP)
+        pose = await tester.settle(target)
+        (yaw,) = earth_yaw([pose])
+        if not pose.near(target) or not abs(yaw - 40.0 - STEP) < TOLERANCE:
+            raise Failed(f'commanded {40.0 + STEP:g} deg from north at a heading of 40 deg: it '
+                         f'reports {pose}, {yaw:.1f} deg from north')
+        return f'{yaw:.1f} deg from north'
+    finally:
+        tester.heading = None
+
+
+@moves('yaw-lock', 'holds a locked yaw against north while the vehicle turns (GM-3)', MESSAGES,
+       'GIMBAL_DEVICE_FLAGS')
+async def yaw_lock(tester: DeviceTester) -> str:
+    """Lock it straight ahead, then turn the vehicle."""
+    await tester.requires(Capabilities.HAS_YAW_LOCK)
+    try:
+        await _with_heading(tester, 40.0)
+        tester.point(Pose(0.0, -STEP, 0.0), flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
+        await tester.pause(0.5)
+        tester.heading = 40.0 + STEP
+        target = Pose(0.0, -STEP, -STEP)
+        pose = await tester.settle(target)
+        if not pose.near(target):
+            raise Failed(f'the vehicle turned by {STEP:g} deg, and it reports {pose}')
+        return str(pose)
+    finally:
+        tester.heading = None
+
+
+INFORMATION = gimbal.GimbalDeviceInformation
+REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
+    component.heartbeat,
+    component.heartbeat_type(gimbal.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
+    component.heartbeat_autopilot, component.address,
+    component.status_stream(AttitudeStatus, GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
+    component.sent_on_request('status-request', AttitudeStatus, MESSAGES, STATUS),
+    failures_at_rest, north_needs_heading,
+    component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Device'),
+    information_static(INFORMATION), limits(INFORMATION), pitch_axis(INFORMATION), device_id,
+    component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
+    command_int(INFORMATION),
+    setpoint, *MOTION, earth_frame, yaw_lock, only_manager, one_manager, manager_set,
+    other_target, *component.interval_requirements(AttitudeStatus),
+    component.heartbeat_rate, *CONTENT, status_to_all, continuous, uptime,
+    *component.ACKNOWLEDGEMENTS, component.checksums,
+)
+
+
+def is_device(message: Message) -> bool:
+    """Return whether a message identifies its sender as a gimbal device."""
+    # With a gimbal_device_id it is of a gimbal manager.
+    return (isinstance(message, gimbal.GimbalDeviceInformation | AttitudeStatus)
+            and message.gimbal_device_id == 0
+            or isinstance(message, Heartbeat) and message.type == gimbal.MAV_TYPE_GIMBAL)
+
+
+CHECKS: PayloadChecks[DeviceTester] = PayloadChecks(
+    payload='gimbal', device='gimbal', messages=(INFORMATION, AttitudeStatus),
+    is_device=is_device,
+    evidence='HEARTBEAT with MAV_TYPE_GIMBAL, or GIMBAL_DEVICE_ATTITUDE_STATUS',
+    tester=DeviceTester, requirements=REQUIREMENTS,
+    describe=describe,
+    risk='turn to all sides and to the end of its range',
+    question='Most checks turn gimbal {device}, also to the end of its range and to its '
+             'retracted position.\nAt the end it is turned back.\n'
+             'May gimbal {device} turn? [y/N] ',
+    options=(Option('manager', 'ID', MANAGER_ID, 1, 255,
+                    'component id of the manager that is played, in the system of the gimbal'),),
+    mavlink_version=2)

@@ -1,0 +1,562 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The checks of a gimbal manager: control, setpoints, and the reports on its gimbal.
+
+They play two players: ours, and a second one in the system of the manager. -2 in
+MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE is not checked, since implementations differ in whom it means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+import math
+from typing import Any
+
+from .attitude import (
+    command_int,
+    CONTENT,
+    continuous,
+    earth_yaw,
+    failures_at_rest,
+    information_static,
+    limits,
+    MOTION,
+    moves,
+    pitch_axis,
+    uptime,
+)
+from .tester import (
+    angles_of,
+    Control,
+    control_of,
+    control_text,
+    describe,
+    free_address,
+    GIMBAL,
+    GimbalTester,
+    LEVEL,
+    NAN,
+    Pose,
+    PROPOSAL,
+    radians,
+    RATE,
+    STEP,
+    TOLERANCE,
+    UNSET,
+)
+from .. import messages as gimbal
+from ..messages import Capabilities, GimbalCommand
+from ...mavlink.messages import Address
+from ...payload.checks import component_requirements as component
+from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, requirement
+from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transaction
+from ...payload.checks.specification import MESSAGES, ROUTING
+from ...payload.mount import MountFlags
+from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
+
+INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
+PITCHYAW, CONFIGURE = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW,
+                       GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE)
+VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
+NOBODY = Address(0, 0)
+# s from an acknowledgement to the status that shows the control.
+SHOWN_TIMEOUT = 1.5
+
+controls = partial(requirement, needs_consent=True)
+
+
+class ManagerTester(GimbalTester):
+    """Plays players that take control of a gimbal manager, and command it."""
+
+    information = INFORMATION
+    status = MANAGER_STATUS
+
+    def __init__(self, session: Session, conditions: Conditions) -> None:
+        super().__init__(session, conditions)
+        self._control_before: Control | None = None
+
+    @property
+    def other(self) -> Address:
+        """Return the address of the second player."""
+        return free_address(self.session)
+
+    @property
+    def device_id(self) -> int:
+        """Return the gimbal device that the manager is responsible for, 0 if unknown."""
+        known = self.session.received(MANAGER_STATUS), self.session.received(INFORMATION)
+        return next((int(one[-1][1].gimbal_device_id) for one in known if one), 0)
+
+    # Control
+
+    async def control(self) -> Control:
+        """Return who has control; raise Skipped if the manager does not tell."""
+        streamed = await self.session.receive_more(MANAGER_STATUS, 1.0)
+        message = streamed[-1][1] if streamed else await self.session.request(MANAGER_STATUS)
+        if message is None:
+            raise Skipped('it does not report who has control')
+        return control_of(message)
+
+    async def configure(
+        self, *values: float, sender: Address | None = None, device_id: float | None = None,
+    ) -> Transaction:
+        """Send MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE with four values."""
+        return await self.session.command(
+            CONFIGURE, *values, 0.0, 0.0, self.device_id if device_id is None else device_id,
+            sender=sender)
+
+    async def shown(self, condition: Callable[[Control], bool]) -> Control:
+        """Return the control once it meets a condition, or after a time."""
+        end = self.session.now + SHOWN_TIMEOUT
+        while not condition(control := await self.control()) and self.session.now < end:
+            await self.pause(0.1)
+        return control
+
+    async def take(self, primary: Address, secondary: Address = NOBODY) -> None:
+        """Give control to two players; raise Failed if that is refused or not shown."""
+        one = await self.configure(*primary, *secondary)
+        if not one.accepted:
+            raise one.failure()
+        wanted = (primary, secondary)
+        if (control := await self.shown(lambda control: control == wanted)) != wanted:
+            raise one.failure(f'{one.answer}, and then {control_text(control)}')
+
+    async def prepare(self) -> None:
+        """Take primary control."""
+        if (await self.control())[0] != self.session.address:
+            await self.configure(*self.session.address, *NOBODY)
+            await self.pause(0.3)
+
+    # Setpoints
+
+    def point(
+        self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
+        rates: tuple[float, float, float] = UNSET, sender: Address | None = None,
+        device_id: int | None = None,
+    ) -> None:
+        """See :class:`GimbalTester`: GIMBAL_MANAGER_SET_ATTITUDE of a player."""
+        self.session.send(gimbal.GimbalManagerSetAttitude(
+            *self.session.device, flags, self.device_id if device_id is None else device_id,
+            angles_of(pose), *radians(rates)), sender)
+
+    def send(self, cls: type[Any], pitch: float, yaw: float, pitch_rate: float,
+             yaw_rate: float, sender: Address | None = None) -> None:
+        """Send SET_PITCHYAW (rad) or SET_MANUAL_CONTROL."""
+        self.session.send(
+            cls(*self.session.device, int(LEVEL | VEHICLE_FRAME), self.device_id, pitch, yaw,
+                pitch_rate, yaw_rate), sender)
+
+    async def pitchyaw(
+        self, *values: float, sender: Address | None = None, device_id: float | None = None,
+    ) -> Transaction:
+        """Send MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW with four values, degrees."""
+        return await self.session.command(
+            PITCHYAW, *values, float(LEVEL | VEHICLE_FRAME), 0.0,
+            self.device_id if device_id is None else device_id, sender=sender)
+
+    # Restoring
+
+    async def save(self) -> bool:
+        """See :class:`Tester`."""
+        if self._control_before is None:
+            try:
+                self._control_before = await self.control()
+            except Skipped:
+                return False
+        return await super().save()
+
+    @property
+    def saved(self) -> str:
+        """See :class:`Tester`."""
+        assert self._control_before is not None
+        return f'{super().saved}, control: {control_text(self._control_before)}'
+
+    async def restore(self) -> list[str]:
+        """See :class:`Tester`."""
+        differing, before = await super().restore(), self._control_before
+        assert before is not None
+        try:
+            if await self.control() != before:
+                await self.configure(*before[0], *before[1])
+            if await self.shown(lambda control: control == before) != before:
+                differing.append('control')
+        except Skipped:
+            differing.append('control')
+        return differing
+
+
+# Reports
+
+@requirement('manager-status-request', 'sends GIMBAL_MANAGER_STATUS with the gimbal device of '
+             'its INFORMATION (GM-27)', GIMBAL, 'Mapping from Gimbal Managers to Gimbal Devices')
+async def same_device(tester: ManagerTester) -> str:
+    """Compare the ids."""
+    information = await tester.session.request(INFORMATION)
+    status = await tester.session.request(MANAGER_STATUS)
+    if information is None or status is None:
+        raise Skipped('INFORMATION or STATUS was not received')
+    found = {information.gimbal_device_id, status.gimbal_device_id}
+    if len(found) != 1 or 0 in found:
+        raise Failed(f'gimbal_device_id {information.gimbal_device_id} in INFORMATION, '
+                     f'{status.gimbal_device_id} in STATUS')
+    return f'gimbal device {status.gimbal_device_id}'
+
+
+@requirement('attitude-stream', 'sends the attitude of a gimbal that is not a component of its '
+             'own (GM-22)', GIMBAL, 'Addressing of non-MAVLink gimbal devices')
+async def attitude_stream(tester: ManagerTester) -> str:
+    """Wait for statuses with the id of the gimbal."""
+    if tester.device_id not in gimbal.NON_MAVLINK_IDS:
+        raise Skipped('its gimbal is a MAVLink component of its own')
+    received = [one.gimbal_device_id for _, one in tester.session.received(AttitudeStatus)]
+    if not received:
+        raise Failed('none was received')
+    if set(received) != {tester.device_id}:
+        raise Failed(f'gimbal_device_id {sorted(set(received))}, not {tester.device_id}')
+    return f'{len(received)} statuses'
+
+
+# Control
+
+@controls('take', 'gives primary control to a component that asks, and shows it', GIMBAL,
+          'Starting / Configuring Gimbal Control')
+async def take(tester: ManagerTester) -> str:
+    """Take it."""
+    await tester.take(tester.session.address)
+    return control_text(await tester.control())
+
+
+@controls('release', 'ends the control of a component that releases it', MESSAGES,
+          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+async def release(tester: ManagerTester) -> None:
+    """Send -3."""
+    await tester.prepare()
+    one = await tester.configure(-3, -3, -3, -3)
+    control = await tester.shown(lambda control: control[0] == NOBODY)
+    if not one.accepted or control[0] != NOBODY:
+        raise one.failure(f'{one.answer}, and then {control_text(control)}')
+
+
+@controls('release-others', 'keeps the control of a component when another one releases', MESSAGES,
+          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+async def release_others(tester: ManagerTester) -> None:
+    """Send -3 from two other components: one has our component id, one our system id."""
+    await tester.prepare()
+    own = tester.session.address
+    before = await tester.control()
+    for sender in (Address(tester.other.system, own.component),
+                   Address(own.system, own.component ^ 1)):
+        if sender == own:
+            continue
+        one = await tester.configure(-3, -3, -3, -3, sender=sender)
+        await tester.pause(0.5)
+        if (control := await tester.control()) != before:
+            raise one.failure(f'from {sender}: {control_text(control)}')
+
+
+@controls('secondary', 'gives secondary control, and shows it', MESSAGES,
+          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+async def secondary(tester: ManagerTester) -> None:
+    """Give it to the second player."""
+    try:
+        await tester.take(tester.session.address, tester.other)
+    finally:
+        await tester.configure(-1, -1, 0, 0)
+
+
+@controls('unchanged', 'leaves control as it is at -1', MESSAGES,
+          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+async def unchanged(tester: ManagerTester) -> None:
+    """Send -1."""
+    await tester.prepare()
+    before = await tester.control()
+    one = await tester.configure(-1, -1, -1, -1)
+    await tester.pause(0.5)
+    control = await tester.control()
+    if not one.accepted or control != before:
+        raise one.failure(f'{one.answer}, and then {control_text(control)}')
+
+
+@controls('configure-values', 'rejects ids that do not exist', MESSAGES,
+          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+async def configure_values(tester: ManagerTester) -> None:
+    """Send -4 and 256."""
+    await tester.prepare()
+    sent = [await tester.configure(value, value, -1, -1) for value in (-4, 256)]
+    fail_if([one.failure() if one.accepted or one.result is None else None for one in sent])
+
+
+@controls('one-player', 'obeys one player at a time when a second one takes control (GM-16)',
+          PROPOSAL, 'Proposed Architecture')
+async def one_player(tester: ManagerTester) -> str:
+    """Let the second player take control; the one that the status does not show must not move."""
+    before, other = await tester.begin(), tester.other
+    one = await tester.configure(*other, *NOBODY, sender=other)
+    await tester.pause(0.5)
+    holder = (await tester.control())[0]
+    if one.accepted is not (holder == other):
+        raise one.failure(f'{one.answer}, and then primary {holder}')
+    loser = tester.session.address if holder == other else other
+    tester.point(await tester.target(-2 * STEP, STEP), sender=loser)
+    await tester.stays(before, f'primary {holder}, a setpoint of {loser}')
+    return 'the second player took it at will' if holder == other else 'its holder kept it'
+
+
+# Players without control
+
+@moves('no-control-command', 'rejects MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW of a component without '
+       'control (GM-19)', GIMBAL, 'Starting / Configuring Gimbal Control')
+async def no_control_command(tester: ManagerTester) -> None:
+    """Send it from the second player."""
+    before = await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN, sender=tester.other)
+    await tester.stays(before, f'{one.text} of {tester.other}')
+    if one.accepted:
+        raise one.failure()
+
+
+@moves('no-control-messages', 'ignores setpoint messages of a component without control (GM-19)',
+       GIMBAL, 'Starting / Configuring Gimbal Control')
+async def no_control_messages(tester: ManagerTester) -> None:
+    """Send each of them from the second player."""
+    before = await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    angles = math.radians(target.pitch), math.radians(target.yaw)
+    tester.point(target, sender=tester.other)
+    tester.send(gimbal.GimbalManagerSetPitchyaw, *angles, NAN, NAN, tester.other)
+    tester.send(gimbal.GimbalManagerSetManualControl, NAN, NAN, -0.3, 0.3, tester.other)
+    await tester.stays(before, f'setpoints of {tester.other}')
+
+
+@moves('no-control-roi', 'rejects a region of interest of a component without control (GM-11)',
+       GIMBAL, 'Starting / Configuring Gimbal Control')
+async def no_control_roi(tester: ManagerTester) -> None:
+    """Clear it from the second player, which would turn the gimbal to its neutral position."""
+    await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
+    before = await tester.begin()
+    one = await tester.session.command(
+        GimbalCommand.DO_SET_ROI_NONE, tester.device_id, sender=tester.other)
+    await tester.stays(before, f'{one.text} of {tester.other}')
+    if one.accepted:
+        raise one.failure()
+
+
+# Setpoints
+
+@moves('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
+       'Controlling Gimbal Angle and/or Angular Rate using MAVLink')
+async def set_attitude(tester: ManagerTester) -> str:
+    """Turn down and right."""
+    await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    tester.point(target)
+    await tester.reach(target)
+    return str(await tester.pose())
+
+
+@moves('pitchyaw', 'turns to angles (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)', MESSAGES,
+       'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
+async def pitchyaw(tester: ManagerTester) -> None:
+    """Turn down and right, by command."""
+    await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN)
+    if not one.accepted:
+        raise one.failure()
+    await tester.reach(target)
+
+
+@moves('pitchyaw-rate', 'turns at rates in deg/s (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)', MESSAGES,
+       'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
+async def pitchyaw_rate(tester: ManagerTester) -> str:
+    """Turn down slowly for a second, so that rad/s are noticed and do no harm."""
+    before = await tester.begin()
+    one = await tester.pitchyaw(NAN, NAN, -2.0, 0.0)
+    await tester.pause(1.0)
+    after = await tester.pose()
+    tester.point(None, rates=(NAN, 0.0, 0.0))
+    if not one.accepted:
+        raise one.failure()
+    text = f'commanded -2 deg/s, turned {after.pitch - before.pitch:.1f} deg in 1 s'
+    if not -6.0 < after.pitch - before.pitch < -0.5:
+        raise Failed(text)
+    return text
+
+
+@moves('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
+       'GIMBAL_MANAGER_SET_PITCHYAW')
+async def set_pitchyaw(tester: ManagerTester) -> None:
+    """Turn down and right, by message."""
+    await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    tester.send(gimbal.GimbalManagerSetPitchyaw, math.radians(target.pitch),
+                math.radians(target.yaw), NAN, NAN)
+    await tester.reach(target)
+
+
+@moves('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
+       'Manual Gimbal Control using MAVLink')
+async def manual(tester: ManagerTester) -> str:
+    """Turn down at a fifth of the full rate for a second."""
+    before = await tester.begin()
+    tester.send(gimbal.GimbalManagerSetManualControl, NAN, NAN, -0.2, 0.0)
+    await tester.pause(1.0)
+    after = await tester.pose()
+    tester.send(gimbal.GimbalManagerSetManualControl, NAN, NAN, 0.0, 0.0)
+    text = f'turned {after.pitch - before.pitch:.1f} deg in 1 s'
+    if after.pitch - before.pitch > -0.5:
+        raise Failed(text)
+    return text
+
+
+@moves('one-axis', 'changes one angle and keeps the other (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)',
+       MESSAGES, 'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
+async def one_axis(tester: ManagerTester) -> None:
+    """Set the pitch only."""
+    before = await tester.begin()
+    target = await tester.target(-2 * STEP, before.yaw)
+    one = await tester.pitchyaw(target.pitch, NAN, NAN, NAN)
+    if not one.accepted:
+        raise one.failure()
+    await tester.reach(target)
+
+
+@moves('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)', MESSAGES,
+       'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
+async def angles_with_rates(tester: ManagerTester) -> None:
+    """Send an attitude and rates in one message."""
+    await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    tester.point(target, rates=(3 * RATE, 3 * RATE, 3 * RATE))
+    await tester.reach(target)
+
+
+@moves('earth-frame', 'takes yaw relative to north (GM-2)', MESSAGES, 'GIMBAL_MANAGER_FLAGS')
+async def earth_frame(tester: ManagerTester) -> str:
+    """Command a yaw relative to north without locking it."""
+    start = await tester.begin()
+    if not abs(start.heading) > 2 * TOLERANCE:
+        raise Skipped('it does not report delta_yaw' if math.isnan(start.heading) else
+                      'the vehicle heads north, where both frames are the same')
+    target = await tester.target(-STEP, STEP)
+    (yaw,) = earth_yaw([Pose(0.0, target.pitch, target.yaw, heading=start.heading)])
+    tester.point(Pose(0.0, target.pitch, yaw), flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
+    pose = await tester.settle(target)
+    if not pose.near(target):
+        raise Failed(f'commanded {yaw:.1f} deg from north at a heading of '
+                     f'{start.heading:.1f} deg: it reports {pose}')
+    return f'{yaw:.1f} deg from north'
+
+
+@moves('flags-shown', 'shows the flags of the setpoint in GIMBAL_MANAGER_STATUS', MESSAGES,
+       'GIMBAL_MANAGER_STATUS')
+async def flags_shown(tester: ManagerTester) -> None:
+    """Command NEUTRAL, and read the status."""
+    await tester.requires(Capabilities.HAS_NEUTRAL)
+    await tester.begin()
+    tester.point(None, flags=MountFlags.NEUTRAL | LEVEL)
+    await tester.pause(0.5)
+    streamed = await tester.session.receive_more(MANAGER_STATUS, 1.0)
+    if not streamed:
+        raise Skipped('no GIMBAL_MANAGER_STATUS was received')
+    if not (flags := streamed[-1][1].flags) & MountFlags.NEUTRAL:
+        raise Failed(f'flags 0x{flags:x}')
+
+
+@moves('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)', GIMBAL,
+       'Addressing of Gimbal MAVLink Devices')
+async def other_device(tester: ManagerTester) -> None:
+    """Send them for a device that does not exist."""
+    before = await tester.begin()
+    device_id = next(n for n in (6, 175) if n != tester.device_id)
+    target = await tester.target(-2 * STEP, STEP)
+    tester.point(target, device_id=device_id)
+    one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN, device_id=device_id)
+    await tester.stays(before, f'setpoints for gimbal device {device_id}')
+    if one.accepted:
+        raise one.failure()
+
+
+@moves('other-target', 'ignores setpoints and commands for other components', ROUTING,
+       'Routing Detail')
+async def other_target(tester: ManagerTester) -> None:
+    """Send them to a component that does not exist."""
+    before, session = await tester.begin(), tester.session
+    other, pose = free_address(session, 200), await tester.target(-2 * STEP, STEP)
+    session.send(gimbal.GimbalManagerSetAttitude(
+        *other, int(LEVEL | VEHICLE_FRAME), tester.device_id, angles_of(pose), *UNSET))
+    one = await session.send_to_other(
+        other, PITCHYAW, pose.pitch, pose.yaw, NAN, NAN, float(LEVEL), 0.0, tester.device_id)
+    await tester.stays(before, f'setpoints for {other}')
+    if one.acks:
+        raise one.failure(f'answered a command for {other}: {one.answer}')
+
+
+@moves('all-devices', 'takes gimbal device 0 for all of its gimbals (GM-28)', GIMBAL,
+       'Addressing of Gimbal MAVLink Devices')
+async def all_devices(tester: ManagerTester) -> None:
+    """Send a setpoint for device 0."""
+    await tester.begin()
+    target = await tester.target(-2 * STEP, STEP)
+    tester.point(target, device_id=0)
+    await tester.reach(target)
+
+
+@moves('roi', 'accepts a region of interest, and its end (GM-8)', GIMBAL,
+       'Gimbal Manager Messages')
+async def roi(tester: ManagerTester) -> None:
+    """Set one far below the horizon, as COMMAND_INT, and clear it."""
+    await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
+    await tester.begin()
+    sent = [await tester.session.command(
+        GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id)]
+    await tester.pause(0.5)
+    sent.append(await tester.session.command(GimbalCommand.DO_SET_ROI_NONE, tester.device_id))
+    fail_if([None if one.accepted else one.failure() for one in sent])
+
+
+REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
+    component.heartbeat, component.address,
+    component.status_stream(MANAGER_STATUS, GIMBAL, 'Gimbal Manager Status'),
+    component.sent_on_request('status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.name),
+    failures_at_rest,
+    component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Manager'),
+    information_static(INFORMATION), limits(INFORMATION), pitch_axis(INFORMATION), same_device,
+    attitude_stream,
+    component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
+    command_int(INFORMATION),
+    take, release, unchanged, release_others, secondary, configure_values, one_player,
+    set_attitude, *MOTION, angles_with_rates, set_pitchyaw, pitchyaw, pitchyaw_rate, one_axis,
+    manual, earth_frame, flags_shown, roi,
+    no_control_command, no_control_messages, no_control_roi, other_device, all_devices,
+    other_target,    *component.interval_requirements(MANAGER_STATUS),
+    component.heartbeat_rate, *CONTENT, continuous, uptime,
+    *component.ACKNOWLEDGEMENTS, component.checksums,
+)
+
+
+CHECKS: PayloadChecks[ManagerTester] = PayloadChecks(
+    payload='gimbal_manager', device='gimbal manager',
+    messages=(INFORMATION, MANAGER_STATUS, AttitudeStatus),
+    is_device=lambda message: isinstance(message, INFORMATION | MANAGER_STATUS),
+    evidence='GIMBAL_MANAGER_STATUS or GIMBAL_MANAGER_INFORMATION',
+    tester=ManagerTester, requirements=REQUIREMENTS, describe=describe,
+    risk='give control away, and turn its gimbal to all sides and to the end of its range',
+    question='Most checks take control of gimbal manager {device}, and turn its gimbal, also to '
+             'the end of its\nrange and to its retracted position. At the end it is turned back, '
+             'and control is restored.\nMay the checks control gimbal manager {device}? [y/N] ',
+    mavlink_version=2, discovery=INFORMATION)

@@ -1,0 +1,350 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The testers of gimbals: they move a gimbal, watch its attitude, and bring it back."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from typing import Any, NamedTuple
+
+from .. import messages as gimbal
+from ..messages import Capabilities
+from ...mavlink.messages import Address, Message
+from ...payload.checks.component_requirements import restore_interval
+from ...payload.checks.requirement import Conditions
+from ...payload.checks.session import Failed, Session, Skipped
+from ...payload.checks.specification import Specification
+from ...payload.mount import MountFlags, yaw_frame, YawFrame
+from ...payload.rotation import Quaternion
+from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
+
+GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
+PROPOSAL = Specification(
+    'gimbal proposal', 'https://docs.google.com/document/d/'
+    '16pekKRXLN2FhlL9YNFP983cjfBKAsDwN0gOSks8USo4')
+
+# s
+MOVE_TIMEOUT = 8.0
+# In which a gimbal that must not move would begin to.
+WATCH_TIME = 1.0
+POLL = 0.1
+# After which a gimbal that passes a pose is away from it.
+SETTLE_TIME = 0.4
+# Degrees.
+TOLERANCE = 3.0
+STEP = 15.0
+RATE = 6.0
+NAN = math.nan
+UNSET = (NAN, NAN, NAN)
+LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+Control = tuple[Address, Address]
+_LIMIT_NAMES = [f'{axis}_{end}' for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """
+    An attitude as a gimbal reports it, degrees.
+
+    :param yaw: relative to the vehicle.
+    :param heading: of the vehicle, NaN if unknown.
+    """
+
+    roll: float
+    pitch: float
+    yaw: float
+    flags: int = 0
+    failures: int = 0
+    heading: float = NAN
+
+    @classmethod
+    def from_message(cls, message: AttitudeStatus) -> Pose:
+        """
+        Read a status.
+
+        :raises ValueError: if it has no attitude relative to the vehicle.
+        """
+        roll, pitch, yaw = Quaternion(*message.q).normalized().euler()
+        if yaw_frame(message.flags) is YawFrame.EARTH:
+            yaw = math.remainder(yaw - message.delta_yaw, math.tau)
+        if math.isnan(yaw):
+            raise ValueError('yaw is relative to north, and delta_yaw is not known')
+        return cls(math.degrees(roll), math.degrees(pitch), math.degrees(yaw), message.flags,
+                   message.failure_flags, math.degrees(message.delta_yaw))
+
+    def near(self, other: Pose, tolerance: float = TOLERANCE) -> bool:
+        """Return whether another pose is the same within a tolerance, degrees."""
+        return (abs(self.pitch - other.pitch) < tolerance
+                and abs(math.remainder(self.yaw - other.yaw, 360.0)) < tolerance)
+
+    def __str__(self) -> str:
+        return f'pitch {self.pitch:.1f}, yaw {self.yaw:.1f} deg'
+
+
+class Limits(NamedTuple):
+    """The ranges and capabilities of an INFORMATION message; NaN for unknown, degrees."""
+
+    roll_min: float
+    roll_max: float
+    pitch_min: float
+    pitch_max: float
+    yaw_min: float
+    yaw_max: float
+    capabilities: int
+
+    @classmethod
+    def from_message(cls, message: Any) -> Limits:
+        """Read GIMBAL_DEVICE_INFORMATION or GIMBAL_MANAGER_INFORMATION."""
+        return cls(capabilities=getattr(message, 'cap_flags2', 0) or message.cap_flags,
+                   **{name: math.degrees(getattr(message, name)) for name in _LIMIT_NAMES})
+
+
+def describe(message: Message) -> str:
+    """Return a message of the gimbal protocol in one line, '' for its name."""
+    if isinstance(message, AttitudeStatus):
+        try:
+            text = str(Pose.from_message(message))
+        except ValueError as error:
+            text = str(error)
+        return f'{message.name} {text}, flags {message.flags}, failures {message.failure_flags}'
+    if isinstance(message, gimbal.GimbalManagerStatus):
+        return f'{message.name} {control_text(control_of(message))}, flags {message.flags}'
+    if isinstance(message, gimbal.GimbalDeviceSetAttitude | gimbal.GimbalManagerSetAttitude):
+        angles = 'no attitude'
+        if all(map(math.isfinite, message.q)):
+            _, pitch, yaw = map(math.degrees, Quaternion(*message.q).euler())
+            angles = f'pitch {pitch:.1f}, yaw {yaw:.1f} deg'
+        rates = ' '.join(f'{math.degrees(rate):g}' for rate in (
+            message.angular_velocity_y, message.angular_velocity_z))
+        return f'{message.name} {angles}, rates {rates} deg/s, flags {message.flags}'
+    return ''
+
+
+def control_text(control: Control) -> str:
+    """Return who has control."""
+    return ', '.join(f'{name} {one if any(one) else "none"}'
+                     for name, one in zip(('primary', 'secondary'), control, strict=True))
+
+
+def control_of(message: gimbal.GimbalManagerStatus) -> Control:
+    """Return primary and secondary control of a status."""
+    return (Address(message.primary_control_sysid, message.primary_control_compid),
+            Address(message.secondary_control_sysid, message.secondary_control_compid))
+
+
+class GimbalTester(ABC):
+    """
+    Moves a gimbal; checks get it.
+
+    :cvar information: the class of the INFORMATION message.
+    :cvar status: the class whose interval is restored.
+    """
+
+    information: type[Any]
+    status: type[Message]
+
+    def __init__(self, session: Session, conditions: Conditions) -> None:
+        self.session = session
+        self.conditions = conditions
+        self._before: Pose | None = None
+        self._limits: Limits | None = None
+
+    # Reports
+
+    async def pose(self) -> Pose:
+        """
+        Return the present attitude.
+
+        :raises Skipped: if the gimbal does not report one.
+        """
+        streamed = await self.session.receive_more(AttitudeStatus, 1.0)
+        message = streamed[-1][1] if streamed else await self.session.request(AttitudeStatus)
+        if message is None:
+            raise Skipped('it does not report its attitude')
+        try:
+            return Pose.from_message(message)
+        except ValueError as error:
+            raise Skipped(f'its attitude cannot be read: {error}') from error
+
+    async def limits(self) -> Limits:
+        """
+        Return what the gimbal can do.
+
+        :raises Skipped: if it does not tell.
+        """
+        if self._limits is None:
+            message = await self.session.request(self.information)
+            if message is None:
+                raise Skipped(f'no {self.information.name} was received')
+            self._limits = Limits.from_message(message)
+        return self._limits
+
+    async def requires(self, capability: Capabilities) -> None:
+        """Raise Skipped if the gimbal does not have a capability."""
+        if not (await self.limits()).capabilities & capability:
+            raise Skipped(f'it does not have {capability.name}')
+
+    # Moving
+
+    @abstractmethod
+    async def prepare(self) -> None:
+        """Get into the position to move it."""
+
+    @abstractmethod
+    def point(
+        self, pose: Pose | None, *, flags: int = LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME,
+        rates: tuple[float, float, float] = UNSET,
+    ) -> None:
+        """Send a setpoint: an attitude if there is one, and rates, deg/s."""
+
+    async def pause(self, seconds: float) -> None:
+        """Let time pass, and send what must be sent regularly."""
+        await self.session.runner.sleep(seconds)
+
+    async def until(
+        self, condition: Callable[[Pose], bool], timeout: float = MOVE_TIMEOUT,
+    ) -> Pose:
+        """Return the first pose that meets a condition, or the last one before the timeout."""
+        end = self.session.now + timeout
+        while not condition(pose := await self.pose()) and self.session.now < end:
+            await self.pause(POLL)
+        return pose
+
+    async def steady(self) -> Pose:
+        """Return a pose that two statuses in succession show."""
+        end, pose = self.session.now + 1.0, await self.pose()
+        while not pose.near(now := await self.pose()) and self.session.now < end:
+            pose = now
+        return now
+
+    async def settle(self, pose: Pose) -> Pose:
+        """Return the pose once the gimbal stands still at a wanted one, or after a time."""
+        end = self.session.now + MOVE_TIMEOUT
+        while True:
+            await self.until(pose.near, end - self.session.now)
+            # It may only have passed by.
+            await self.pause(SETTLE_TIME)
+            if pose.near(now := await self.pose()) or self.session.now >= end:
+                return now
+
+    async def reach(self, pose: Pose) -> None:
+        """Raise Failed if the gimbal does not turn to a pose, and stay there."""
+        reached = await self.settle(pose)
+        if not pose.near(reached):
+            raise Failed(f'commanded {pose}, reached {reached} after {MOVE_TIMEOUT:g} s')
+
+    async def target(self, pitch: float, yaw: float) -> Pose:
+        """Return a pose within the ranges; an axis that it lacks stays where it is."""
+        try:
+            limits = await self.limits()
+        except Skipped:
+            return Pose(0.0, pitch, yaw)
+        now = await self.pose()
+
+        def clipped(angle: float, low: float, high: float) -> float:
+            return angle if math.isnan(low) or math.isnan(high) or low > high else min(
+                max(angle, 0.9 * low), 0.9 * high)
+
+        return Pose(
+            0.0,
+            clipped(pitch, limits.pitch_min, limits.pitch_max)
+            if limits.capabilities & Capabilities.HAS_PITCH_AXIS else now.pitch,
+            clipped(yaw, limits.yaw_min, limits.yaw_max)
+            if limits.capabilities & Capabilities.HAS_YAW_AXIS else now.yaw)
+
+    async def begin(self) -> Pose:
+        """Bring it to the pose that checks start from, as far as it obeys; return its pose."""
+        await self.prepare()
+        start = await self.target(-STEP, 0.0)
+        if not start.near(await self.pose()):
+            self.point(start)
+        return await self.until(start.near)
+
+    async def stays(self, before: Pose, cause: str, seconds: float = WATCH_TIME) -> None:
+        """Raise Failed if the gimbal moves."""
+        end = self.session.now + seconds
+        # Two in succession, because "continuous" covers a wrong status.
+        away = 0
+        while away < 2 and self.session.now < end:
+            pose = await self.pose()
+            away = 0 if pose.near(before) else away + 1
+            await self.pause(POLL)
+        if away == 2:
+            raise Failed(f'{cause}: it moved from {before} to {pose}')
+
+    # Restoring
+
+    async def save(self) -> bool:
+        """See :class:`Tester`."""
+        if self._before is None:
+            try:
+                self._before = await self.pose()
+            except Skipped:
+                return False
+        return True
+
+    @property
+    def saved(self) -> str:
+        """See :class:`Tester`."""
+        return str(self._before)
+
+    async def restore(self) -> list[str]:
+        """See :class:`Tester`."""
+        before = self._before
+        assert before is not None
+        differing = []
+        try:
+            now = await self.pose()
+            same_mode = not (now.flags ^ before.flags) & ~MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+            if self.conditions.consent and not (now.near(before, 1.0) and same_mode):
+                await self.prepare()
+                await self._turn_back(before)
+            if not (await self.until(lambda pose: pose.near(before), 1.0)).near(before):
+                differing = ['attitude']
+        except Skipped:
+            differing = ['attitude']
+        await restore_interval(self.session, self.status)
+        return differing
+
+    async def _turn_back(self, before: Pose) -> None:
+        frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+        self.point(before, flags=before.flags & ~frames | MountFlags.YAW_IN_VEHICLE_FRAME)
+        await self.until(lambda pose: pose.near(before, 1.0))
+        # Until it stands still.
+        await self.pause(0.5)
+
+
+def angles_of(pose: Pose | None) -> tuple[float, float, float, float]:
+    """Return the quaternion of a pose for a message, NaN without one."""
+    if pose is None:
+        return (NAN,) * 4
+    q = Quaternion.from_euler(*map(math.radians, (pose.roll, pose.pitch, pose.yaw)))
+    return q.w, q.x, q.y, q.z
+
+
+def radians(rates: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return rates in rad/s."""
+    one, two, three = map(math.radians, rates)
+    return one, two, three
+
+
+def free_address(session: Session, first: int = 192) -> Address:
+    """Return an address of the device's system from which nothing was heard."""
+    taken = session.heard | {session.address}
+    return next(one for component in range(first, 256)
+                if (one := Address(session.device.system, component)) not in taken)

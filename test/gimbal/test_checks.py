@@ -1,0 +1,280 @@
+"""The checks of gimbal devices and managers: each fault is found by exactly what it breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+from typing import Any
+
+from illuminator_ros.gimbal import messages as gimbal
+from illuminator_ros.gimbal import simulated_device, simulated_manager
+from illuminator_ros.gimbal.checks import device, manager
+from illuminator_ros.gimbal.messages import GimbalCommand
+from illuminator_ros.gimbal.simulated_motion import UNSET
+from illuminator_ros.mavlink.messages import Address, CommandLong
+from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
+from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.simulated import SimulatedType
+from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
+import pytest
+from support.gimbal_checks import GimbalRun
+
+KINDS: dict[str, tuple[PayloadChecks[Any], SimulatedType[Any]]] = {
+    'gimbal': (device.CHECKS, simulated_device.SIMULATED),
+    'gimbal_manager': (manager.CHECKS, simulated_manager.SIMULATED)}
+every_kind = pytest.mark.parametrize('kind', KINDS)
+
+# The faults that both can have, and the requirements that each breaks.
+COMMON = {
+    'silence': {'heartbeat'},
+    'slow': {'acknowledged-promptly'},
+    'heartbeat': {'heartbeat-rate'},
+    'no-int': {'command-int'},
+    'no-broadcast': {'broadcast'},
+    'any-target': {'other-target'},
+    'no-stop': {'interval-stop'},
+    'fixed-rate': {'interval'},
+    'unknown': {'unknown-command', 'unknown-message'},
+    'no-request': {'status-request'},
+    'no-resume': {'interval-default'},
+    'misaddress': {'acknowledged-to-us'},
+    'jumps': {'continuous'},
+    'no-frame': {'yaw-frame'},
+    'flags': {'failures-at-rest'},
+    'no-identity': {'information'},
+    'changing-identity': {'information-static'},
+    'no-limits': {'range'},
+    'runaway': {'stop'},
+}
+POINTING = {'set-attitude', 'set-pitchyaw', 'pitchyaw', 'one-axis', 'angles-with-rates',
+            'all-devices', 'earth-frame'}
+TURNING = {'rate', 'pitchyaw-rate', 'manual'}
+SEEDED = {
+    'gimbal': {
+        **COMMON,
+        'type': {'heartbeat-type'},
+        'autopilot': {'heartbeat-autopilot'},
+        'lie': {'setpoint', 'rate', 'neutral', 'retract', 'earth-frame', 'yaw-lock'},
+        'frozen-axis': {'setpoint', 'rate', 'earth-frame', 'yaw-lock'},
+        'obeys-everybody': {'only-manager', 'one-manager'},
+        'no-status': {'status-stream', 'status-request'},
+        'stale-flags': {'neutral', 'retract'},
+        'false-north': {'north-needs-heading'},
+        'manager-set': {'manager-set'},
+    },
+    'gimbal_manager': {
+        **COMMON,
+        'refuse': {'take', 'release', 'unchanged', 'secondary', 'neutral', 'retract',
+                   'flags-shown', 'roi', *POINTING, *TURNING},
+        'progress': {'finished'},
+        'busy': {'not-busy'},
+        'disobey': {'no-control-command', 'no-control-roi'},
+        'lie': {'take', 'secondary', 'one-player', 'roi', 'neutral', 'retract',
+                'flags-shown', *POINTING, *TURNING},
+        'frozen-axis': {*POINTING, *TURNING},
+        'obeys-everybody': {'no-control-command', 'no-control-messages', 'one-player'},
+        'no-status': {'status-stream', 'status-request', 'attitude-stream'},
+        'stale-flags': {'neutral', 'retract', 'flags-shown'},
+        'stale-control': {'take', 'secondary', 'one-player'},
+    },
+}
+# Found at random, or with others that depend on when they strike.
+RANDOM = {'drop': 'acknowledged', 'duplicate': 'acknowledged-once', 'corrupt': 'checksums',
+          'delay': 'acknowledged-promptly', 'reboot': 'uptime'}
+PROFILES: dict[str, set[str]] = {
+    'reference': set(),
+    'px4': {'secondary', 'release-others', 'configure-values', 'no-control-roi', 'other-device',
+            'pitchyaw-rate', 'set-pitchyaw', 'one-axis', 'earth-frame'},
+    'ardupilot': {'secondary', 'one-player', 'no-control-command', 'no-control-messages',
+                  'no-control-roi', 'angles-with-rates', 'one-axis', 'manual', 'earth-frame',
+                  'flags-shown', 'limit-flags'},
+}
+
+
+def run(kind: str, *faults: str, **settings: Any) -> GimbalRun:
+    if kind == 'gimbal_manager':
+        settings = {'heading': 40.0, **settings}
+    return GimbalRun(*KINDS[kind], *faults, **settings)
+
+
+@pytest.mark.parametrize(('kind', 'fault'), [
+    (kind, fault) for kind, faults in SEEDED.items() for fault in faults])
+def test_a_fault_fails_exactly_its_requirements(kind: str, fault: str) -> None:
+    assert run(kind, fault).finish().failed == SEEDED[kind][fault]
+
+
+@every_kind
+@pytest.mark.parametrize('fault', RANDOM)
+def test_a_random_fault_fails_its_requirement(kind: str, fault: str) -> None:
+    assert RANDOM[fault] in run(kind, fault).finish().failed
+
+
+@every_kind
+def test_a_gimbal_without_faults_meets_every_requirement_and_is_turned_back(kind: str) -> None:
+    done = run(kind).finish()
+    assert done.names(Verdict.PASS) == {one.name for one in done.checks.requirements}
+    assert done.runner.passed
+    assert done.runner.restored == f'the {done.checks.device} is as it was'
+
+
+@pytest.mark.parametrize('profile', PROFILES)
+def test_a_profile_fails_exactly_its_known_deviations(profile: str) -> None:
+    assert simulated_manager.PROFILES.keys() == PROFILES.keys()
+    done = run('gimbal_manager', profile=profile).finish()
+    assert done.failed == PROFILES[profile]
+    assert done.runner.restored == 'the gimbal manager is as it was'
+
+
+# Deviations that no fault of the simulator has
+
+def _changed(cls: type[Any], **fields: Any) -> Callable[[GimbalRun], None]:
+    def seed(one: GimbalRun) -> None:
+        original = one.device.message
+
+        def message(message_id: int, now: float) -> Any:
+            found = original(message_id, now)
+            return replace(found, **fields) if isinstance(found, cls) else found
+        one.device.message = message
+    return seed
+
+
+def _moves_when_unset(one: GimbalRun) -> None:
+    mount = one.device.mount
+    original = mount.set
+
+    def moved(flags: int, frame: YawFrame, angles: Any, rates: Any, *others: Any) -> None:
+        unset = all(map(math.isnan, (*angles, *rates))) and not flags & 3
+        original(flags, frame, (0.0, 0.5, 0.0) if unset else angles, UNSET if unset else rates,
+                 *others)
+    mount.set = moved
+
+
+def _forgets_at_minus_1(one: GimbalRun) -> None:
+    original = one.device.execute
+
+    def execute(source: Address, command: Any, now: float) -> Any:
+        unchanged = command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE and (
+            command.param1 == command.param3 == -1)
+        return original(source, replace(
+            command, param1=0.0, param2=0.0) if unchanged else command, now)
+    one.device.execute = execute
+
+
+def _silent_at(param: float) -> Callable[[GimbalRun], None]:
+    def seed(one: GimbalRun) -> None:
+        original = one.device.receive
+        one.device.receive = lambda source, message, now: () if getattr(
+            message, 'gimbal_device_id', None) == param else original(source, message, now)
+    return seed
+
+
+INFORMATION, STATUS = gimbal.GimbalDeviceInformation, gimbal.GimbalManagerStatus
+DEVIATIONS = {
+    ('gimbal', 'device-id'): _changed(INFORMATION, gimbal_device_id=3),
+    ('gimbal', 'limits'): _changed(INFORMATION, roll_min=1.0),
+    ('gimbal', 'pitch-axis'): _changed(INFORMATION, cap_flags2=256),
+    ('gimbal', 'attitude'): _changed(AttitudeStatus, q=(0.5, 0.0, 0.0, 0.0)),
+    ('gimbal', 'status-to-all'): _changed(AttitudeStatus, target_system=1),
+    ('gimbal', 'limit-flags'): _changed(AttitudeStatus, failure_flags=0),
+    ('gimbal', 'hold'): _moves_when_unset,
+    ('gimbal_manager', 'hold'): _moves_when_unset,
+    ('gimbal_manager', 'manager-status-request'): _changed(STATUS, gimbal_device_id=2),
+    ('gimbal_manager', 'attitude-stream'): _changed(AttitudeStatus, gimbal_device_id=0),
+    ('gimbal_manager', 'attitude'): _changed(AttitudeStatus, q=(0.5, 0.0, 0.0, 0.0)),
+    ('gimbal_manager', 'limits'): _changed(gimbal.GimbalManagerInformation, roll_min=1.0),
+    ('gimbal_manager', 'pitch-axis'): _changed(gimbal.GimbalManagerInformation, cap_flags=256),
+    ('gimbal_manager', 'unchanged'): _forgets_at_minus_1,
+    ('gimbal_manager', 'all-devices'): _silent_at(0),
+}
+
+
+@pytest.mark.parametrize(('kind', 'name'), DEVIATIONS)
+def test_a_deviation_fails_its_requirement(kind: str, name: str) -> None:
+    one = run(kind, only=(name,))
+    DEVIATIONS[kind, name](one)
+    assert name in one.finish().failed
+
+
+@every_kind
+def test_every_fault_is_seeded_and_every_requirement_can_fail(kind: str) -> None:
+    checks, simulated = KINDS[kind]
+    assert set(simulated.device.faults) == {*SEEDED[kind], *RANDOM}
+    found = set().union(*SEEDED[kind].values(), RANDOM.values(), *PROFILES.values(),
+                        {name for one, name in DEVIATIONS if one == kind})
+    # test/conformance covers the address, and changes by command, of which a device has none.
+    others = {'address'} if kind == 'gimbal_manager' else {'address', 'finished', 'not-busy'}
+    assert {one.name for one in checks.requirements} - found == others
+
+
+# Consent and restoring
+
+@every_kind
+def test_without_consent_nothing_moves_and_nobody_gets_control(kind: str) -> None:
+    one = run(kind, consent=False)
+    one.device.mount.motion.turn(-0.5, 0.4, one.link.now)
+    one.finish()
+    assert one.device.mount.motion.angles == (0.0, -0.5, 0.4)
+    assert getattr(one.device, 'primary', Address(0, 0)) == Address(0, 0)
+    assert one.failed == set()
+    assert {found.requirement.name for found in one.runner.results
+            if 'not agreed to; see --yes' in found.detail
+            } == {found.name for found in one.checks.requirements if found.needs_consent}
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('after', [5.0, 12.0, 20.0, 31.0])
+def test_an_interrupted_run_turns_the_gimbal_back(kind: str, after: float) -> None:
+    one = run(kind)
+    motion = one.device.mount.motion
+    motion.turn(-0.5, 0.4, one.link.now)
+    one.link.run(after)
+    one.session.interrupt(one.link.now)
+    one.finish()
+    assert motion.angles == pytest.approx((0.0, -0.5, 0.4), abs=0.01)
+    assert one.runner.restored in ('nothing was changed', f'the {one.checks.device} is as it was')
+
+
+def test_control_is_given_back_to_the_player_that_had_it() -> None:
+    one = run('gimbal_manager')
+    player = Address(1, 195)
+    one.component.receive(player, CommandLong(
+        1, 154, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, *player, 0, 0, 0),
+        one.link.now)
+    one.finish()
+    assert one.failed == set()
+    assert (one.device.primary, one.device.secondary) == (player, player)
+
+
+def test_a_gimbal_that_cannot_be_turned_back_is_reported_with_its_former_pose() -> None:
+    one = run('gimbal')
+    one.device.mount.motion.turn(-0.5, 0.0, one.link.now)
+    one.link.run(15.0)
+    one.component.behave(one.device.faults.add(one.device.behaviour, 'lie'), one.link.now)
+    one.finish()
+    assert one.runner.restored == (
+        'THE GIMBAL IS NOT AS IT WAS (attitude): it was pitch -28.6, yaw 0.0 deg')
+    assert not one.runner.passed
+
+
+@every_kind
+def test_the_gimbal_keeps_its_yaw_lock(kind: str) -> None:
+    one = run(kind, drift=0.0)
+    motion, lock = one.device.mount.motion, MountFlags.YAW_LOCK | MountFlags.PITCH_LOCK
+    motion.set(lock, YawFrame.VEHICLE, (0.0, -0.2, 0.1), UNSET, one.link.now)
+    one.finish()
+    assert motion.flags == lock
+    assert motion.angles[1:] == pytest.approx((-0.2, 0.1), abs=0.05)
+
+
+def test_a_manager_without_its_status_is_found_by_its_information() -> None:
+    one = run('gimbal_manager', 'no-status', only=('heartbeat', 'status-stream')).finish()
+    assert one.session.found == Address(1, 154)
+    assert one.failed == {'status-stream'}
+
+
+def test_the_heading_of_another_component_leaves_north_unchecked() -> None:
+    one = run('gimbal', only=('north-needs-heading', 'earth-frame', 'yaw-lock'))
+    one.device.mount.motion.take_heading(0.0, 0.0, 0.3, 0.0, one.link.now, math.inf)
+    assert one.finish().names(Verdict.SKIPPED) == {
+        'north-needs-heading', 'earth-frame', 'yaw-lock'}
