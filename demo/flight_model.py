@@ -38,8 +38,9 @@ FIX_RATE, ATTITUDE_RATE = 12.5, 20.0
 # s between images; s for which the camera uses injected state; s without a fix, without a link,
 # and after that.
 IMAGE_INTERVAL, VALIDITY, OUTAGE, PULL, RETURN = 0.5, 5.0, 8.0, 3.0, 12.0
-# The place of the take-off, degrees and m above mean sea level; and the ellipsoid below that, m.
-LATITUDE, LONGITUDE, ALTITUDE, GEOID = 47.397742, 8.545594, 488.0, -47.3
+# The place of the take-off, degrees and m above mean sea level; and the height of mean sea level
+# above the ellipsoid, m.
+LATITUDE, LONGITUDE, ALTITUDE, GEOID = 47.397742, 8.545594, 488.0, 48.0
 METRES_PER_DEGREE = 111_319.49
 # m from the truth at the time of the image, for a fix that is not older than one interval; m from
 # the truth at the time of the fix, for any; degrees from the truth within MAX_DELAY.

@@ -456,4 +456,5 @@ def properties(settings: Values, address: Address) -> GimbalProperties:
 SIMULATED = SimulatedType(
     'gimbal', 'gimbals', SimulatedGimbal,
     make=lambda settings, address, several: SimulatedGimbal(properties(settings, address)),
-    address=lambda settings: GimbalProperties.address, settings=SETTINGS)
+    address=lambda settings: GimbalProperties.address, settings=SETTINGS,
+    mavlink_version=2)

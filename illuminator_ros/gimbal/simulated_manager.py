@@ -514,5 +514,5 @@ SIMULATED = SimulatedType(
     'manager', 'managers', SimulatedManager,
     make=lambda settings, address, several: SimulatedManager(
         manager_properties(settings, address)),
-    address=lambda settings: _profile(settings).address, settings=SETTINGS,
+    address=lambda settings: _profile(settings).address, settings=SETTINGS, mavlink_version=2,
     profiles={name: profile.description for name, profile in PROFILES.items()})

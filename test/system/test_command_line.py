@@ -73,7 +73,7 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', '--count 0', 'argument --count: 0 is outside 1 to 200'),
     ('simulator', '--status-interval nan', '--status-interval: nan is outside 0 to 3600'),
     ('simulator', '--mavlink-version 1', '--mavlink-version 1: a light needs MAVLink 2'),
-    ('simulator', '--payload rededge,illuminator', 'so start a program for each'),
+    ('simulator', '--payload rededge,gimbal', 'a gimbal needs MAVLink 2: a link sends'),
     ('simulator', '--payload rededge --images /nowhere/x', '/nowhere/x: No such file'),
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',
      "key file '/nonexistent': No such file or directory"),
