@@ -16,10 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-import contextlib
+from collections.abc import Callable
 import math
-from typing import Any
 
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
 from illuminator_ros.gimbal.simulated_device import SimulatedGimbal
@@ -30,35 +28,14 @@ from support.gimbal_vehicle import HERE, managed_gimbal
 from support.ports import free_port
 from support.waiting import eventually
 
-mavsdk = pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
-plugin = pytest.importorskip('mavsdk.plugins.gimbal.gimbal')
+pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
+
+from support.mavsdk_player import player, plugin, result  # noqa: E402
 
 FIRST, SECOND = Address(1, 195), Address(1, 196)
 GIMBAL = 1
 # MAVSDK's name of MAV_RESULT_DENIED.
 DENIED = 'ERROR'
-
-
-@contextlib.contextmanager
-def player(address: Address, port: int) -> Iterator[Any]:
-    """Return the Gimbal plugin of a MAVSDK that has found the gimbal."""
-    sdk = mavsdk.Mavsdk(mavsdk.Configuration.create_manual(*address, 1))
-    try:
-        assert sdk.add_any_connection(f'udpout://127.0.0.1:{port}') == 0
-        eventually(sdk.get_systems)
-        gimbal = plugin.Gimbal(sdk.get_systems()[0])
-        eventually(lambda: gimbal.gimbal_list().gimbals)
-        yield gimbal
-    finally:
-        sdk.destroy()
-
-
-def result(call: Callable[..., Any], *arguments: Any) -> str:
-    """Return the name of the result of a call."""
-    try:
-        return str(plugin.GimbalResult(call(*arguments)).name)
-    except plugin.GimbalError as error:
-        return str(error.result.name)
 
 
 def points_to(device: SimulatedGimbal, pitch: float, yaw: float) -> Callable[[], bool]:
