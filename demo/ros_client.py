@@ -18,18 +18,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import functools
+import math
 import threading
 from typing import TYPE_CHECKING, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Vector3Stamped
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from std_msgs.msg import Bool, Float32
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 if TYPE_CHECKING:
     from rclpy.type_support import ServiceType
@@ -46,7 +48,7 @@ class TimedOut(Exception):
 
 
 class RosClient:
-    """Calls the services and follows the topics of the node ``/illuminator``."""
+    """Uses the services and topics of the nodes ``/illuminator`` and ``/gimbal``."""
 
     def __init__(self) -> None:
         rclpy.init()
@@ -63,6 +65,10 @@ class RosClient:
                 Float32, f'/illuminator/{topic}', functools.partial(self._received, topic),
                 STATE_QOS)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 10)
+        self._angles: tuple[float, float] | None = None
+        self._node.create_subscription(
+            Vector3Stamped, '/gimbal/angles', self._turned, qos_profile_sensor_data)
+        self._setpoints = self._node.create_publisher(Vector3Stamped, '/gimbal/cmd/angles', 10)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
@@ -71,6 +77,11 @@ class RosClient:
     def _received(self, topic: str, message: Bool | Float32) -> None:
         with self._changed:
             self._topics[topic] = message.data
+            self._changed.notify_all()
+
+    def _turned(self, message: Vector3Stamped) -> None:
+        with self._changed:
+            self._angles = math.degrees(message.vector.y), math.degrees(message.vector.z)
             self._changed.notify_all()
 
     def _diagnosed(self, array: DiagnosticArray) -> None:
@@ -104,45 +115,61 @@ class RosClient:
     def call(self, type_: type[ServiceType[Request, Response]], service: str, request: Request,
              timeout: float = 10.0) -> Response:
         """
-        Call a service of the node.
+        Call a service.
 
         :raises TimedOut: if it is not there or does not answer.
         """
-        client = self._node.create_client(type_, f'/illuminator/{service}')
+        client = self._node.create_client(type_, service)
         try:
             if not client.wait_for_service(timeout):
-                raise TimedOut(f'no service /illuminator/{service} within {timeout:g} s')
+                raise TimedOut(f'no service {service} within {timeout:g} s')
             answered = threading.Event()
             future = client.call_async(request)
             future.add_done_callback(lambda _: answered.set())
             if not answered.wait(timeout):
-                raise TimedOut(f'no answer of /illuminator/{service} within {timeout:g} s')
+                raise TimedOut(f'no answer of {service} within {timeout:g} s')
             return future.result()
         finally:
             self._node.destroy_client(client)
 
     def enable(self, on: bool) -> SetBool.Response:
         """Call ``~/enable``."""
-        return self.call(SetBool, 'enable', SetBool.Request(data=on))
+        return self.call(SetBool, '/illuminator/enable', SetBool.Request(data=on))
 
     def set(self, name: str, value: float) -> SetParametersResult:  # noqa: A003
         """Set one parameter, as ``ros2 param set`` does."""
         parameters = [Parameter(name, value=value).to_parameter_msg()]
-        return self.call(SetParameters, 'set_parameters',
+        return self.call(SetParameters, '/illuminator/set_parameters',
                          SetParameters.Request(parameters=parameters)).results[0]
 
     def set_atomically(self, **values: float) -> SetParametersResult:
         """Set several parameters in one call."""
         parameters = [Parameter(name, value=value).to_parameter_msg()
                       for name, value in values.items()]
-        return self.call(SetParametersAtomically, 'set_parameters_atomically',
+        return self.call(SetParametersAtomically, '/illuminator/set_parameters_atomically',
                          SetParametersAtomically.Request(parameters=parameters)).result
 
     def get(self, name: str) -> float:
         """Return the value of a floating-point parameter."""
-        response = self.call(GetParameters, 'get_parameters',
+        response = self.call(GetParameters, '/illuminator/get_parameters',
                              GetParameters.Request(names=[name]))
         return response.values[0].double_value
+
+    def take_control(self) -> Trigger.Response:
+        """Call ``take_control`` of the gimbal."""
+        return self.call(Trigger, '/gimbal/take_control', Trigger.Request())
+
+    def angles(self) -> tuple[float, float] | None:
+        """Return the last pitch and yaw of the gimbal, degrees, None before the first."""
+        return self._angles
+
+    def turn(self, pitch: float, yaw: float) -> None:
+        """Publish a setpoint of the gimbal, degrees: down and to the left are positive."""
+        setpoint = Vector3Stamped()
+        # Relative to the vehicle: the default of the parameter vehicle_frame.
+        setpoint.header.frame_id = 'base_link_stabilized'
+        setpoint.vector.y, setpoint.vector.z = math.radians(pitch), math.radians(yaw)
+        self._setpoints.publish(setpoint)
 
     def close(self) -> None:
         """Leave the ROS graph."""

@@ -15,14 +15,15 @@
 """
 Run simulated devices and their nodes, use them from ordinary ROS clients, and show each step.
 
-A light with the bridge comes first, then a camera on a flight.
+A light with the bridge comes first, then a camera on a flight, and the light on a gimbal.
 
 The exit status is 0 if each step succeeded, otherwise 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+import math
 import os
 from pathlib import Path
 import random
@@ -47,6 +48,8 @@ from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from ros_client import RosClient, TimedOut  # noqa: E402
 
 LIGHT = Address(1, 243)
+# Degrees of the last step.
+DOWN, LEFT = 45.0, 30.0
 # s for simulator and bridge to end after SIGINT.
 END_TIMEOUT = 5.0
 
@@ -141,6 +144,27 @@ class Demo:
         return self._switch(False)
 
 
+    def take_control(self) -> str:
+        """Take control of the gimbal."""
+        self.ros.wait('attitude of the gimbal', self.ros.angles, 20.0)
+        answer = self.ros.take_control()
+        if not answer.success:
+            raise Failed(answer.message)
+        return answer.message
+
+    def turn(self) -> str:
+        """Turn the gimbal, and wait until its attitude confirms it."""
+        def turned() -> tuple[float, float] | None:
+            angles = self.ros.angles()
+            return angles if angles and math.dist(angles, (DOWN, LEFT)) < 0.5 else None
+
+        self.ros.turn(DOWN, LEFT)
+        down, left = self.ros.wait('such attitude in /gimbal/angles', turned)
+        if not self.ros.topic('enabled'):
+            raise Failed('the searchlight is off')
+        return f'/gimbal/angles: {down:.1f} degrees down, {left:.1f} to the left; the light is on'
+
+
 class Step(NamedTuple):
     """
     One step of the demonstration.
@@ -168,10 +192,19 @@ STEPS = (
          Demo.overheat, 'ros2 topic echo /diagnostics'),
     Step('Switch the light off', Demo.switch_off, f'{ENABLE} "{{data: false}}"'),
 )
+SEARCHLIGHT = (
+    Step('The searchlight is on a gimbal. Switch it on', Demo.switch_on,
+         f'{ENABLE} "{{data: true}}"'),
+    Step('Take control of the gimbal; success means that its manager shows it', Demo.take_control,
+         'ros2 service call /gimbal/take_control std_srvs/srv/Trigger'),
+    Step(f'Turn it {DOWN:g} degrees down and {LEFT:g} to the left', Demo.turn,
+         'ros2 topic pub -1 /gimbal/cmd/angles geometry_msgs/msg/Vector3Stamped "{header: '
+         '{frame_id: base_link_stabilized}, vector: {y: 0.785, z: 0.524}}"'),
+)
 INTRODUCTION = """
-This demonstration starts two programs: a simulated light that speaks MAVLink, as a searchlight
-on a drone does, and the bridge, which makes a ROS 2 node, /illuminator, of the light. A ROS
-client then uses the node as a program of yours would.
+This demonstration starts two programs: a simulated searchlight on a gimbal, both of which speak
+MAVLink, as on a drone; and the bridge, which makes the ROS 2 nodes /illuminator and /gimbal of
+them. A ROS client then uses the nodes as a program of yours would.
 """
 WITH_ROS2 = 'Under each step stands the ros2 command that has the same effect.'
 WITHOUT_ROS2 = """
@@ -190,10 +223,10 @@ Go on with these three, each in a terminal of its own:
 """
 
 
-def show(demo: Demo) -> bool:
-    """Run and print the steps; return whether all succeeded."""
+def show(demo: Demo, steps: Sequence[Step]) -> bool:
+    """Run and print some steps; return whether all succeeded."""
     start = time.monotonic()
-    for step in STEPS:
+    for step in steps:
         print(f'\n{step.title}')
         if step.command:
             print(f'     $ {step.command}')
@@ -208,16 +241,25 @@ def show(demo: Demo) -> bool:
     return True
 
 
+def fly() -> bool:
+    """Run the flight of the camera; return whether it succeeded."""
+    print(FLIGHT, flush=True)
+    return not subprocess.run(
+        [sys.executable, Path(__file__).with_name('flight.py'), '--seconds', '36'],
+        check=False).returncode
+
+
 def main() -> int:
     """Run the demonstration."""
     print(INTRODUCTION.strip(), (WITH_ROS2 if shutil.which('ros2') else WITHOUT_ROS2).strip(),
           sep='\n')
     url = f'127.0.0.1:{free_port()}'
     commands = {
-        'simulator': ['-m', 'illuminator_ros.simulator', f'udpin://{url}', '--ambient', '45',
-                      '--time-scale', '60'],
+        'simulator': ['-m', 'illuminator_ros.simulator', f'udpin://{url}', '--payload',
+                      'illuminator,gimbal_manager', '--ambient', '45', '--time-scale', '60'],
         'bridge': ['-m', 'illuminator_ros.bridge', '--ros-args', '-p',
-                   f'connection_url:=udpout://{url}'],
+                   f'connection_url:=udpout://{url}', '-p',
+                   'payloads:=[illuminator, gimbal]'],
     }
     with tempfile.TemporaryDirectory() as logs:
         processes = []
@@ -229,7 +271,8 @@ def main() -> int:
         ground_station = GroundStation(f'udpout://{url}')
         ros = RosClient()
         try:
-            success = show(Demo(ros, ground_station))
+            demo = Demo(ros, ground_station)
+            success = show(demo, STEPS) and fly() and show(demo, SEARCHLIGHT)
         finally:
             ros.close()
             ground_station.close()
@@ -239,11 +282,6 @@ def main() -> int:
                 success = False
                 print(f'\nThe {name} ended with status {status}; its log:')
                 print(Path(logs, name).read_text())
-    if success:
-        print(FLIGHT, flush=True)
-        success = not subprocess.run(
-            [sys.executable, Path(__file__).with_name('flight.py'), '--seconds', '36'],
-            check=False).returncode
     print('\nEach step succeeded.' if success else '\nThe demonstration failed.')
     if success:
         python = Path(sys.executable)
