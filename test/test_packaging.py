@@ -30,6 +30,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = 'illuminator_ros'
 # Modules whose rosdep key is another than their name; fastcrc comes with pymavlink.
 KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
+        'numpy': 'python3-numpy',
         'pymavlink': 'python3-pymavlink-pip', 'pytest': 'python3-pytest',
         'rich': 'python3-rich', 'scipy': 'python3-scipy', 'serial': 'python3-serial',
         'yaml': 'python3-yaml',

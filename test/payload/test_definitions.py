@@ -28,11 +28,13 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink_2
 import pytest
 
-# The camera gets MAVLink 1, so its messages have no extension fields (RE-2).
+# The camera gets MAVLink 1, so its messages have no extension fields (RE-2), but for the one that
+# it sends and that recorders count by.
 MODULES: dict[ModuleType, ModuleType] = {
     vehicle: mavlink_2, gimbal: mavlink_2, rededge: mavlink_1}
 CLASSES: list[tuple[type[Message], ModuleType]] = [
-    (value, dialect) for module, dialect in MODULES.items() for value in vars(module).values()
+    (value, mavlink_2 if value is rededge.CameraFeedback else dialect)
+    for module, dialect in MODULES.items() for value in vars(module).values()
     if isinstance(value, type) and issubclass(value, Message) and value is not Message
     and value.__module__ == module.__name__]
 
