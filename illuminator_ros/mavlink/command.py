@@ -31,16 +31,8 @@ from enum import Enum
 import math
 from typing import NamedTuple
 
-from .messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    MavCmd,
-    MavResult,
-    Message,
-    result_name,
-)
+from . import messages
+from .messages import Address, MavResult, Message
 
 # s between two reports of progress. The specification leaves it open; MAVSDK also takes 3 s.
 PROGRESS_TIMEOUT = 3.0
@@ -122,8 +114,8 @@ class Command(NamedTuple):
     def key(self) -> tuple[Address, int, float]:
         """Return the kind: commands of one kind wait for each other."""
         # As in MAVSDK: a request for one message must not wait for that of another.
-        detail = self.params[0] if self.command == MavCmd.REQUEST_MESSAGE and self.params else 0.0
-        return self.target, self.command, detail
+        is_request = self.command == messages.MavCmd.REQUEST_MESSAGE and self.params
+        return self.target, self.command, self.params[0] if is_request else 0.0
 
     def message(self, tries: int, as_int: bool) -> Message:
         """Return the message of a try, counted from 0, as COMMAND_LONG or COMMAND_INT."""
@@ -135,9 +127,10 @@ class Command(NamedTuple):
             # MAV_FRAME_GLOBAL: the command has no position.
             x, y, z, frame = _int32(p5), _int32(p6), p7, 0
         else:
-            return CommandLong(
+            return messages.CommandLong(
                 *self.target, self.command, min(tries, 255), p1, p2, p3, p4, p5, p6, p7)
-        return CommandInt(*self.target, frame, self.command, 0, 0, p1, p2, p3, p4, x, y, z)
+        return messages.CommandInt(
+            *self.target, frame, self.command, 0, 0, p1, p2, p3, p4, x, y, z)
 
 
 class EarlierCommand(NamedTuple):
@@ -197,8 +190,8 @@ class CommandResult(NamedTuple):
     def describe(self) -> str:
         """Return the outcome for people, with the name of the MAV_RESULT."""
         if self.status is CommandStatus.ANSWERED and self.result is not None:
-            return result_name(self.result)
-        last = '' if self.result is None else f', last answer {result_name(self.result)}'
+            return messages.result_name(self.result)
+        last = '' if self.result is None else f', last answer {messages.result_name(self.result)}'
         if self.progress is not None:
             last += f' at {self.progress} %'
         return f'{self.status.value}{last}'
@@ -411,7 +404,7 @@ class CommandSender:
         """Return the round-trip times of a target's acknowledgements."""
         return self._round_trips.get(target) or RttEstimator()
 
-    def acknowledge(self, source: Address, ack: CommandAck, now: float) -> None:
+    def acknowledge(self, source: Address, ack: messages.CommandAck, now: float) -> None:
         """
         Receive a COMMAND_ACK.
 
@@ -435,7 +428,7 @@ class CommandSender:
         if request is not None:
             self._answered(request, ack, now)
 
-    def _answered(self, request: _Request, ack: CommandAck, now: float) -> None:
+    def _answered(self, request: _Request, ack: messages.CommandAck, now: float) -> None:
         if request.tries == 1 and request.result is None:
             # An acknowledgement after a resend may be that of either try: no measure (RFC 6298).
             self._round_trips.setdefault(request.command.target, RttEstimator()).add(

@@ -30,19 +30,10 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 from .events import Listeners
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
 from .simulated_settings import integer, Setting, Values
+from ..mavlink import messages
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
-from ..mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    MavCmd,
-    MAVLINK_VERSION,
-    MavResult,
-    Message,
-)
+from ..mavlink.messages import Address, MavResult, Message
 
 # s; the shortest interval of a stream, which also serves requests for shorter ones.
 SHORTEST_INTERVAL = 0.01
@@ -52,7 +43,7 @@ MAX_PEERS = 100
 PROGRESS_INTERVAL = 0.5
 
 Change = Callable[[], None]
-AnyCommand = CommandLong | CommandInt
+AnyCommand = messages.CommandLong | messages.CommandInt
 T_contra = TypeVar('T_contra', contravariant=True)
 R_co = TypeVar('R_co', covariant=True)
 
@@ -389,8 +380,8 @@ class SimulatedComponent(Generic[D]):
                 else:
                     self._send(sent, now)
             self._changed()
-        if (not isinstance(message, CommandLong | CommandInt) or not behaviour.answers_commands
-                or isinstance(message, CommandInt) and not behaviour.answers_command_int):
+        if (not isinstance(message, AnyCommand) or not behaviour.answers_commands
+                or isinstance(message, messages.CommandInt) and not behaviour.answers_command_int):
             return
         if behaviour.slow:
             self._schedule.add(now + behaviour.slow,
@@ -421,7 +412,7 @@ class SimulatedComponent(Generic[D]):
         target = source if self.behaviour.acks_target else Address(0, 0)
         if self.behaviour.acks_wrong_target:
             target = Address(source.system, source.component ^ 1)
-        self._send(CommandAck(command, result, progress, 0, *target), now)
+        self._send(messages.CommandAck(command, result, progress, 0, *target), now)
 
     def _progress(
         self, source: Address, message: AnyCommand, begun: float, now: float,
@@ -441,14 +432,14 @@ class SimulatedComponent(Generic[D]):
     def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
         """Acknowledge a command and do what it asks for."""
         behaviour = self.behaviour
-        if message.command == MavCmd.REQUEST_MESSAGE:
+        if message.command == messages.MavCmd.REQUEST_MESSAGE:
             requested = self._requested(message.param1, now)
             result = MavResult.ACCEPTED if requested else self._unknown(MavResult.DENIED)
             self._acknowledge(source, message.command, result, now)
             if requested:
                 self._send(requested, now)
             return
-        if message.command == MavCmd.SET_MESSAGE_INTERVAL:
+        if message.command == messages.MavCmd.SET_MESSAGE_INTERVAL:
             self._acknowledge(source, message.command, self._set_interval(message, now), now)
             return
         reply = self.device.execute(source, message, now)
@@ -512,10 +503,10 @@ class SimulatedComponent(Generic[D]):
     def _send_heartbeat(self, now: float) -> None:
         behaviour = self.behaviour
         self._heartbeat_due = now + (behaviour.heartbeat_interval or math.inf)
-        self._send(Heartbeat(
+        self._send(messages.Heartbeat(
             behaviour.heartbeat_type, behaviour.heartbeat_autopilot,
             behaviour.heartbeat_base_mode, behaviour.heartbeat_custom_mode,
-            behaviour.heartbeat_state, MAVLINK_VERSION), now)
+            behaviour.heartbeat_state, messages.MAVLINK_VERSION), now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
@@ -565,7 +556,7 @@ class SimulatedComponents(Endpoint, Generic[D]):
         self.sends = tuple(dict.fromkeys(
             cls for one in self.components for cls in one.device.sends))
         self.messages = tuple(dict.fromkeys((
-            Heartbeat, CommandLong, CommandInt,
+            messages.Heartbeat, messages.CommandLong, messages.CommandInt,
             *(cls for one in self.components for cls in one.device.messages))))
 
     def link_opened(self, now: float) -> None:

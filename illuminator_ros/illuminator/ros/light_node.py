@@ -36,17 +36,9 @@ from ..sources import DEFAULT
 from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...payload.rotation import Quaternion
+from ...ros import node as ros_node
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
-from ...ros.node import (
-    Answer,
-    AnyCommand,
-    AnyService,
-    CommandTopic,
-    NodeInterface,
-    Publication,
-    RequestService,
-)
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import DeviceParameters, ParameterError
 from ...ros.payload import Host
@@ -71,8 +63,8 @@ class LightNode:
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
-        geometry: BeamGeometry, *, services: tuple[AnyService, ...] = (),
-        commands: tuple[AnyCommand, ...] = (),
+        geometry: BeamGeometry, *, services: tuple[ros_node.AnyService, ...] = (),
+        commands: tuple[ros_node.AnyCommand, ...] = (),
     ) -> None:
         self.name = node.get_name()
         self.full_name = node.get_fully_qualified_name()
@@ -86,13 +78,13 @@ class LightNode:
         parameters = DeviceParameters(node, device_parameters(limits))
         self._overrides = _checked(parameters.overrides(), limits)
         sources = client.settings.sources
-        interface = NodeInterface(
-            node, host.link, log,
-            publications=(*PUBLICATIONS, *([Publication('source', String)] if sources else ())),
+        source_topic = [ros_node.Publication('source', String)] if sources else []
+        interface = ros_node.NodeInterface(
+            node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
             services=(
                 *(self._enable_service(source) for source in self._ways()),
                 *(self._release_service(source) for source in (sources.names if sources else ())),
-                RequestService('refresh', Trigger, self._refresh, limit=MAX_REFRESHES),
+                ros_node.RequestService('refresh', Trigger, self._refresh, limit=MAX_REFRESHES),
                 *services),
             commands=(
                 *(topic for source in self._ways() for topic in self._command_topics(source)),
@@ -166,22 +158,22 @@ class LightNode:
         return {DEFAULT: ''} | {
             name: f'{name}/' for name in (sources.names if sources else ()) if name != DEFAULT}
 
-    def _enable_service(self, source: str) -> AnyService:
-        def enable(request: SetBool.Request, now: float, answer: Answer) -> None:
+    def _enable_service(self, source: str) -> ros_node.AnyService:
+        def enable(request: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
             self._request_enable(source, request.data, now, f'{prefix}service', answer)
 
         prefix = self._ways()[source]
-        return RequestService(f'{prefix}enable', SetBool, enable)
+        return ros_node.RequestService(f'{prefix}enable', SetBool, enable)
 
-    def _release_service(self, source: str) -> AnyService:
-        def release(request: Trigger.Request, now: float, answer: Answer) -> None:
+    def _release_service(self, source: str) -> ros_node.AnyService:
+        def release(request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
             if light := self._light_or_refusal(now, answer):
                 light.release(source, now)
                 answer(True, f'held by {light.snapshot(now).holder or "no source"}')
 
-        return RequestService(f'{source}/release', Trigger, release)
+        return ros_node.RequestService(f'{source}/release', Trigger, release)
 
-    def _command_topics(self, source: str) -> tuple[AnyCommand, AnyCommand]:
+    def _command_topics(self, source: str) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
         prefix = self._ways()[source]
         switching = LatestOnly(functools.partial(self._switch, source, prefix))
 
@@ -192,14 +184,14 @@ class LightNode:
             switching.offer(on, now)
 
         return (
-            CommandTopic(f'{prefix}cmd/enable', Bool, enable),
-            CommandTopic(f'{prefix}cmd/brightness', Float32,
+            ros_node.CommandTopic(f'{prefix}cmd/enable', Bool, enable),
+            ros_node.CommandTopic(f'{prefix}cmd/brightness', Float32,
                          functools.partial(self._set_brightness, source, prefix),
                          lambda message: checked('brightness', message.data)))
 
     # Requests
 
-    def _light_or_refusal(self, now: float, answer: Answer) -> Light | None:
+    def _light_or_refusal(self, now: float, answer: ros_node.Answer) -> Light | None:
         """Return the light; refuse the request if there is none."""
         light = self._light()
         if light is None:
@@ -207,7 +199,7 @@ class LightNode:
         return light
 
     def _request_enable(
-        self, source: str, on: bool, now: float, way: str, answer: Answer,
+        self, source: str, on: bool, now: float, way: str, answer: ros_node.Answer,
     ) -> None:
         if light := self._light_or_refusal(now, answer):
             light.enable(on, now, lambda result, now: answer(result.success, result.message),
@@ -226,7 +218,7 @@ class LightNode:
 
         self._request_enable(source, on, now, f'{prefix}topic', answer)
 
-    def _refresh(self, request: Trigger.Request, now: float, answer: Answer) -> None:
+    def _refresh(self, request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):
             light.refresh(now, lambda result, now: answer(result.success, result.message))
 
