@@ -59,9 +59,7 @@ from ..payload.simulated import (
     Change,
     CommandReply,
     ConsoleCommand,
-    Description,
     Reply,
-    SimulatedComponents,
     SimulatedDevice,
     SimulatedType,
     Snapshot,
@@ -286,19 +284,6 @@ class SimulatedIlluminator(SimulatedDevice):
             ', '.join(flag_names(status.error_status)))))
         return Snapshot('  '.join((*state, f'{temperature:6.1f} degC', *notes)),
                         (*state, *notes), temperature / TEMPERATURE_STEP)
-
-
-def describe(properties: IlluminatorProperties) -> Description[SimulatedIlluminator]:
-    """Return the simulated component that has these properties."""
-    return Description(properties.address, SimulatedIlluminator(properties), properties.name,
-                       properties.seed)
-
-
-def simulated_lights(
-    properties: Iterable[IlluminatorProperties], now: float,
-) -> SimulatedComponents[SimulatedIlluminator]:
-    """Return an endpoint of simulated lights that are powered on now, s."""
-    return SimulatedComponents(map(describe, properties), now)
 
 
 # Its settings, and its registration with the simulator

@@ -102,11 +102,6 @@ class LinkSnapshot:
     address: Address
     address_conflict: bool
     unanswering: frozenset[Address]
-    frames_received: int
-    bytes_received: int
-    unsigned: int
-    bad_signatures: int
-    unchecked: int
     values: Mapping[str, Value]
     devices: Mapping[Address, Mapping[str, Value]]
 
@@ -130,8 +125,7 @@ def link_snapshot(link: Link, component: Component, url: str, now: float) -> Lin
         }
     return LinkSnapshot(
         state, now, component.address, component.address_conflict(now),
-        frozenset(commands.unanswering), traffic.frames_received, traffic.bytes_received,
-        signing.unsigned, signing.bad, signing.unchecked, {
+        frozenset(commands.unanswering), {
             'url': url,
             'open': state.is_open,
             'since_s': now - state.since,
@@ -162,21 +156,21 @@ def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
 
     :param device: such as ``an illuminator``.
     """
-    signing = link.state.signing
+    signing, traffic = link.state.signing, link.state.traffic
     if signing.replayed and signing.replayed >= max(signing.bad, signing.unsigned):
         return (f'{signing.replayed} frames refused as replayed: their time stamps are not newer '
                 'than the last; compare the clocks')
-    if link.bad_signatures:
-        return (f'{link.bad_signatures} frames refused for their signature, made with another '
+    if signing.bad:
+        return (f'{signing.bad} frames refused for their signature, made with another '
                 'key: both sides need the same key')
-    if link.unsigned and not link.frames_received:
-        return (f'{link.unsigned} frames refused because they are not signed: sign them at the '
+    if signing.unsigned and not traffic.frames_received:
+        return (f'{signing.unsigned} frames refused because they are not signed: sign them at the '
                 'other side, or set signing_mode to sign')
-    if link.frames_received:
-        return (f'{link.frames_received} frames received, none from {device}: check that it is '
+    if traffic.frames_received:
+        return (f'{traffic.frames_received} frames received, none from {device}: check that it is '
                 'on, and that routers forward its frames')
-    if link.bytes_received:
-        return f'{link.bytes_received} bytes received, no valid frame; check the baud rate'
+    if traffic.bytes_received:
+        return f'{traffic.bytes_received} bytes received, no valid frame; check the baud rate'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '
             'to this address or line')
 
@@ -203,7 +197,7 @@ def link_findings(
             ERROR if waited > DISCOVERY_GRACE else WARN,
             f'no {what} connected for {format_seconds(waited)}'
             + (f': {absence}' if link.state.is_open else '')))
-    if device in link.unanswering and link.unchecked:
+    if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
     loss = link.devices.get(device, {}).get('loss_percent') if device else None
     if isinstance(loss, float) and loss > LOSS_WARNING:

@@ -18,7 +18,6 @@ from collections.abc import Iterable
 from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
-from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import (
@@ -34,6 +33,7 @@ from illuminator_ros.mavlink.messages import (
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.light_bench import GROUND, LightBench
+from support.simulated_lights import simulated_lights
 
 NAN, INF = float('nan'), float('inf')
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE

@@ -16,7 +16,6 @@
 
 from typing import Any
 
-from illuminator_ros.illuminator.simulated import describe
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
@@ -25,6 +24,7 @@ from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from payloads.winch import SimulatedWinch, WINCH
 from payloads.winch_checks import REQUIREMENTS
 import pytest
+from support.simulated_lights import describe
 from support.virtual_link import START, VirtualLink
 
 DECK = Address(1, 169)

@@ -18,11 +18,11 @@ from illuminator_ros.cli.simulator.console import COMMANDS, execute
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
-from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.faults import Behaviour
 import pytest
+from support.simulated_lights import simulated_lights
 
 
 class Console:

@@ -21,7 +21,7 @@ import shutil
 from typing import Any
 
 from illuminator_ros.cli.simulator.view import LiveView, look, PlainView
-from illuminator_ros.illuminator.simulated import describe, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorBehaviour,
@@ -30,6 +30,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
+from support.simulated_lights import describe
 
 Light = SimulatedComponent[SimulatedIlluminator]
 

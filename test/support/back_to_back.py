@@ -22,7 +22,7 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import AnyLightEvent, LightFound, LightSnapshot
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
@@ -40,6 +40,7 @@ from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedCompo
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
 from support.records import Answer, Recorder
+from support.simulated_lights import simulated_lights
 
 BRIDGE = Address(1, 194)
 ONE_LIGHT = (IlluminatorProperties(),)

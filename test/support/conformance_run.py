@@ -25,12 +25,13 @@ from illuminator_ros.cli.conformance.run import LISTEN_TIME
 from illuminator_ros.illuminator.checks.requirements import CHECKS, REQUIREMENTS
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
-from illuminator_ros.illuminator.simulated import simulated_lights, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
-from illuminator_ros.payload.checks.coroutine import Interrupted
 from illuminator_ros.payload.checks.requirement import Conditions, Requirement, Result, Verdict
 from illuminator_ros.payload.checks.runner import absence, CheckRunner
+from illuminator_ros.payload.checks.session import Interrupted
+from support.simulated_lights import simulated_lights
 from support.virtual_link import START, VirtualLink
 
 TESTER = Address(255, 190)

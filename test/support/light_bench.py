@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.illuminator.simulated import describe, SimulatedIlluminator
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorBehaviour,
@@ -26,6 +26,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, MavResult
 from illuminator_ros.payload.simulated import SimulatedComponent
+from support.simulated_lights import describe
 
 GROUND = Address(255, 190)
 

@@ -24,7 +24,6 @@ from typing import Any, Generic, TypeVar
 
 from illuminator_ros.illuminator.events import AnyLightEvent, LightConnected, LightLost
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
@@ -34,6 +33,7 @@ from illuminator_ros.mavlink.url import parse_url, Url
 from illuminator_ros.payload.request import Result
 from support.client import Client
 from support.messages import HANDLED
+from support.simulated_lights import simulated_lights
 from support.waiting import eventually, Log, PATIENCE
 
 BRIDGE = Address(1, 194)

@@ -23,9 +23,9 @@ from pathlib import Path
 import select
 import threading
 
-from illuminator_ros.illuminator.simulated import simulated_lights
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from support.frames import Codec
+from support.simulated_lights import simulated_lights
 from support.waiting import PATIENCE
 
 

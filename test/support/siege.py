@@ -22,7 +22,6 @@ import random
 from typing import Any, cast
 
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.simulated import describe, simulated_lights
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.command import MAX_WAITING
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
@@ -38,6 +37,7 @@ from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedCompo
 from support.attacker import Attacker
 from support.client import Client
 from support.frames import Codec
+from support.simulated_lights import describe, simulated_lights
 from support.simulated_link import SimulatedLink
 
 BRIDGE = Address(1, 194)

@@ -51,10 +51,10 @@ from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import KeyFileError, TimestampStore
 from ...mavlink.url import parse_url, Url, UrlError
-from ...payload.checks.coroutine import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
 from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
+from ...payload.checks.session import Main
 from ...payload.simulated_settings import integer, number
 
 # s to listen before the first command.

@@ -20,9 +20,8 @@ from collections.abc import Callable, Sequence
 import logging
 from typing import Generic
 
-from .coroutine import Interrupted
 from .requirement import Conditions, NOT_AGREED, PayloadChecks, Requirement, Result, T, Verdict
-from .session import DeviceLost, Failed, Session, Skipped
+from .session import DeviceLost, Failed, Interrupted, Session, Skipped
 from ...mavlink.messages import Address
 
 # s

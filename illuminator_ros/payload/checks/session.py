@@ -12,17 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A session with one device: commands, acknowledgements, and a record of all messages. No I/O."""
+"""
+A session with one device: commands, acknowledgements, and a record of all messages. No I/O.
+
+Its coroutines wait for conditions and times. There is no event loop: time is an argument, so that
+a run against a simulated device takes no real time.
+"""
 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Coroutine, Generator, Iterable, Sequence
 from dataclasses import astuple, dataclass, field
 import math
 from typing import cast, NamedTuple, TypeVar
 
-from .coroutine import CoroutineRunner
 from ..identity import Identity
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
@@ -58,6 +62,97 @@ REJECTIONS = 12
 # Entries kept of each record, and acknowledgements of one command.
 MAX_ENTRIES = 10_000
 MAX_ACKS = 400
+
+
+class Interrupted(BaseException):
+    """The run must end now."""
+
+
+@dataclass
+class _Wait:
+    condition: Callable[[], object]
+    deadline: float
+
+    def __await__(self) -> Generator[_Wait, None, None]:
+        yield self
+
+
+# A coroutine that awaits :class:`_Wait`, by way of others.
+Main = Coroutine[_Wait, None, None]
+
+
+class CoroutineRunner:
+    """
+    Runs one coroutine after another; each awaits :meth:`until` and :meth:`sleep`.
+
+    :ivar now: time of the latest message or poll, s.
+    :ivar interrupted: whether :meth:`interrupt` was called.
+    :ivar restoring: whether interruption is ignored, because the device is being restored.
+    """
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.interrupted = False
+        self.restoring = False
+        self._main: Main | None = None
+        self._wait: _Wait | None = None
+
+    def run(self, main: Main) -> None:
+        """Run a coroutine from the next :meth:`advance` on."""
+        self._main, self._wait = main, None
+
+    @property
+    def running(self) -> bool:
+        """Whether the coroutine has not ended."""
+        return self._main is not None
+
+    def advance(self, now: float) -> None:
+        """Continue the coroutine if its condition holds or its time has come."""
+        self.now = now
+        while self._main is not None and (
+                self._wait is None or now >= self._wait.deadline or self._wait.condition()):
+            self._step(lambda main: main.send(None))
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`advance` is due, infinity if never."""
+        if self._main is None:
+            return math.inf
+        return self._wait.deadline if self._wait else self.now
+
+    def interrupt(self, now: float) -> None:
+        """Raise :class:`Interrupted` in the coroutine, unless it restores the device."""
+        self.interrupted = True
+        if not self.restoring:
+            self.advance(now)
+            self._step(lambda main: main.throw(Interrupted()))
+            self.advance(now)
+
+    def _step(self, step: Callable[[Main], _Wait]) -> None:
+        if self._main is None:
+            return
+        try:
+            self._wait = step(self._main)
+        except (StopIteration, Interrupted):
+            self._main = self._wait = None
+
+    async def until(self, condition: Callable[[], object], timeout: float) -> bool:
+        """
+        Wait for a condition, for ``timeout`` s at most, and return whether it holds.
+
+        :raises Interrupted: if the run must end.
+        """
+        if self.interrupted and not self.restoring:
+            raise Interrupted
+        await _Wait(condition, self.now + timeout)
+        return bool(condition())
+
+    async def sleep(self, seconds: float) -> None:
+        """
+        Wait for a time, s.
+
+        :raises Interrupted: if the run must end.
+        """
+        await self.until(lambda: False, seconds)
 
 
 class DeviceLost(Exception):
