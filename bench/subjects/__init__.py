@@ -29,5 +29,6 @@ SUBJECTS = {
     'reconnection': 'the time until the link is up again',
     'loss': 'commands through loss',
     'parallel': 'the delay that a silent light causes to others',
+    'gimbal_manager': 'the way of a setpoint, and control that players compete for',
     'limits': 'the documented time limits',
 }

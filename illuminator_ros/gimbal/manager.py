@@ -203,6 +203,7 @@ class GimbalManager(Payload):
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
         self._status: GimbalDeviceAttitudeStatus | None = None
+        self._attitude: MountAttitude | None = None
         self._status_at = self._measured_at = -math.inf
         self._setpoint: Setpoint | None = None
         self._offsets = STILL
@@ -336,6 +337,10 @@ class GimbalManager(Payload):
 
     def _report(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         self._status, self._status_at = status, now
+        try:
+            self._attitude = MountAttitude.from_status(status)
+        except ValueError:
+            self._attitude = None
         if not self.has_mavlink and self.state is ManagerState.ACTIVE:
             self._commands.send(replace(status, gimbal_device_id=self.device_id))
         self.events.emit(AttitudeReceived(status))
@@ -438,13 +443,12 @@ class GimbalManager(Payload):
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
             return f'the gimbal does not have {lacking.name}'
-        current = self._pointing(demand.frame, now)
-        if (current is None and not demand.is_complete) or (
-                self._heading(now) is None and not self._accepts(demand.frame, now)):
+        current = Quaternion() if demand.is_complete else self._pointing(demand.frame, now)
+        if current is None or (
+                not self._accepts(demand.frame, now) and self._heading(now) is None):
             return 'the heading of the vehicle is unknown'
         self._place = None
-        self._setpoint = resolve(
-            demand, current or Quaternion(), now, turns=not self.has_mavlink)
+        self._setpoint = resolve(demand, current, now, turns=not self.has_mavlink)
         self._send(now)
         return ''
 
@@ -456,11 +460,8 @@ class GimbalManager(Payload):
                 return attitude
             return None if heading is None else turned_by(
                 attitude, heading if frame is YawFrame.EARTH else -heading)
-        if (status := self._device_status(now)) is not None:
-            try:
-                seen = MountAttitude.from_status(status).seen_from(frame, heading)
-            except ValueError:
-                seen = None
+        if self._attitude is not None and self._device_status(now) is not None:
+            seen = self._attitude.seen_from(frame, heading)
             if seen is not None:
                 return Quaternion(*to_mavlink(seen, frame))
         if frame is YawFrame.VEHICLE:
@@ -476,13 +477,9 @@ class GimbalManager(Payload):
 
     def _heading(self, now: float) -> float | None:
         """Return the vehicle's heading as the device knows it, or else the vehicle."""
-        if (status := self._device_status(now)) is not None:
-            try:
-                heading = MountAttitude.from_status(status).heading
-            except ValueError:
-                heading = None
-            if heading is not None:
-                return heading
+        if (self._attitude is not None and self._attitude.heading is not None
+                and self._device_status(now) is not None):
+            return self._attitude.heading
         return self.vehicle.heading(now)
 
     def _send(self, now: float) -> None:

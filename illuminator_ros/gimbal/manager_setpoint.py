@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ MANUAL_RATE = 0.5
 _NEEDED = {MountFlags.RETRACT: Capabilities.HAS_RETRACT,
            MountFlags.NEUTRAL: Capabilities.HAS_NEUTRAL,
            MountFlags.YAW_LOCK: Capabilities.HAS_YAW_LOCK}
+_NEEDING = int(sum(_NEEDED))
 # Equatorial radius, m, and squared eccentricity of WGS 84.
 _RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
 
@@ -110,6 +112,8 @@ class GimbalModel:
     def lacks(self, flags: MountFlags) -> MountFlags:
         """Return those of the flags that the gimbal cannot follow."""
         lacking = MountFlags(0)
+        if not int(flags) & _NEEDING:
+            return lacking
         for flag, needed in _NEEDED.items():
             if flags & flag and self.capabilities and not self.capabilities & needed:
                 lacking |= flag
@@ -145,11 +149,11 @@ class Demand:
     attitude: Quaternion | None = None
 
     def __post_init__(self) -> None:
-        yaw_frame(self.flags)
+        self.frame  # noqa: B018 - raises an exception
         if any(map(math.isinf, (*self.angles, *self.rates))):
             raise ValueError('an angle or a rate is infinite')
 
-    @property
+    @cached_property
     def frame(self) -> YawFrame:
         """The frame of its yaw."""
         return yaw_frame(self.flags)
@@ -284,6 +288,8 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
         return Setpoint(flags, frame, demand.attitude, demand.rates, since=now)
     given = [math.isfinite(angle) for angle in demand.angles]
     rates = demand.rates
+    if all(given):
+        return Setpoint(flags, frame, _from_angles(demand.angles), rates, since=now)
     only_rate = [not has_angle and math.isfinite(rate)
                  for has_angle, rate in zip(given, rates, strict=True)]
     if any(only_rate) and not any(given) and not turns:
@@ -342,7 +348,8 @@ def clip(
     angles = [roll, pitch, yaw]
     for index, (axis, range_) in enumerate(zip(AXES, ranges, strict=True)):
         zero = offset if axis == 'yaw' else 0.0
-        if zero is None or range_.high - range_.low >= 2 * math.pi - 1e-6:
+        if (zero is None or range_.low <= angles[index] - zero <= range_.high
+                or range_.high - range_.low >= 2 * math.pi - 1e-6):
             continue
         asked = _nearest(angles[index] - zero, range_)
         limit = max(range_.low, min(range_.high, asked))

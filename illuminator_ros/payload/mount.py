@@ -67,6 +67,10 @@ _FLAGS = {YawFrame.EARTH: MountFlags.YAW_IN_EARTH_FRAME,
           YawFrame.VEHICLE: MountFlags.YAW_IN_VEHICLE_FRAME}
 
 
+_EARTH, _VEHICLE, _LOCK = int(MountFlags.YAW_IN_EARTH_FRAME), int(
+    MountFlags.YAW_IN_VEHICLE_FRAME), int(MountFlags.YAW_LOCK)
+
+
 def names_frame(flags: int) -> bool:
     """Return whether flags name a yaw frame, as those of old implementations do not."""
     return bool(flags & (MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME))
@@ -80,10 +84,12 @@ def yaw_frame(flags: int) -> YawFrame:
 
     :raises ValueError: if the flags name both frames.
     """
-    earth, vehicle = flags & MountFlags.YAW_IN_EARTH_FRAME, flags & MountFlags.YAW_IN_VEHICLE_FRAME
+    # An operation on an IntFlag takes ten times as long as on an int.
+    bits = int(flags)
+    earth, vehicle = bits & _EARTH, bits & _VEHICLE
     if earth and vehicle:
         raise ValueError('the flags name both yaw frames')
-    if not vehicle and (earth or flags & MountFlags.YAW_LOCK):
+    if not vehicle and (earth or bits & _LOCK):
         return YawFrame.EARTH
     return YawFrame.VEHICLE
 

@@ -1,0 +1,219 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A gimbal manager: the way of a setpoint to the device, and control that 20 players compete for.
+
+The setpoint of a MAVLink player goes over UDP to the manager, and from there to the device. The
+peer is a forwarder in Python that reads no MAVLink.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+import contextlib
+import math
+import socket
+import time
+from typing import Any
+
+from illuminator_ros.gimbal.messages import (
+    GimbalCommand,
+    GimbalDeviceSetAttitude,
+    GimbalManagerSetPitchyaw,
+    GimbalManagerStatus,
+    MAV_TYPE_GIMBAL,
+)
+from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandLong,
+    decode_payload,
+    heartbeat,
+    MavType,
+    Message,
+)
+from illuminator_ros.payload.rotation import Quaternion
+from support.frames import Codec
+
+from ..rig import Bench, bridge, free_port, peer
+from ..rows import at_most, one, quantiles, Row, times
+
+MANAGER, DEVICE = Address(1, 194), Address(1, 154)
+PLAYERS = [Address(255, 100 + number) for number in range(20)]
+CLASSES: dict[int, type[Message]] = {cls.id: cls for cls in (
+    CommandAck, GimbalDeviceSetAttitude, GimbalManagerStatus)}
+WARM_UP = 50
+RATE, SECONDS = 1000, 10.0
+# rad between the yaws by which the setpoints of two players differ.
+STEP = 0.1
+
+
+class Line:
+    """A UDP socket with MAVLink messages of any senders."""
+
+    def __init__(self, port: int = 0) -> None:
+        self.socket = socket.socket(type=socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        self.socket.bind(('127.0.0.1', port))
+        self._codec, self._decoder = Codec(), Decoder()
+
+    def frame(self, source: Address, message: Message) -> bytes:
+        """Return a message as a frame."""
+        return self._codec.frame(source, message)
+
+    def send(self, source: Address, message: Message, port: int) -> None:
+        """Send a message."""
+        self.socket.sendto(self.frame(source, message), ('127.0.0.1', port))
+
+    def receive(self, timeout: float) -> list[Any]:
+        """Return the messages of the next datagram, none after the time."""
+        self.socket.settimeout(max(timeout, 1e-4))
+        try:
+            data = self.socket.recv(65536)
+        except TimeoutError:
+            return []
+        return [decode_payload(CLASSES[frame.message_id], frame.payload)
+                for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
+
+
+def configure(player: Address) -> CommandLong:
+    """Return the command by which a player takes control."""
+    return CommandLong(*MANAGER, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0,
+                       0, 0)
+
+
+def setpoint(player: Address, pitch: float = 0.0) -> GimbalManagerSetPitchyaw:
+    """Return a setpoint whose yaw belongs to one player."""
+    return GimbalManagerSetPitchyaw(
+        *MANAGER, 0, 0, pitch, STEP * (PLAYERS.index(player) - 10), math.nan, math.nan)
+
+
+@contextlib.contextmanager
+def managed() -> Iterator[tuple[int, Line, Line]]:
+    """Run a manager; yield its port, its device, and players of which the first has control."""
+    port = free_port()
+    device, players = Line(), Line()
+    with bridge(f'udpin://127.0.0.1:{port}', name='gimbal_manager',
+                payloads='[gimbal_manager]'):
+        until = time.monotonic() + 20.0
+        while time.monotonic() < until:
+            device.send(DEVICE, heartbeat(MAV_TYPE_GIMBAL), port)
+            players.send(PLAYERS[0], heartbeat(MavType.GCS), port)
+            players.send(PLAYERS[0], configure(PLAYERS[0]), port)
+            device.receive(0.1)
+            if any(isinstance(message, CommandAck) and message.result == 0
+                   for _ in range(20) for message in players.receive(0.01)):
+                yield port, device, players
+                break
+        else:
+            raise RuntimeError('the manager gives no control')
+    device.socket.close()
+    players.socket.close()
+
+
+def measure(bench: Bench) -> Iterator[Row]:
+    """Measure the way of a setpoint, then the competition."""
+    yield _setpoints(bench)
+    yield from _competition(bench)
+
+
+def _setpoints(bench: Bench) -> Row:
+    took: dict[str, list[float]] = {'manager': [], 'forwarder': []}
+    with managed() as (port, device, players), Listener() as far:
+        forward = free_port()
+        with peer('forwarder', str(forward), str(far.port)):
+            beat = 0.0
+            for number in range(bench.amount(2000, 20)):
+                if time.monotonic() >= beat:
+                    beat = time.monotonic() + 0.5
+                    device.send(DEVICE, heartbeat(MAV_TYPE_GIMBAL), port)
+                    players.send(PLAYERS[0], heartbeat(MavType.GCS), port)
+                    time.sleep(0.01)
+                message = setpoint(PLAYERS[0], pitch=0.3 * math.sin(number))
+                while device.receive(0.0):
+                    pass
+                began = time.perf_counter()
+                players.send(PLAYERS[0], message, port)
+                while not any(isinstance(got, GimbalDeviceSetAttitude)
+                              for got in device.receive(1.0)):
+                    if time.perf_counter() > began + 5.0:
+                        raise RuntimeError('the device gets no setpoint')
+                took['manager'].append((time.perf_counter() - began) * 1e3)
+                data = players.frame(PLAYERS[0], message)
+                began = time.perf_counter()
+                players.socket.sendto(data, ('127.0.0.1', forward))
+                far.socket.recv(2048)
+                took['forwarder'].append((time.perf_counter() - began) * 1e3)
+    ours, theirs = (quantiles(values[bench.amount(WARM_UP, 0):]) for values in took.values())
+    return Row('setpoint of a MAVLink player through the manager to the device', 'ms', ours,
+               {'bare UDP forwarder': theirs}, [times(ours, theirs, 3.0, 'p50')])
+
+
+class Listener:
+    """A UDP socket for the forwarder."""
+
+    def __enter__(self) -> Listener:
+        self.socket = socket.socket(type=socket.SOCK_DGRAM)
+        self.socket.bind(('127.0.0.1', 0))
+        self.socket.settimeout(5.0)
+        self.port: int = self.socket.getsockname()[1]
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.socket.close()
+
+
+def _competition(bench: Bench) -> Iterator[Row]:
+    seconds = bench.amount(SECONDS, 1.0)
+    results: Counter[int] = Counter()
+    obeyed: set[int] = set()
+    holders: set[int] = set()
+    statuses = sent = 0
+    with managed() as (port, device, players):
+        while players.receive(0.05) or device.receive(0.0):
+            pass
+        began, beat = time.monotonic(), 0.0
+        # A second more for late answers.
+        while (now := time.monotonic()) < began + seconds + 1.0:
+            if now >= beat:
+                beat = now + 0.5
+                device.send(DEVICE, heartbeat(MAV_TYPE_GIMBAL), port)
+                for player in PLAYERS:
+                    players.send(player, heartbeat(MavType.GCS), port)
+            while sent < min(now - began, seconds) * RATE:
+                player = PLAYERS[sent % len(PLAYERS)]
+                players.send(player, configure(player), port)
+                players.send(player, setpoint(player), port)
+                sent += 1
+            while received := players.receive(0.0):
+                results.update(message.result for message in received
+                               if isinstance(message, CommandAck))
+            for message in device.receive(0.001):
+                if isinstance(message, GimbalDeviceSetAttitude):
+                    obeyed.add(round(Quaternion(*message.q).euler()[2] / STEP))
+                elif isinstance(message, GimbalManagerStatus):
+                    statuses += now < began + seconds
+                    holders.add(message.primary_control_compid)
+    unanswered = sent - results.total()
+    yield Row(f'{sent} commands of {len(PLAYERS)} players that compete for control, with as many '
+              f'setpoints, {RATE} a second', 'commands', one(unanswered), targets=[
+                  at_most(unanswered, 0, 'without an answer'),
+                  at_most(max(len(obeyed), len(holders)) - 1, 0, 'instants with two players')],
+              note=f'{results[0]} accepted, {results[2]} denied')
+    rate = statuses / seconds
+    yield Row('GIMBAL_MANAGER_STATUS meanwhile', 'Hz', one(rate), targets=[
+        at_most(round(abs(rate - 5.0), 3), 0.5, 'Hz from 5')])
