@@ -198,8 +198,9 @@ def test_satellites_are_counted_and_no_single_one_is_invented_re_28() -> None:
 
 
 def feedback(**changes: Any) -> CameraFeedback:
-    return CameraFeedback(**{**{field.name: 0 for field in fields(CameraFeedback)},
-        'lat': 473977421, 'lng': 85455939, 'alt_msl': 487.25, **changes})
+    return CameraFeedback(**{
+        **{field.name: 0 for field in fields(CameraFeedback)}, 'lat': 473977421,
+        'lng': 85455939, 'alt_msl': 487.25, **changes})
 
 
 def test_position_of_an_image_is_above_the_ellipsoid() -> None:
