@@ -132,7 +132,7 @@ class IlluminatorClient(Payload):
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
             if light := self._discovery.hear(source, now, proved=True):
-                light.take_status(Status.from_message(message), now)
+                light.take_status(Status.from_message(message), now, message.sender)
         elif isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR:
             if light := self._discovery.hear(source, now, proved=False):
                 light.heard(now)

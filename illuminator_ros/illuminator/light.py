@@ -169,12 +169,16 @@ class Light:
             self._set_up(now)
             self._emit(events.LightConnected(self.address))
 
-    def take_status(self, status: Status, now: float) -> None:
-        """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
+    def take_status(self, status: Status, now: float, sender: int = 0) -> None:
+        """
+        Take an ILLUMINATOR_STATUS, unless it is older than the one before.
+
+        :param sender: of the message.
+        """
         self.heard(now)
         was_lost, self._was_lost = self._was_lost, False
         report, restarted = self._tracker.take(
-            status, now, was_lost=was_lost,
+            status, now, sender=sender, was_lost=was_lost,
             commanded=bool(self._switching.current or self._configuration.is_changing))
         if report is None:
             self._was_lost = was_lost

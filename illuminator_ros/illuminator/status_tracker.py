@@ -17,8 +17,10 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from enum import Enum
 import math
+import operator
 
 from .model import DIMMING_FLAGS, Mode, NOTHING, Status, unexpected_differences
 from ..payload.request import Report
@@ -187,14 +189,54 @@ ENOUGH_RETURNS = 2
 GAP_MARGIN = 1.2
 
 
-class _Start:
-    """A starting time, ms on our clock, and the statuses that fit it."""
+class _Sender:
+    """A light, by a value that its statuses share: its number, or its starting time."""
 
-    def __init__(self, number: int, start: float) -> None:
+    def __init__(self, number: int) -> None:
         self.number = number
-        self.start = start
+        self.value = 0.0
         self.seen_at = -math.inf
         self.returns = 0
+
+
+class _Senders:
+    """
+    Lights that are told apart by a value; one is proved when statuses return to it.
+
+    :param is_same: whether two values are those of one light.
+    :ivar newest: the number of the light that has sent the newest status.
+    """
+
+    def __init__(self, is_same: Callable[[float, float], bool]) -> None:
+        self.newest = 0
+        self._is_same = is_same
+        self._senders: list[_Sender] = []
+        self._count = 0
+
+    def take(self, value: float, now: float) -> None:
+        """Take the value of a status."""
+        self._senders = [one for one in self._senders if now - one.seen_at <= SENDER_TIME]
+        for one in self._senders:
+            if self._is_same(value, one.value):
+                break
+        else:
+            self._count += 1
+            one = _Sender(self._count)
+            self._senders = [*self._senders[1 - MAX_STATES:], one]
+        one.returns += one.seen_at > -math.inf and one.number != self.newest
+        one.seen_at, one.value = now, value
+        self.newest = one.number
+
+    def proved(self, now: float) -> frozenset[int]:
+        """Return the lights that have sent lately; the newest if there are not several."""
+        proved = [one.number for one in self._senders
+                  if one.returns >= ENOUGH_RETURNS and now - one.seen_at <= SENDER_TIME]
+        return frozenset(proved if len(proved) > 1 else (self.newest,))
+
+
+def _is_same_start(start: float, other: float) -> bool:
+    difference = (start - other + WRAP_MS / 2) % WRAP_MS - WRAP_MS / 2
+    return abs(difference) < CLOCK_STEP * 1000.0
 
 
 class AddressConflict:
@@ -203,40 +245,40 @@ class AddressConflict:
 
     ILLUMINATOR_STATUS does not say which light it is of: ArduSub sends one for each of its
     lights from the autopilot's address, and two lights may have been given the same ids. Lights
-    are distinguished by their alternating states and by their start times. Lights with the same
-    state and start time cannot be distinguished.
+    are distinguished by their alternating states, by their start times, and by their sequence
+    numbers. Lights of one component with the same state and start time cannot be distinguished.
 
     :ivar detected: whether several lights send.
     :ivar can_follow: whether the newest status can be followed: it does not go back to a state
         shown before, or it has been repeated.
-    :ivar sender: the light that has sent the newest status, by when it was started.
     """
 
     def __init__(self) -> None:
         self.detected = False
         self.can_follow = True
-        self.sender = 0
         self._evidence = 0
         # With the last one at the end, and when each was shown.
         self._states: list[tuple[Status, float]] = []
         self._gaps: deque[float] = deque(maxlen=MAX_RECENT)
-        self._starts: list[_Start] = []
-        self._count = 0
+        self._by_start = _Senders(_is_same_start)
+        self._by_number = _Senders(operator.eq)
         self._recent: deque[Status] = deque(maxlen=MAX_RECENT)
 
-    def take(self, status: Status, now: float, *, commanded: bool) -> None:
+    def take(self, status: Status, now: float, *, commanded: bool, sender: int = 0) -> None:
         """
         Take a status, late ones too.
 
+        :param sender: of the message.
         :param commanded: whether a command of ours may have changed the light.
         """
         uptime = status.uptime_ms
         has_clock = any(one.uptime_ms != uptime for one in self._recent)
-        if has_clock and any(one.uptime_ms == uptime and one == status for one in self._recent):
-            # The same frame, by another way.
+        if has_clock and status in self._recent:
+            # The same frame, by another way, on which its number may lag far behind.
             return
         if has_clock or not self._recent:
-            self._take_start(now * 1000.0 - uptime, now)
+            self._by_start.take(now * 1000.0 - uptime, now)
+        self._by_number.take(sender, now)
         self._recent.append(status)
         if not commanded:
             repeated = self._take_state(status, now)
@@ -249,32 +291,22 @@ class AddressConflict:
         self.detected = (self._evidence >= (1 if self.detected else ENOUGH_EVIDENCE)
                          or len(self.senders(now)) > 1)
 
+    def _senders(self, now: float) -> _Senders:
+        return max(self._by_start, self._by_number, key=lambda one: len(one.proved(now)))
+
+    def sender(self, now: float) -> int:
+        """Return the light that has sent the newest status."""
+        return self._senders(now).newest
+
     def senders(self, now: float) -> frozenset[int]:
-        """Return the lights that have sent lately, as far as starting times tell them apart."""
-        proved = [start.number for start in self._starts
-                  if start.returns >= ENOUGH_RETURNS and now - start.seen_at <= SENDER_TIME]
-        return frozenset(proved) if len(proved) > 1 else frozenset((self.sender,))
+        """Return the lights that have sent lately, as far as they are told apart."""
+        return self._senders(now).proved(now)
 
     def span(self, now: float) -> float:
         """Return the time in which each light sends a status, s; 0 where they are told apart."""
         if not self.detected or len(self.senders(now)) > 1:
             return 0.0
         return GAP_MARGIN * max(self._gaps, default=0.0)
-
-    def _take_start(self, start: float, now: float) -> None:
-        self._starts = [one for one in self._starts if now - one.seen_at <= SENDER_TIME]
-        for one in self._starts:
-            difference = (start - one.start + WRAP_MS / 2) % WRAP_MS - WRAP_MS / 2
-            if abs(difference) < CLOCK_STEP * 1000.0:
-                break
-        else:
-            self._count += 1
-            one = _Start(self._count, start)
-            self._starts = [*self._starts[1 - MAX_STATES:], one]
-        one.returns += one.seen_at > -math.inf and one.number != self.sender
-        one.seen_at = now
-        one.start = start
-        self.sender = one.number
 
     def _take_state(self, status: Status, now: float) -> bool:
         """Return whether a status repeats the last state."""
@@ -331,20 +363,21 @@ class StatusTracker:
         return self._clock.is_suspecting
 
     def take(
-        self, status: Status, now: float, *, was_lost: bool, commanded: bool,
+        self, status: Status, now: float, *, was_lost: bool, commanded: bool, sender: int = 0,
     ) -> tuple[Report[Status] | None, bool]:
         """
         Return the report of a status, None if it is late, and whether the light has restarted.
 
+        :param sender: of the message.
         :param was_lost: whether the light was lost since the newest status.
         :param commanded: whether a command of ours may have changed the light.
         """
         conflict = self.conflict
-        conflict.take(status, now, commanded=commanded)
+        conflict.take(status, now, commanded=commanded, sender=sender)
         if conflict.detected:
             # The uptimes of several lights say nothing about one another.
             self._clock = UptimeClock()
-            return Report(status, now, True, True, conflict.sender, conflict.senders(now),
+            return Report(status, now, False, True, conflict.sender(now), conflict.senders(now),
                           conflict.span(now)), False
         meaning = self._clock.take(status.uptime_ms, now)
         if meaning is Uptime.LATE:
@@ -353,9 +386,9 @@ class StatusTracker:
         if restarted:
             self._sending_times = SendingTimes()
         sent_by, is_told = self._sending_times.take(status, now)
-        sender = conflict.sender
-        return Report(status, sent_by, is_told, sender=sender,
-                      senders=frozenset((sender,))), restarted
+        newest = conflict.sender(now)
+        return Report(status, sent_by, is_told, sender=newest,
+                      senders=frozenset((newest,))), restarted
 
     def lost(self) -> None:
         """Forget the other lights at the address: the light is lost."""

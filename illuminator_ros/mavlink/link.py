@@ -353,12 +353,13 @@ class Link:
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
             return
-        self._heard(channel, peer, frame.source, bytes((frame.sequence,)), now)
+        sender = self._heard(channel, peer, frame.source, bytes((frame.sequence,)), now,
+                             hash((frame.message_id, frame.payload)))
         cls = self._classes.get(frame.message_id)
         if cls is not None:
             self._work_pending = True
             self._safe_call(self.endpoint.inspect, frame, cls)
-            message = decode_payload(cls, frame.payload)
+            message = decode_payload(cls, frame.payload, sender)
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('received from %s: %s', frame.source, message,
                                  extra={'address': frame.source})
@@ -366,20 +367,22 @@ class Link:
 
     def _heard(
         self, channel: Channel, peer: Peer, source: Address, sequences: bytes | bytearray,
-        now: float,
-    ) -> None:
+        now: float, content: int | None = None,
+    ) -> int:
+        """Note frames from an address, and return which of its senders has sent the last one."""
         if not self._frame_received:
             self._frame_received = self._work_pending = True
             self._connector.backoff.answered()
             self._status.take(LinkInput.PROVED, now, channel.name)
         self._greet_at = now + SILENCE
-        self._traffic.count(source, sequences)
+        sender = self._traffic.count(source, sequences, content)
         if channel.heard(peer, now):
             self._work_pending = True
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('new peer %s on %s', peer, channel.name)
             self._safe_call(self.endpoint.link_opened, now)
         self._router.heard(source, peer, now)
+        return sender
 
     def _poll_channel(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:

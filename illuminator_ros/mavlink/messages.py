@@ -87,7 +87,11 @@ class Message:
     :cvar name: name in the XML definition.
     :cvar crc_extra: seeds the checksum, so that both sides have the same definition.
     :cvar base_size: bytes of the payload without extension fields, as MAVLink 1 sends it.
+    :ivar sender: of a received message, which of several senders with one address has sent it,
+        as far as their sequence numbers tell; see :class:`~.statistics.SequenceCounter`.
     """
+
+    sender: int = 0
 
     id: ClassVar[int]  # noqa: A003 - the term of the specification
     name: ClassVar[str]
@@ -171,7 +175,7 @@ def encode_payload(message: Message) -> bytes:
     return codec.pack(*codec.values(message))
 
 
-def decode_payload(cls: type[M], payload: bytes) -> M:
+def decode_payload(cls: type[M], payload: bytes, sender: int = 0) -> M:
     """
     Return the message of a checked payload.
 
@@ -183,7 +187,9 @@ def decode_payload(cls: type[M], payload: bytes) -> M:
     size = codec.size
     if len(payload) != size:
         payload = payload[:size].ljust(size, b'\0')
-    return cls(*codec.arguments(codec.unpack(payload)))
+    message = cls(*codec.arguments(codec.unpack(payload)))
+    message.sender = sender
+    return message
 
 
 class MavCmd(IntEnum):

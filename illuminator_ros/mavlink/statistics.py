@@ -28,6 +28,10 @@ MAX_SOURCES = 256
 # are two frames: the number has 8 bits.
 WINDOW = 64
 _ALL_SEEN = (1 << WINDOW) - 1
+# Frames within which a sender must continue for another one with its address to be told from
+# it, and by how many numbers at most.
+INTERLEAVED = 32
+CONTINUED = 4
 # s
 RECENT = 10.0
 
@@ -62,6 +66,16 @@ class WindowedCounter(NamedTuple):
         return self.growth / elapsed if elapsed > 0 else 0.0
 
 
+class _Place(NamedTuple):
+    """Where a sender left off: see the fields of :class:`SequenceCounter`."""
+
+    sender: int
+    newest: int
+    seen: int
+    contents: dict[int, tuple[int, int]]
+    left_at: int
+
+
 @dataclass(slots=True)
 class SequenceCounter:
     """
@@ -69,12 +83,23 @@ class SequenceCounter:
 
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
     loss. Behind a router that leaves out messages, what it leaves out looks lost.
+
+    Two senders with one address count each for itself, so the numbers jump back and forth, or
+    frames with one number differ.
+
+    :ivar sender: of the newest frame. A sender that was heard before keeps its number; one that
+        loses many frames gets a new one.
     """
 
     received: int = 0
     lost: int = 0
     duplicate: int = 0
     reordered: int = 0
+    sender: int = 0
+    _senders: int = 1
+    _left: _Place | None = None
+    # By sequence number: a hash, and how many frames had been received by then.
+    _contents: dict[int, tuple[int, int]] = field(default_factory=dict)
     _newest: int = -1
     # The number that follows, -1 while that is not known.
     _next: int = -1
@@ -83,38 +108,77 @@ class SequenceCounter:
     _recently_lost: WindowedCounter = WindowedCounter()
     _recently_received: WindowedCounter = WindowedCounter()
 
-    def add(self, sequence: int) -> None:
-        """Take the number of a frame that has come."""
+    def add(self, sequence: int, content: int | None = None) -> None:
+        """
+        Take the number of a frame that has come.
+
+        :param content: a hash of the frame, None where it is not known.
+        """
         self.received += 1
         if sequence == self._next:
             self._newest, self._next = sequence, (sequence + 1) & 0xFF
             self._seen = (self._seen << 1 | 1) & _ALL_SEEN
-            return
-        self._add_irregular(sequence)
-        self._next = (self._newest + 1) & 0xFF
+        else:
+            self._add_irregular(sequence, content)
+            self._next = (self._newest + 1) & 0xFF
+        if content is not None:
+            self._contents[sequence] = content, self.received
 
-    def _add_irregular(self, sequence: int) -> None:
+    def _add_irregular(self, sequence: int, content: int | None) -> None:
         if self._newest < 0:
             # Nothing is known of what went before, so nothing of it is missing.
             self._newest, self._seen = sequence, _ALL_SEEN
             return
-        ahead = (sequence - self._newest) & 0xFF
-        back = 256 - ahead
-        if 0 < ahead <= 128 or back > WINDOW - 1 and ahead:
-            self.lost += ahead - 1 if ahead <= 128 else 0
-            seen = self._seen << ahead | 1 if ahead <= 128 else _ALL_SEEN
-            self._seen = seen & (_ALL_SEEN)
-            self._newest = sequence
-        elif not ahead or self._seen >> back & 1:
+        back = (self._newest - sequence) & 0xFF
+        is_seen = back < WINDOW and bool(self._seen >> back & 1)
+        if is_seen and not self._differs(sequence, content):
             self.duplicate += 1
-        else:
+            return
+        if self._return_to_left(sequence):
+            back = (self._newest - sequence) & 0xFF
+        elif is_seen or back >= WINDOW and 256 - back > WINDOW:
+            # Of another sender, or after a long loss.
+            self.lost += 255 - back if not is_seen and back >= 128 else 0
+            self._left = self._place()
+            self.sender, self._senders = self._senders, self._senders + 1
+            self._newest, self._seen, self._contents = sequence, _ALL_SEEN, {}
+            return
+        if back < WINDOW:
             self._seen |= 1 << back
             self.reordered += 1
             self.lost -= 1
+        else:
+            ahead = 256 - back
+            self.lost += ahead - 1
+            self._seen = (self._seen << ahead | 1) & _ALL_SEEN
+            self._newest = sequence
+
+    def _differs(self, sequence: int, content: int | None) -> bool:
+        """Return whether a frame that has come had the same number and another content."""
+        known, at = self._contents.get(sequence, (content, 0))
+        return content is not None and known != content and self.received - at <= 2 * WINDOW
+
+    def _place(self) -> _Place:
+        return _Place(self.sender, self._newest, self._seen, self._contents, self.received)
+
+    def _return_to_left(self, sequence: int) -> bool:
+        """Return whether a number continues those of the sender before."""
+        left = self._left
+        if left is None or self.received - left.left_at > INTERLEAVED:
+            return False
+        continues_left, continues = (
+            0 < (sequence - newest) & 0xFF <= CONTINUED for newest in (left.newest, self._newest))
+        if continues or not continues_left:
+            return False
+        self._left = self._place()
+        self.sender, self._newest, self._seen, self._contents, _ = left
+        return True
 
     def restart(self) -> None:
         """Forget the numbers but not the counts: what comes next follows on nothing."""
         self._newest = self._next = -1
+        self._left = None
+        self._contents = {}
 
     def reset_loss(self) -> None:
         """Forget recent losses: the sequence numbers of the sender have restarted."""
@@ -176,16 +240,24 @@ class Traffic:
         return replace(self, sources={
             source: copy(counter) for source, counter in self.sources.items()})
 
-    def count(self, source: Address, sequences: bytes | bytearray) -> None:
-        """Count frames with the right checksum by their sequence numbers."""
+    def count(
+        self, source: Address, sequences: bytes | bytearray, content: int | None = None,
+    ) -> int:
+        """
+        Count frames with the right checksum by their sequence numbers.
+
+        :param content: a hash of the only frame, None where it is not known.
+        :return: the sender of the last one, see :class:`SequenceCounter`.
+        """
         counter = self.sources.get(source)
         if counter is None:
             if len(self.sources) >= MAX_SOURCES:
                 self._frames_of_others += len(sequences)
-                return
+                return 0
             counter = self.sources[source] = SequenceCounter()
         for sequence in sequences:
-            counter.add(sequence)
+            counter.add(sequence, content)
+        return counter.sender
 
     def restart(self) -> None:
         """Forget the sequence numbers but not the counts: the link was interrupted."""

@@ -121,6 +121,7 @@ def test_every_command_has_one_outcome_and_it_is_true(line: str, share: float) -
         assert light.status is not None
         assert light.status.enabled == simulated.device.enabled
         assert 'restarted' not in pair.recorders[simulated.address].events
+        assert not light.snapshot(pair.now).shared_address
 
 
 def test_the_same_seed_gives_the_same_answers() -> None:

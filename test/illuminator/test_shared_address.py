@@ -20,12 +20,15 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import Cause
 from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.model import Status
+from illuminator_ros.illuminator.simulated_properties import FAULTS
+from illuminator_ros.illuminator.status_tracker import AddressConflict
 from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
 from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight
-from support.shared_address import SharedAddress
+from support.fake_light import FakeLight, status_message
+from support.shared_address import SharedAddress, TwoDevices
 
 AUTOPILOT = Address(1, 1)
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
@@ -115,6 +118,39 @@ def test_a_switch_fails_where_one_of_two_lights_does_not_obey(
         assert not result.success, result.message
         pair.run(2.0)
     assert pair.light.restarts <= 1
+
+
+@pytest.mark.parametrize('later', [0.002, 0.037, 1.2])
+@pytest.mark.parametrize('numbers', [(0, 1), (0, 20), (0, 128), (5, 200)])
+def test_two_equal_devices_started_together_are_told_apart_by_their_sequence_numbers(
+    numbers: tuple[int, int], later: float,
+) -> None:
+    pair = TwoDevices(numbers, later)
+    pair.run(40.0)
+    assert pair.light.snapshot(pair.link.now).shared_address
+    for on in (True, False) * 3:
+        assert pair.enable(on).success
+    second = pair.lights[1]
+    second.behave(FAULTS.add(second.behaviour, 'lie'), pair.link.now)
+    for _ in range(10):
+        result = pair.enable(True)
+        assert not result.success, result.message
+
+
+def test_two_devices_started_in_the_same_millisecond_are_taken_for_one() -> None:
+    pair = TwoDevices((0, 0), 0.0)
+    pair.run(40.0)
+    assert not pair.light.snapshot(pair.link.now).shared_address
+
+
+def test_light_whose_frames_come_again_over_a_slower_line_is_one_light() -> None:
+    conflict = AddressConflict()
+    for second in range(60):
+        # The numbers of the slower line are 2 s and more than 64 frames behind.
+        for sender, sent_at in ((0, 100 + second), (1, 98 + second)):
+            conflict.take(Status.from_message(status_message(1000 * sent_at)),
+                          100.1 + second + sender / 2, commanded=False, sender=sender)
+    assert not conflict.detected
 
 
 def test_a_set_makes_two_lights_equal_again(different: Pair) -> None:

@@ -65,6 +65,26 @@ def test_lost_duplicate_and_reordered_frames_are_counted_apart(
     assert counts(after(sequences)) == expected
 
 
+@pytest.mark.parametrize(('frames', 'senders', 'lost'), [
+    # Numbers far from one another; the first jump looks like a loss.
+    ([(10, 0), (100, 0), (11, 1), (101, 1), (13, 2), (102, 2), (14, 3)], '0101010', 90),
+    ([(10, 0), (200, 0), (11, 1), (201, 1), (12, 2)], '01010', 0),
+    # The same numbers: frames that differ are of two senders, those that do not are one.
+    ([(10, 1), (10, 1), (11, 2), (11, 3), (12, 4), (12, 5), (13, 6)], '0001100', 0),
+    # One sender: repeated, late, lost, after a restart, and with unknown contents.
+    ([(10, 1), (10, 1), (12, 3), (11, 2), (11, 2), (40, 4)], '000000', 27),
+    ([(10, 1), (11, 2), (200, 3), (201, 4), (202, 5)], '00111', 0),
+    ([(10, None), (10, None), (9, None), (11, None)], '0000', 0),
+    ([*((number % 256, number) for number in range(254, 600)), (80, 592)], '0' * 347, 0)])
+def test_senders_with_one_address_are_told_apart_by_numbers_and_contents(
+        frames: list[tuple[int, int | None]], senders: str, lost: int) -> None:
+    counter, found = SequenceCounter(), ''
+    for number, content in frames:
+        counter.add(number, content)
+        found += str(counter.sender)
+    assert (found, counter.lost) == (senders, lost)
+
+
 @st.composite
 def journeys(draw: st.DrawFn) -> tuple[list[int], Counts]:
     """Return the order in which frames arrive, and the counts that follow from it."""

@@ -30,7 +30,7 @@ from support.shared_address import SharedAddress
 from support.slow import CLOCK, SlowLink, SPEED
 
 CLASH = 'another sender uses our address 1/194'
-SHARED = 'several lights answer as 1/1: their statuses contradict one another'
+SHARED = 'several lights answer as 1/1: each needs an address of its own'
 
 
 def is_of(node: str) -> Callable[[DiagnosticArray], bool]:

@@ -35,6 +35,7 @@ from illuminator_ros.mavlink.messages import (
     LAYOUTS,
     MavCmd,
 )
+from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
@@ -61,6 +62,7 @@ class _End:
         self.sent: list[tuple[float, Any]] = []
         self.received: list[tuple[float, Address, Any]] = []
         self._sequences: dict[Address, int] = {}
+        self._traffic = Traffic()
 
     def flush(self, now: float) -> None:
         while self.endpoint.outgoing:
@@ -78,7 +80,9 @@ class _End:
         for frame in self.decoder.feed(data):
             cls = self.classes.get(frame.message_id)
             if cls is not None:
-                message = decode_payload(cls, frame.payload)
+                sender = self._traffic.count(frame.source, bytes((frame.sequence,)), hash(
+                    (frame.message_id, frame.payload)))
+                message = decode_payload(cls, frame.payload, sender)
                 self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)

@@ -142,8 +142,8 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]
         if status.invalid:
             findings.append((diagnostics.WARN, f'implausible: {", ".join(status.invalid)}'))
     if light.shared_address:
-        findings.append((diagnostics.WARN, f'several lights answer as {light.address}: their '
-                                           'statuses contradict one another'))
+        findings.append((diagnostics.WARN, f'several lights answer as {light.address}: each needs '
+                                           'an address of its own'))
     if light.limit_exceeded.impossible:
         findings.append((diagnostics.ERROR, light.limit_exceeded.impossible))
     findings += [(diagnostics.WARN, text) for text in light.limit_exceeded.excess]
