@@ -18,6 +18,7 @@
 SUBJECTS = {
     'enable': 'the time that ~/enable takes, and 50 clients at the same moment',
     'status': 'the time from a status on the wire to a subscriber',
+    'gimbal': 'the time from a rate of a gimbal to the datagram',
     'foreign': 'CPU for the frames of others on the link',
     'burst': 'frames lost of a burst',
     'noise': 'frames recovered from noise',
