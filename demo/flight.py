@@ -74,9 +74,11 @@ from illuminator_ros.rededge.simulated import (  # noqa: E402
 # s to start a program, and s from its start to the take-off, real time.
 START_TIMEOUT, LEAD_TIME = 20.0, 0.5
 END_TIMEOUT = 5.0
-# s that a message may take from its stamp to the camera, real time; and the share of images in
+# s, flight time, after which the node refuses a fix, and an attitude.
+POSITION_TIMEOUT, ATTITUDE_TIMEOUT = 1.0, 0.5
+# s that a message may take from the node to the camera, real time; and the share of images in
 # undisturbed flight whose fix is not older than one interval. Both depend on the computer's load.
-MAX_DELAY, LEAST_FRESH = 0.1, 0.25
+MAX_DELIVERY, LEAST_FRESH = 0.1, 0.25
 
 
 def publish(flight: Flight) -> None:
@@ -205,7 +207,8 @@ def fly(flight: Flight, images: Path, directory: Path) -> Comparison:
     link = camera.plug_in()
     parameters = {
         'connection_url': f'serial://{port}:57600', 'geoid_separation': GEOID,
-        'position_timeout': 1.0 / speed, 'attitude_timeout': 0.5 / speed,
+        'position_timeout': POSITION_TIMEOUT / speed,
+        'attitude_timeout': ATTITUDE_TIMEOUT / speed,
         'attitude_rate': ATTITUDE_RATE * speed}
     node = ('-m', 'illuminator_ros.rededge', '--ros-args', *(
         text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')))
@@ -231,7 +234,7 @@ def fly(flight: Flight, images: Path, directory: Path) -> Comparison:
     with images.open(newline='') as file:
         rows = list(csv.DictReader(file))
     return compare((Image.read(row, begin, speed) for row in rows), flight,
-                   max_delay=MAX_DELAY * speed, least_fresh=LEAST_FRESH)
+                   max_delay=POSITION_TIMEOUT + MAX_DELIVERY * speed, least_fresh=LEAST_FRESH)
 
 
 def report(result: Comparison, speed: float) -> str:

@@ -20,7 +20,7 @@ Times are flight time, s since the take-off. A flight may be played faster than 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
@@ -43,7 +43,7 @@ IMAGE_INTERVAL, VALIDITY, OUTAGE, PULL, RETURN = 0.5, 5.0, 8.0, 3.0, 12.0
 LATITUDE, LONGITUDE, ALTITUDE, GEOID = 47.397742, 8.545594, 488.0, 48.0
 METRES_PER_DEGREE = 111_319.49
 # m from the truth at the time of the image, for a fix that is not older than one interval; m from
-# the truth at the time of the fix, for any; degrees from the truth within MAX_DELAY.
+# the truth at the time of the fix, for any; degrees from the truth at one and the same moment.
 MAX_POSITION_ERROR, MAX_FIX_ERROR, MAX_ANGLE_ERROR = 0.5, 0.05, 0.05
 
 # From the axes of the camera, FRD with x out of the lens, to those of the image.
@@ -79,6 +79,21 @@ class Truth(NamedTuple):
     vehicle: Quaternion
     camera: Quaternion
     velocity: Vector
+
+
+class Pair(NamedTuple):
+    """
+    Attitude and mount of an image.
+
+    :param time: and ``mount_time``, when the camera received them; the same if they came together.
+        An image between the two messages has the new attitude, and the mount that came before.
+    :param mount: attitude of the image in the vehicle.
+    """
+
+    time: float
+    vehicle: Quaternion
+    mount_time: float
+    mount: Quaternion
 
 
 class Window(NamedTuple):
@@ -152,31 +167,37 @@ class Flight:
             (image.longitude - truth.longitude) * METRES_PER_DEGREE
             * math.cos(math.radians(truth.latitude)), image.altitude - truth.altitude)
 
-    def angle(self, time: float, image: Image) -> float:
-        """Return the larger error of the attitudes of vehicle and camera, degrees."""
-        truth = self.truth(time)
-        assert image.vehicle and image.camera
-        return math.degrees(max(
-            image.vehicle.angle_to(truth.vehicle), image.camera.angle_to(truth.camera)))
-
-    def delay(self, image: Image, time: float, limit: float) -> tuple[float, float]:
+    def delay(self, pair: Pair, limit: float) -> tuple[float, float]:
         """
-        Return the delay, within a limit, that explains the attitude of an image best.
+        Return the delay, within a limit, that explains attitude and mount best.
 
-        Vehicle and camera must have the same: they are of one instant.
+        It must be the same for both, since they are of one instant, if they came together.
 
         :return: the delay, s; and the error that it leaves, degrees.
         """
-        steps = [limit * number / 40 for number in range(-40, 41)]
-        best = min(steps, key=lambda delay: self.angle(time - delay, image))
-        low, high = best - limit / 40, best + limit / 40
-        for _ in range(40):
-            third = (high - low) / 3
-            if self.angle(time - low - third, image) < self.angle(time - high + third, image):
-                high -= third
-            else:
-                low += third
-        return low, self.angle(time - low, image)
+        def vehicle(delay: float) -> float:
+            return math.degrees(pair.vehicle.angle_to(self.truth(pair.time - delay).vehicle))
+
+        def mount(delay: float) -> float:
+            truth = self.truth(pair.mount_time - delay)
+            return math.degrees(pair.mount.angle_to(truth.vehicle.inverse() * truth.camera))
+
+        if pair.time == pair.mount_time:
+            return least(lambda delay: vehicle(delay) + mount(delay), limit)
+        return max(least(vehicle, limit), least(mount, limit), key=lambda found: found[1])
+
+
+def least(error: Callable[[float], float], limit: float) -> tuple[float, float]:
+    """Return the argument, within a limit on both sides, with the least error; and that error."""
+    best = min((limit * number / 40 for number in range(-40, 41)), key=error)
+    low, high = best - limit / 40, best + limit / 40
+    for _ in range(40):
+        third = (high - low) / 3
+        if error(low + third) < error(high - third):
+            high -= third
+        else:
+            low += third
+    return low, error(low)
 
 
 @dataclass(frozen=True)
@@ -185,8 +206,8 @@ class Image:
     A line of the simulated camera's CSV, in flight time.
 
     :param time: by the camera's clock.
-    :param position_age: and ``attitude_age``, s; None if its own sensors were used.
-    :param vehicle: and ``camera``, attitudes as :class:`Truth` has them.
+    :param position_age: s; None if it is that of its own GPS.
+    :param pair: None without an injected attitude.
     """
 
     time: float
@@ -194,9 +215,7 @@ class Image:
     longitude: float
     altitude: float
     position_age: float | None
-    attitude_age: float | None
-    vehicle: Quaternion | None
-    camera: Quaternion | None
+    pair: Pair | None
 
     @classmethod
     def read(cls, row: Mapping[str, str], begin: float, speed: float) -> Image:
@@ -208,14 +227,20 @@ class Image:
         def age(name: str) -> float | None:
             return float(row[f'{name}_age_s']) * speed if row[f'{name}_age_s'] else None
 
-        def rotation(prefix: str) -> Quaternion | None:
-            texts = [row[f'{prefix}{name}_deg'] for name in ('roll', 'pitch', 'yaw')]
-            return Quaternion.from_euler(*(math.radians(float(text)) for text in texts)) if all(
-                texts) else None
+        def rotation(prefix: str) -> Quaternion:
+            return Quaternion.from_euler(*(math.radians(float(row[f'{prefix}{name}_deg']))
+                                           for name in ('roll', 'pitch', 'yaw')))
 
-        return cls((float(row['time_utc_s']) - begin) * speed, float(row['latitude_deg']),
-                   float(row['longitude_deg']), float(row['altitude_m']), age('position'),
-                   age('attitude'), rotation(''), rotation('camera_'))
+        time, pair = (float(row['time_utc_s']) - begin) * speed, None
+        attitude_age, mount_age = age('attitude'), age('mount')
+        if attitude_age is not None and mount_age is not None:
+            vehicle = rotation('')
+            together = abs(mount_age - attitude_age) < 0.5 / ATTITUDE_RATE
+            pair = Pair(time - attitude_age, vehicle,
+                        time - (attitude_age if together else mount_age),
+                        vehicle.inverse() * rotation('camera_'))
+        return cls(time, float(row['latitude_deg']), float(row['longitude_deg']),
+                   float(row['altitude_m']), age('position'), pair)
 
 
 @dataclass
@@ -227,7 +252,7 @@ class Comparison:
     :param fresh: how many have a fix that is not older than one interval.
     :param position_error: of those, from the truth at the time of the image, at most, m.
     :param fix_error: of every injected position, from the truth at the time of the fix, m.
-    :param angle_error: of every injected attitude, from the truth at its own time, degrees.
+    :param angle_error: of every injected attitude and mount, from the truth, degrees.
     :param delay: by which such a time differs from what the ages say, at most, s.
     :param oldest: age of the oldest injected position or attitude, s.
     :param own: images in the outage with the position of the camera's own GPS.
@@ -257,7 +282,7 @@ def compare(
     """
     Compare the images of a flight with the truth.
 
-    :param max_delay: s that a message may take to the camera, flight time.
+    :param max_delay: s that a message may take from its stamp to the camera, flight time.
     :param least_fresh: the share of images outside the disturbances whose fix must be fresh.
     """
     result, calm = Comparison(), 0
@@ -270,8 +295,9 @@ def compare(
         disturbed = time >= flight.pull.begin or (
             flight.outage.begin <= time <= flight.outage.end + 2 / FIX_RATE)
         calm += not disturbed
-        ages = [age for age in (one.position_age, one.attitude_age) if age is not None]
-        result.oldest = max(result.oldest, *ages, 0.0)
+        result.oldest = max(
+            result.oldest, one.position_age or 0.0,
+            time - min(one.pair.time, one.pair.mount_time) if one.pair else 0.0)
         if one.position_age is None:
             result.own += time in flight.outage
         else:
@@ -281,8 +307,8 @@ def compare(
                 result.fresh += not disturbed
                 result.returned += time >= flight.pull.end
                 result.position_error = max(result.position_error, flight.distance(time, one))
-        if one.attitude_age is not None:
-            delay, error = flight.delay(one, time - one.attitude_age, max_delay)
+        if one.pair:
+            delay, error = flight.delay(one.pair, max_delay)
             result.angle_error = max(result.angle_error, error)
             result.delay = max(result.delay, abs(delay))
     expected = flight.seconds / IMAGE_INTERVAL

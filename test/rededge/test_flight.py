@@ -159,7 +159,8 @@ def test_comparison_finds_wrong_angles_and_old_data() -> None:
             changed, flight, max_delay=0.001, least_fresh=1.0).failures)
 
     assert 'an attitude is wrong by 0.1' in failures(
-        [replace(one, camera=one.camera and one.camera * turned) for one in images])
+        [replace(one, pair=one.pair and one.pair._replace(mount=one.pair.mount * turned))
+         for one in images])
     assert 'data that is 6.00 s old' in failures(
         [*images[1:], replace(images[0], position_age=6.0)])
     assert 'instead of 72' in failures(images[5:])
