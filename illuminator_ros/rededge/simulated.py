@@ -236,6 +236,29 @@ def _position(message: GpsRawInt | GlobalPositionInt) -> dict[str, Any]:
             'satellites': None if satellites == UNKNOWN_SATELLITES else satellites}
 
 
+def _own_position(place: Place | None) -> dict[str, Any]:
+    """Return the columns of the position of its own GPS."""
+    return {} if place is None else {
+        'fix_type': FIX_3D, 'latitude_deg': place.latitude, 'longitude_deg': place.longitude,
+        'altitude_m': place.altitude}
+
+
+def _orientation(attitude: Attitude | None, mount: MountStatus | None) -> dict[str, Any]:
+    """Return the columns of the angles of vehicle, mount and camera."""
+    pitch, roll, yaw = (angle / 100 for angle in (
+        mount.pointing_a, mount.pointing_b, mount.pointing_c)) if mount else (0.0, 0.0, 0.0)
+    columns = {'mount_roll_deg': roll, 'mount_pitch_deg': pitch, 'mount_yaw_deg': yaw}
+    if attitude is None:
+        return columns
+    vehicle = Quaternion.from_euler(attitude.roll, attitude.pitch, attitude.yaw)
+    camera = Quaternion.from_euler(*map(math.radians, (roll, pitch, yaw)))
+    return {
+        **columns,
+        **dict(zip(('roll_deg', 'pitch_deg', 'yaw_deg'), _angles(vehicle), strict=True)),
+        **dict(zip(('camera_roll_deg', 'camera_pitch_deg', 'camera_yaw_deg'),
+                   _angles(vehicle * _DOWN * camera * _DOWN.inverse()), strict=True))}
+
+
 def _angles(rotation: Quaternion) -> tuple[float, float, float]:
     roll, pitch, yaw = map(math.degrees, rotation.euler())
     return roll, pitch, yaw % 360
@@ -409,43 +432,31 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         """
         self._count += 1
         time_utc, time_source = self._clock(now)
-        position = self._fresh(self._position, now)
-        attitude, mount = self._fresh(self._attitude, now), self._fresh(self._mount, now)
-        columns: dict[str, Any] = dict.fromkeys(COLUMNS)
-        if position:
-            columns |= _position(position.message)
-        elif self.own_gps:
-            place = self.own_gps
-            columns |= {'fix_type': FIX_3D, 'latitude_deg': place.latitude,
-                        'longitude_deg': place.longitude, 'altitude_m': place.altitude}
-        pitch, roll, yaw = (angle / 100 for angle in (
-            mount.message.pointing_a, mount.message.pointing_b, mount.message.pointing_c,
-        )) if mount else (0.0, 0.0, 0.0)
-        if attitude:
-            vehicle = Quaternion.from_euler(
-                attitude.message.roll, attitude.message.pitch, attitude.message.yaw)
-            camera = Quaternion.from_euler(*map(math.radians, (roll, pitch, yaw)))
-            columns |= zip(('roll_deg', 'pitch_deg', 'yaw_deg'), _angles(vehicle), strict=True)
-            columns |= zip(('camera_roll_deg', 'camera_pitch_deg', 'camera_yaw_deg'),
-                           _angles(vehicle * _DOWN * camera * _DOWN.inverse()), strict=True)
+        position, attitude, mount = (
+            self._fresh(self._position, now), self._fresh(self._attitude, now),
+            self._fresh(self._mount, now))
         image = Image(**{
-            **columns, 'camera': self._component, 'image': self._count,
-            'shot': shot.name.lower(), 'trigger': trigger,
-            'img_idx': self._index if trigger == 'mavlink' else None,
+            **dict.fromkeys(COLUMNS),
+            **(_position(position.message) if position else _own_position(self.own_gps)),
+            **_orientation(attitude and attitude.message, mount and mount.message),
+            'camera': self._component, 'image': self._count, 'shot': shot.name.lower(),
+            'trigger': trigger, 'img_idx': self._index if trigger == 'mavlink' else None,
             'time_utc_s': time_utc, 'time_source': time_source,
-            'position_source': Source.INJECTED if position else
-            Source.OWN if self.own_gps else Source.NONE,
+            'position_source': Source.INJECTED if position else self._own_source,
             'position_age_s': position and now - position.at,
             'attitude_source': Source.INJECTED if attitude else Source.NONE,
             'attitude_age_s': attitude and now - attitude.at,
             'mount_source': Source.INJECTED if mount else Source.NONE,
-            'mount_age_s': mount and now - mount.at, 'mount_roll_deg': roll,
-            'mount_pitch_deg': pitch, 'mount_yaw_deg': yaw})
+            'mount_age_s': mount and now - mount.at})
         if self._ground is None:
             self._ground = image.altitude_m
         self.images.append(image)
         self.records.emit(image.row())
         return image
+
+    @property
+    def _own_source(self) -> Source:
+        return Source.OWN if self.own_gps else Source.NONE
 
     def _fresh(self, injected: Injected[M] | None, now: float) -> Injected[M] | None:
         return injected if injected and now - injected.at <= self.behaviour.validity else None
@@ -488,10 +499,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
-        own = Source.OWN if self.own_gps else Source.NONE
         injected: tuple[tuple[str, Injected[Any] | None, Source], ...] = (
-            ('position', self._position, own), ('attitude', self._attitude, Source.NONE),
-            ('mount', self._mount, Source.NONE))
+            ('position', self._position, self._own_source),
+            ('attitude', self._attitude, Source.NONE), ('mount', self._mount, Source.NONE))
         count = f'{self._count:4} image{"s" if self._count != 1 else " "}'
         state = (count, f'time {self._clock(now)[1].value}', *(
             f'{name} {(Source.INJECTED if self._fresh(one, now) else other).value}'
