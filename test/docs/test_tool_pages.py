@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
 from typing import Any
 
 from illuminator_ros.cli.simulator.components import scenario
@@ -102,3 +103,23 @@ def test_the_sample_file_of_the_simulator_is_valid() -> None:
     lights = scenario(yaml.safe_load(text), 'the sample', [SIMULATED]).listed['light']
 
     assert [one.name for one in lights] == ['bow', 'stern']
+
+
+def test_the_rules_of_gimbals_have_their_tests_and_requirements() -> None:
+    folder = DOC.parent / 'test' / 'gimbal'
+    tests = re.findall(r'^def (test_gm_\w+)\(', ''.join(
+        (folder / f'test_simulated_{one}.py').read_text() for one in ('device', 'manager')), re.M)
+    requirements: list[Requirement[Any]] = [*device.REQUIREMENTS, *manager.REQUIREMENTS]
+    page = (DOC / 'gimbal.md').read_text()
+    rules = {rule: (re.findall('`(.*?)`', proofs), re.findall('`(.*?)`', names))
+             for rule, proofs, names in table(page, 'rule in simulation')}
+
+    def named(rule: str) -> tuple[list[str], list[str]]:
+        return ([one for one in tests if f'{rule.lower().replace("-", "_")}_' in one],
+                list(dict.fromkeys(one.name for one in requirements if re.search(
+                    rf'{rule}\b', f'{one.title} {one.section}'))))
+
+    assert rules == {rule: named(rule) for rule in rules}
+    assert {name for _, names in rules.values() for name in names} == {
+        one.name for one in requirements if 'GM-' in f'{one.title} {one.section}'}
+    assert {name for found, _ in rules.values() for name in found} == set(tests)

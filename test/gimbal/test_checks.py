@@ -65,6 +65,7 @@ SEEDED = {
     },
     'gimbal_manager': {
         **COMMON,
+        'no-int': {'command-int', 'roi'},
         'refuse': {'take', 'release', 'unchanged', 'secondary', 'neutral', 'retract',
                    'flags-shown', 'roi', *POINTING, *TURNING},
         'progress': {'finished'},
@@ -72,7 +73,7 @@ SEEDED = {
         'disobey': {'no-control-command', 'no-control-roi'},
         'lie': {'take', 'secondary', 'one-player', 'roi', 'neutral', 'retract',
                 'flags-shown', *POINTING, *TURNING},
-        'frozen-axis': {*POINTING, *TURNING},
+        'frozen-axis': {'roi', *POINTING, *TURNING},
         'obeys-everybody': {'no-control-command', 'no-control-messages', 'one-player'},
         'no-status': {'status-stream', 'status-request', 'attitude-stream'},
         'stale-flags': {'neutral', 'retract', 'flags-shown'},
@@ -271,6 +272,16 @@ def test_a_manager_without_its_status_is_found_by_its_information() -> None:
     one = run('gimbal_manager', 'no-status', only=('heartbeat', 'status-stream')).finish()
     assert one.session.found == Address(1, 154)
     assert one.failed == {'status-stream'}
+
+
+def test_the_attitude_of_a_manager_is_that_of_the_device_that_it_names() -> None:
+    session, managed = manager.CHECKS.session(Address(255, 190)), Address(1, 194)
+    session.receive(managed, gimbal.GimbalManagerStatus(0, 0, 154, 0, 0, 0, 0), 1.0)
+    q = (1.0, 0.0, 0.0, 0.0)
+    for component in (154, 171):
+        session.receive(Address(1, component), AttitudeStatus(
+            0, 0, component, 32, q, 0.0, 0.0, 0.0, 0), 1.0)
+    assert [one.time_boot_ms for _, one in session.received(AttitudeStatus)] == [154]
 
 
 def test_the_heading_of_another_component_leaves_north_unchecked() -> None:

@@ -304,7 +304,7 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     command_int(INFORMATION),
     setpoint, *MOTION, earth_frame, yaw_lock, only_manager, one_manager, manager_set,
-    other_target, *component.interval_requirements(AttitudeStatus),
+    other_target, *component.interval_requirements(AttitudeStatus, optional=True),
     component.heartbeat_rate, *CONTENT, status_to_all, continuous, uptime,
     *component.ACKNOWLEDGEMENTS, component.checksums,
 )

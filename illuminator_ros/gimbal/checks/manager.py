@@ -60,12 +60,13 @@ from .tester import (
 )
 from .. import messages as gimbal
 from ..messages import Capabilities, GimbalCommand
-from ...mavlink.messages import Address
+from ...mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, requirement
 from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transaction
 from ...payload.checks.specification import MESSAGES, ROUTING
 from ...payload.mount import MountFlags
+from ...payload.vehicle import Attitude, GlobalPositionInt
 from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
 
 INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
@@ -75,18 +76,29 @@ VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
 NOBODY = Address(0, 0)
 # s from an acknowledgement to the status that shows the control.
 SHOWN_TIMEOUT = 1.5
+# Degrees 1e7 and mm: the vehicle that is played, which heads 15 degrees from north, and degrees
+# 1e7 and m: a place 111 m north of it and 30 m below.
+VEHICLE = (474_000_000, 85_000_000, 500_000)
+HEADING = 15.0
+PLACE = (474_010_000, 85_000_000, 470.0)
+NORTH = Pose(0.0, -15.1, -HEADING)
 
 controls = partial(requirement, needs_consent=True)
 
 
 class ManagerTester(GimbalTester):
-    """Plays players that take control of a gimbal manager, and command it."""
+    """
+    Plays players that take control of a gimbal manager, and command it.
+
+    :ivar vehicle: the autopilot that is played, None for none.
+    """
 
     information = INFORMATION
     status = MANAGER_STATUS
 
     def __init__(self, session: Session, conditions: Conditions) -> None:
         super().__init__(session, conditions)
+        self.vehicle: Address | None = None
         self._control_before: Control | None = None
 
     @property
@@ -139,6 +151,16 @@ class ManagerTester(GimbalTester):
         if (await self.control())[0] != self.session.address:
             await self.configure(*self.session.address, *NOBODY)
             await self.pause(0.3)
+
+    async def pause(self, seconds: float) -> None:
+        """See :class:`GimbalTester`."""
+        if self.vehicle is not None:
+            milliseconds = int(self.session.now * 1000) & 0xFFFFFFFF
+            self.session.send(Attitude(
+                milliseconds, 0.0, 0.0, math.radians(HEADING), 0.0, 0.0, 0.0), self.vehicle)
+            self.session.send(GlobalPositionInt(
+                milliseconds, *VEHICLE, 0, 0, 0, 0, int(100 * HEADING)), self.vehicle)
+        await super().pause(seconds)
 
     # Setpoints
 
@@ -274,7 +296,8 @@ async def secondary(tester: ManagerTester) -> None:
     try:
         await tester.take(tester.session.address, tester.other)
     finally:
-        await tester.configure(-1, -1, 0, 0)
+        # Only its holder may end it in a manager that needs consent (GM-17).
+        await tester.configure(-3, -3, -3, -3, sender=tester.other)
 
 
 @controls('unchanged', 'leaves control as it is at -1', MESSAGES,
@@ -516,17 +539,32 @@ async def all_devices(tester: ManagerTester) -> None:
     await tester.reach(target)
 
 
-@moves('roi', 'accepts a region of interest, and its end (GM-8)', GIMBAL,
-       'Gimbal Manager Messages')
-async def roi(tester: ManagerTester) -> None:
-    """Set one far below the horizon, as COMMAND_INT, and clear it."""
+@moves('roi', 'points at a place, and ends that (GM-8)', GIMBAL, 'Gimbal Manager Messages')
+async def roi(tester: ManagerTester) -> str:
+    """Set a place north of the vehicle; play the vehicle where there is no autopilot."""
     await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
     await tester.begin()
-    sent = [await tester.session.command(
-        GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id)]
-    await tester.pause(0.5)
-    sent.append(await tester.session.command(GimbalCommand.DO_SET_ROI_NONE, tester.device_id))
-    fail_if([None if one.accepted else one.failure() for one in sent])
+    session = tester.session
+    autopilot = Address(session.device.system, MAV_COMP_ID_AUTOPILOT1)
+    tester.vehicle = None if autopilot in session.heard else autopilot
+    try:
+        await tester.pause(0.5)
+        one = await session.command(
+            GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0, *PLACE,
+            as_int=True)
+        if not one.accepted and tester.vehicle is None:
+            raise Skipped(f'{one.answer}: it may not know where the vehicle is')
+        if not one.accepted:
+            raise one.failure()
+        if tester.vehicle is not None:
+            await tester.reach(NORTH)
+        pose = await tester.pose()
+        one = await session.command(GimbalCommand.DO_SET_ROI_NONE, tester.device_id)
+        if not one.accepted:
+            raise one.failure()
+        return str(pose)
+    finally:
+        tester.vehicle = None
 
 
 REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
@@ -543,10 +581,16 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     set_attitude, *MOTION, angles_with_rates, set_pitchyaw, pitchyaw, pitchyaw_rate, one_axis,
     manual, earth_frame, flags_shown, roi,
     no_control_command, no_control_messages, no_control_roi, other_device, all_devices,
-    other_target,    *component.interval_requirements(MANAGER_STATUS),
+    other_target,    *component.interval_requirements(MANAGER_STATUS, optional=True),
     component.heartbeat_rate, *CONTENT, continuous, uptime,
     *component.ACKNOWLEDGEMENTS, component.checksums,
 )
+
+
+def device_of(message: Message) -> int:
+    """Return the component id of the gimbal device of a manager, 0 if it is the manager itself."""
+    found = message.gimbal_device_id if isinstance(message, INFORMATION | MANAGER_STATUS) else 0
+    return 0 if found in gimbal.NON_MAVLINK_IDS else found
 
 
 CHECKS: PayloadChecks[ManagerTester] = PayloadChecks(
@@ -559,4 +603,4 @@ CHECKS: PayloadChecks[ManagerTester] = PayloadChecks(
     question='Most checks take control of gimbal manager {device}, and turn its gimbal, also to '
              'the end of its\nrange and to its retracted position. At the end it is turned back, '
              'and control is restored.\nMay the checks control gimbal manager {device}? [y/N] ',
-    mavlink_version=2, discovery=INFORMATION)
+    mavlink_version=2, discovery=INFORMATION, part_of=device_of)

@@ -209,13 +209,21 @@ def status_stream(
     return check
 
 
-def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], ...]:
-    """Return the requirements ``interval``, ``interval-stop`` and ``interval-default``."""
+def interval_requirements(
+    status: type[Message], *, optional: bool = False,
+) -> tuple[Requirement[Tester], ...]:
+    """
+    Return the requirements ``interval``, ``interval-stop`` and ``interval-default``.
+
+    :param optional: whether a device need not support the command.
+    """
     on_interval = partial(requirement, specification=MESSAGES,
                           section='MAV_CMD_SET_MESSAGE_INTERVAL', changes=True)
 
     async def set_interval(tester: Tester, interval: float) -> None:
         one = await tester.session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
+        if optional and one.result == MavResult.UNSUPPORTED:
+            raise Skipped(one.answer)
         if not one.accepted:
             raise one.failure()
 

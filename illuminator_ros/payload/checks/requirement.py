@@ -174,6 +174,7 @@ class PayloadChecks(Generic[T]):
     :param component: the component id that alone identifies a device, see :class:`Session`.
     :param traces: what the checks leave, although they restore the device.
     :param discovery: a message that is requested of all components until a device is found.
+    :param part_of: names a part of a device that is another component, see :class:`Session`.
     """
 
     payload: str
@@ -191,12 +192,13 @@ class PayloadChecks(Generic[T]):
     component: int | None = None
     traces: str = ''
     discovery: type[Message] | None = None
+    part_of: Callable[[Message], int] = lambda message: 0
 
     def session(self, address: Address, target: Address | None = None) -> Session:
         """Return a session with a device, from our address."""
         return Session(
             address, self.messages, self.is_device, self.describe, target, self.component,
-            self.discovery)
+            self.discovery, self.part_of)
 
 
 # For the command line, which does not use the tester.

@@ -303,6 +303,8 @@ class Session(Endpoint):
     :param component: the component id that alone identifies the device, whose system id changes;
         None if its address stays the same.
     :param discovery: a message that is requested of all components until the device is found.
+    :param part_of: returns the component id of a part of the device, from a message of the
+        device; the payload's messages of that component are recorded, too. 0 for no part.
     :ivar found: the present address of the device, once it is heard.
     :ivar heard: all senders.
     :ivar devices: the senders that are devices of this payload.
@@ -319,6 +321,7 @@ class Session(Endpoint):
         is_device: Callable[[Message], bool], describe: Callable[[Message], str],
         target: Address | None, component: int | None = None,
         discovery: type[Message] | None = None,
+        part_of: Callable[[Message], int] = lambda message: 0,
     ) -> None:
         super().__init__()
         self.address = address
@@ -338,6 +341,8 @@ class Session(Endpoint):
         self._component = component
         self._is_device = is_device
         self._discovery = discovery
+        self._part_of, self._part = part_of, 0
+        self._payload_messages = frozenset(payload_messages)
         self._describe = describe
         self._began: float | None = None
         self._last_heard = -math.inf
@@ -379,6 +384,11 @@ class Session(Endpoint):
             self.found = source
             self._last_heard = now
             self._note('<', self._describe(message) or _protocol_text(message))
+            self._record(message)
+            self._part = self._part_of(message) or self._part
+        elif self.found is not None and source == (self.found.system, self._part) and (
+                type(message) in self._payload_messages):
+            self._note('<', f'from {source}: {self._describe(message) or message.name}')
             self._record(message)
         self.runner.advance(now)
 
@@ -547,7 +557,8 @@ class Session(Endpoint):
     ) -> None:
         values = [*map(float, one.params), *[0.0] * (7 - len(one.params))]
         message = messages.CommandInt(
-            *target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3], 0, 0, 0.0,
+            *target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3],
+            int(values[4]), int(values[5]), values[6],
         ) if as_int else messages.CommandLong(
             *target, one.command, min(confirmation, 255), *values)
         one.sent.append(self.now)
