@@ -35,21 +35,16 @@ def _with_flags(shown: str, status: Status) -> str:
 
 @dataclass(frozen=True)
 class Switch:
-    """
-    Switches a light on or off.
-
-    :param instance: which light of the component; 0 is all of them.
-    """
+    """Switches all lights of a component on or off: those of one cannot be selected."""
 
     on: bool
-    instance: int = 0
     note: str = ''
     command: int = MavCmd.ILLUMINATOR_ON_OFF
 
     @property
     def params(self) -> tuple[float, ...]:
         """See :class:`Change`."""
-        return float(self.on), float(self.instance)
+        return (float(self.on),)
 
     @property
     def goal(self) -> str:
@@ -80,14 +75,13 @@ class Configure:
 
     configuration: Configuration
     names: list[str]
-    instance: int = 0
     note: str = ''
     command: int = MavCmd.DO_ILLUMINATOR_CONFIGURE
 
     @property
     def params(self) -> tuple[float, ...]:
         """See :class:`Change`."""
-        return *self.configuration.params(), float(self.instance)
+        return self.configuration.params()
 
     @property
     def goal(self) -> str:

@@ -114,14 +114,13 @@ class ConfigurationManager:
 
     def __init__(
         self, target: Target, emit: Callable[[events.AnyLightEvent], None], *,
-        limits: SafetyLimits, instance: int = 0, restore: bool = True, reassert: bool = False,
+        limits: SafetyLimits, restore: bool = True, reassert: bool = False,
     ) -> None:
         self.confirmed: Configuration | None = None
         self.discrepancy = ''
         self._target = target
         self._address = target.address
         self._emit = emit
-        self._instance = instance
         self._restore = restore
         self._safety = limits
         self._is_limited = limits != SafetyLimits()
@@ -266,7 +265,7 @@ class ConfigurationManager:
         # Here, since each command is made here: no way to the light passes around the limits.
         limited = self._safety.clipped(goal, self._limits)
         return Configure(limited, list(dict.fromkeys((*values, *goal.differences(limited)))),
-                         self._instance, note)
+                         note)
 
     def _sendable(self, confirmed: Configuration, changes: Changes) -> Configuration:
         """

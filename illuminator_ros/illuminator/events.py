@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from .model import Configuration, FIELDS, Limits, Status
+from .model import Configuration, FIELDS, Status
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause as HolderCause
 from ..payload.arbitration import HolderChanged
@@ -258,11 +258,6 @@ class LightSnapshot:
     unreachable: str
     holder: str | None = None
     held_since: float = 0.0
-
-    @property
-    def limits(self) -> Limits:
-        """Return the strobe periods that the light reports to be possible."""
-        return self.status.limits if self.status else Limits()
 
     def events(self) -> list[AnyLightEvent]:
         """Return the events that lead to this state, for a listener that comes late."""

@@ -20,16 +20,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 
-from . import events
+from . import configuration_manager, events
 from .commands import Switch
-from .configuration_manager import (
-    ConfigurationManager,
-    IMPLIED_TIME,
-    LATE_TIME,
-    REPEAT_INTERVAL,
-    REPEATS,
-    REPORT_INTERVAL,
-)
+from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
 from .model import Changes, DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
 from .sources import DEFAULT, Sources, SourceSettings
@@ -101,19 +94,15 @@ class Light:
     :ivar status: the newest status, None before the first.
     :ivar lost_at: when it was lost, s; infinity while it is heard.
     :ivar restarts: how often it has restarted since it was found.
-    :ivar instance: which light of the component it is; 0 means all of them: commands
-        cannot select one until mavlink pull request 2490 is settled.
     :ivar was_commanded: whether a user has ever sent it a command.
     :ivar has_answered: whether it has ever answered a command.
     """
 
     def __init__(
         self, address: Address, commands: CommandSender, settings: Settings,
-        emit: Callable[[events.AnyLightEvent], None], changed: Callable[[Light, float], None], *,
-        instance: int = 0,
+        emit: Callable[[events.AnyLightEvent], None], changed: Callable[[Light, float], None],
     ) -> None:
         self.address = address
-        self.instance = instance
         self.settings = settings
         self.connected = False
         self.heard_at = -math.inf
@@ -131,7 +120,7 @@ class Light:
             status_name='ILLUMINATOR_STATUS')
         self._identity_query = IdentityQuery(self._target)
         self._configuration = ConfigurationManager(
-            self._target, emit, limits=settings.limits, instance=instance,
+            self._target, emit, limits=settings.limits,
             restore=settings.restore_configuration, reassert=settings.reassert)
         self._switching: RequestQueue[Status] = RequestQueue(self._target)
         self._tracker = StatusTracker()
@@ -146,11 +135,12 @@ class Light:
         self._late_until = -math.inf
         # The brightness that the light reports while it is off: 0 where that is the switch, too.
         self._off_brightness: float | None = None
-        self._rate = RateLimit(REPORT_INTERVAL)
+        self._rate = RateLimit(configuration_manager.REPORT_INTERVAL)
         # When the last request came, or the light was seen to be switched on, s.
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
-        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
+        self._undoing = RepeatLimit(
+            configuration_manager.REPEATS, configuration_manager.REPEAT_INTERVAL)
         self._sources = Sources(settings.sources) if settings.sources else None
         self._refreshes: list[_Refresh] = []
 
@@ -234,7 +224,7 @@ class Light:
         on = self._last_switch[0]
         is_own = (on == status.enabled and now <= self._late_until
                   or self._off_brightness == 0.0
-                  and now <= self._configuration.sent_at + IMPLIED_TIME)
+                  and now <= self._configuration.sent_at + configuration_manager.IMPLIED_TIME)
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(
             self.address, status.enabled, origin, left_out=self._rate.take(now)))
@@ -435,14 +425,14 @@ class Light:
 
     def _switch(self, on: bool, now: float, done: Done, detail: str | None) -> None:
         """Submit a request; ``detail`` is None where its caller reports the change itself."""
-        change = Switch(on, self.instance)
+        change = Switch(on)
         was_on: bool | None = None
 
         def prepare(now: float) -> Change[Status]:
             nonlocal was_on
             was_on = self._enabled
             self._last_switch = on, now
-            self._late_until = now + LATE_TIME
+            self._late_until = now + configuration_manager.LATE_TIME
             return change
 
         def finished(
@@ -614,7 +604,8 @@ class Light:
                 return
             self._emit(events.AutomaticSwitch(
                 self.address, switch.on, switch.reason, result.message))
-            due = switch.limit.take(now) if switch.limit else now + REPEAT_INTERVAL
+            wait = configuration_manager.REPEAT_INTERVAL
+            due = switch.limit.take(now) if switch.limit else now + wait
             if due is None:
                 self._automatic = None
                 self._emit(events.ChangedByOther(

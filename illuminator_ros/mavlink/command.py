@@ -389,11 +389,6 @@ class CommandSender:
         else:
             self._requests[command.target].append(request)
 
-    def pending(self, target: Address, command: int) -> bool:
-        """Return whether a command was sent to a target and has not ended."""
-        return any(request.command.command == command
-                   for request in self._requests.get(target, ()))
-
     def cancel(self, command: Command, now: float) -> None:
         """End a command that was started with CANCELLED, if it has not ended."""
         for request in list(self._requests.get(command.target, ())):

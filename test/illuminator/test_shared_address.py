@@ -19,14 +19,12 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.illuminator.events import Cause
-from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.illuminator.status_tracker import AddressConflict
-from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.messages import Address, MavCmd
 import pytest
-from support.back_to_back import BRIDGE, Pair
+from support.back_to_back import Pair
 from support.fake_light import FakeLight, status_message
 from support.shared_address import SharedAddress, TwoDevices
 
@@ -162,20 +160,3 @@ def test_a_set_makes_two_lights_equal_again(different: Pair) -> None:
     assert not different.snapshot.shared_address
     assert different.snapshot.configuration
     assert different.snapshot.configuration.brightness == 70.0
-
-
-@pytest.mark.parametrize('instance', [0, 2])
-def test_commands_carry_the_instance_of_the_light(instance: int) -> None:
-    sender = CommandSender(BRIDGE)
-    light = Light(AUTOPILOT, sender, Settings(), lambda event: None, lambda light, now: None,
-                  instance=instance)
-    light.heard(0.0)
-    light.enable(True, 0.0, lambda result, now: None)
-    light.configure(
-        {'mode': 'internal_control', 'brightness': 50.0, 'strobe_period': 0.0,
-         'strobe_duty_cycle': 0.0}, 0.0, lambda result, now: None)
-    sent: dict[int, Any] = {
-        getattr(message, 'command', 0): message for _, message in sender.outgoing}
-    assert (sent[ON_OFF].param1, sent[ON_OFF].param2) == (1.0, instance)
-    assert (sent[CONFIGURE].param1, sent[CONFIGURE].param2, sent[CONFIGURE].param5) == (
-        1.0, 50.0, instance)
