@@ -42,7 +42,7 @@ from support.waiting import eventually, PATIENCE
 
 pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
 
-from support.mavsdk_player import player, plugin, result  # noqa: E402
+from support.mavsdk_player import player, plugin, result  # noqa: E402, I100
 
 OURS, THEIRS, MANAGER = Address(1, 194), Address(1, 195), Address(1, 154)
 # The number of the gimbal in MAVSDK's list.

@@ -29,7 +29,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
 from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped  # noqa: E402
 from rclpy.qos import DurabilityPolicy  # noqa: E402

@@ -25,7 +25,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from illuminator_ros.gimbal.ros.gimbal_node import PUBLICATIONS, REQUESTS  # noqa: E402
+from illuminator_ros.gimbal.ros.gimbal_node import PUBLICATIONS, REQUESTS  # noqa: E402, I100
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402
 from illuminator_ros.payload.mount import to_mavlink, YawFrame  # noqa: E402
 from illuminator_ros.payload.rotation import Quaternion  # noqa: E402

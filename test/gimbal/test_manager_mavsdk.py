@@ -30,7 +30,7 @@ from support.waiting import eventually
 
 pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
 
-from support.mavsdk_player import player, plugin, result  # noqa: E402
+from support.mavsdk_player import player, plugin, result  # noqa: E402, I100
 
 FIRST, SECOND = Address(1, 195), Address(1, 196)
 GIMBAL = 1
