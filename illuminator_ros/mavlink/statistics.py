@@ -134,7 +134,8 @@ class SequenceCounter:
         if is_seen and not self._differs(sequence, content):
             self.duplicate += 1
             return
-        if self._return_to_left(sequence):
+        is_late = back < WINDOW and not is_seen
+        if not is_late and self._return_to_left(sequence):
             back = (self._newest - sequence) & 0xFF
         elif is_seen or back >= WINDOW and 256 - back > WINDOW:
             # Of another sender, or after a long loss.

@@ -74,6 +74,9 @@ def test_lost_duplicate_and_reordered_frames_are_counted_apart(
     # One sender: repeated, late, lost, after a restart, and with unknown contents.
     ([(10, 1), (10, 1), (12, 3), (11, 2), (11, 2), (40, 4)], '000000', 27),
     ([(10, 1), (11, 2), (200, 3), (201, 4), (202, 5)], '00111', 0),
+    # One that is later than the window, after which late ones do not lead back and forth.
+    ([*((number, number) for number in range(100, 195) if number not in (129, 192)),
+      (129, 129), (192, 192), (200, 200), (196, 196), (201, 201)], '0' * 93 + '1' * 5, 70),
     ([(10, None), (10, None), (9, None), (11, None)], '0000', 0),
     ([*((number % 256, number) for number in range(254, 600)), (80, 592)], '0' * 347, 0)])
 def test_senders_with_one_address_are_told_apart_by_numbers_and_contents(
