@@ -123,7 +123,7 @@ def bridge(
     """Run the bridge; enter when it has opened its link."""
     given = {'connection_url': url, **parameters}
     overrides = [text for key, value in given.items() for text in ('-p', f'{key}:={value}')]
-    return _ready(python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={name}',
+    return ready(python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={name}',
                          *overrides), 'link open')
 
 
@@ -135,11 +135,12 @@ def simulator(url: str, *arguments: str) -> AbstractContextManager[Program]:
 def peer(name: str, *arguments: str) -> AbstractContextManager[Program]:
     """Run one of ``peers/``; enter when it is ready."""
     path = PEERS / f'{name}.py'
-    return _ready(Program(sys.executable, str(path), *arguments), 'ready')
+    return ready(Program(sys.executable, str(path), *arguments), 'ready')
 
 
 @contextlib.contextmanager
-def _ready(program: Program, text: str) -> Iterator[Program]:
+def ready(program: Program, text: str) -> Iterator[Program]:
+    """Run a program; enter when it has printed a text."""
     with running(program):
         program.wait_for(text, PATIENCE)
         yield program

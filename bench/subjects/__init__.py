@@ -31,5 +31,6 @@ SUBJECTS = {
     'loss': 'commands through loss',
     'parallel': 'the delay that a silent light causes to others',
     'gimbal_manager': 'the way of a setpoint, and control that players compete for',
+    'rededge': 'the way of a fix to a camera, and CPU',
     'limits': 'the documented time limits',
 }

@@ -58,6 +58,10 @@ HURRY = 1.0
 STORE_INTERVAL = 30.0
 # s that a channel stays open until it is proved without a frame.
 PROBATION = 1.0
+# s for which the line may still be busy when the next group of a stream is written, so that it has
+# no gaps. The most urgent group may wait behind one more in the line.
+AHEAD = 0.002
+URGENT_AHEAD = 0.02
 # s without a frame from any peer, longer than between heartbeats; and then between greetings. A
 # router that has restarted forwards nothing to us until it has heard us.
 SILENCE = 1.5
@@ -416,7 +420,7 @@ class Link:
         """Return when messages of streams can be sent, infinity if the channel will tell."""
         if self._channel is None or self._channel.is_waiting or not self._streams:
             return math.inf
-        return self._line_free_at
+        return self._line_free_at - (URGENT_AHEAD if self._streams.is_urgent else AHEAD)
 
     def _send_messages(self, messages: deque[tuple[Address, Message]]) -> None:
         while messages and self._channel is not None:

@@ -43,6 +43,11 @@ class StreamQueue:
     def __bool__(self) -> bool:
         return any(self._held)
 
+    @property
+    def is_urgent(self) -> bool:
+        """Return whether a message of the most urgent group is held."""
+        return bool(self._held and self._held[0])
+
     def hold(self, source: Address, message: Message) -> bool:
         """Take a message, if it belongs to a stream; return whether it does."""
         place = self._places.get(type(message))

@@ -73,8 +73,7 @@ class RedEdgeClient(Payload):
     sends = (DigicamControl, GpsRawInt, SystemTime, GlobalPositionInt, Attitude, MountStatus,
              GpsStatus)
     # A position must not wait behind attitudes.
-    streams = ((GpsRawInt,), (SystemTime, GlobalPositionInt), (Attitude, MountStatus),
-               (GpsStatus,))
+    streams = ((GpsRawInt, SystemTime, GlobalPositionInt), (Attitude, MountStatus), (GpsStatus,))
 
     def __init__(
         self, commands: CommandSender, settings: Settings, *, sequence: int | None = None,

@@ -290,8 +290,13 @@ def mount_angles(mount: Quaternion, frame: MountFrame) -> Vector:
     """
     if frame is MountFrame.OPTICAL:
         mount = mount * _FROM_OPTICAL.inverse()
-    roll, pitch, yaw = (_ZERO_POSE.inverse() * flip(mount)).euler()
-    return math.degrees(roll), math.degrees(pitch), math.degrees(yaw)
+    turned = _ZERO_POSE.inverse() * flip(mount)
+    _, pitch, yaw = (round(math.degrees(angle), 2) for angle in turned.euler())
+    # Near the singular pitch the errors of rounded yaw and roll would add up: let roll make up
+    # for that of yaw.
+    rest = Quaternion.from_euler(0.0, math.radians(pitch), math.radians(yaw)).inverse() * turned
+    return math.degrees(2 * math.atan2(*(
+        (rest.x, rest.w) if rest.w >= 0 else (-rest.x, -rest.w)))), pitch, yaw
 
 
 def mount_status(angles: Vector, target: tuple[int, int]) -> MountStatus:

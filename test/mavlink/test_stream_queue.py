@@ -108,21 +108,22 @@ def run(rate: float, seconds: float) -> tuple[SimulatedLink, list[tuple[float, M
 
 
 def test_on_a_slow_line_nothing_waits_and_whole_pairs_of_the_newest_are_sent() -> None:
-    link, sent, size = run(RATE, 10.0)
+    link, sent, size = run(RATE, 9.95)
     positions = [(at, one) for at, one in sent if isinstance(one, GlobalPositionInt)]
     others = [(at, one) for at, one in sent if not isinstance(one, GlobalPositionInt)]
     # A pair takes 8 ms of the line.
     late = [at - (1000.0 + one.time_boot_ms * 0.1) for at, one in positions]
 
     assert len(positions) == 100
-    assert max(late) < 0.012
-    assert 0.9 * RATE < size / 10.0 <= 1.01 * RATE
+    assert max(late) < 0.001
+    assert 0.9 * RATE < size / 9.95 <= 1.01 * RATE
     for (at, one), (_, other) in zip(others[::2], others[1::2], strict=True):
         assert isinstance(one, Attitude)
         assert (one, other) == pair(one.time_boot_ms)
         assert at - (1000.0 + one.time_boot_ms * 0.005) < 0.006
     dropped = link.snapshot(link.now).traffic.frames_dropped
-    assert dropped + len(others) in (2 * 2000, 2 * 2000 + 2, 2 * 2000 - 2)
+    # The newest may still wait.
+    assert 2 * 1990 - 2 <= dropped + len(others) <= 2 * 1991
 
 
 def test_on_a_fast_link_each_message_is_sent() -> None:

@@ -43,8 +43,8 @@ OPTICAL = Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 ZERO_POSE = Rotation.from_matrix([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
 
 angles = st.floats(-math.pi, math.pi)
-# The singular pitch of 90 degrees, and its neighbours, too.
-pitches = st.sampled_from((-90.0, 90.0, -89.999, 89.99)).map(math.radians) | angles
+# The singular pitch of 90 degrees of the vehicle and its neighbours, and that of the mount.
+pitches = st.sampled_from((-90.0, 90.0, -89.999, 89.99, 0.0, 0.3, -1.0)).map(math.radians) | angles
 rotations = st.builds(Quaternion.from_euler, angles, pitches, angles)
 anything = st.floats(allow_nan=True, allow_infinity=True)
 
@@ -105,9 +105,20 @@ def test_mount_status_recomposes_any_mount_within_its_own_step_re_22(
     status = conversions.mount_status(
         conversions.mount_angles(quaternion(given_), frame), TARGET)
 
-    assert error(recomposed(status), oracle(flip(body))) < 0.01
+    # Three angles that are rounded to 0.01 degrees, about axes at right angles.
+    assert error(recomposed(status), oracle(flip(body))) < 0.005 * math.sqrt(3) + 1e-4
     assert all(-18000 < value <= 18000 for value in (
         status.pointing_a, status.pointing_b, status.pointing_c))
+
+
+def test_rounded_angles_do_not_add_up_where_roll_and_yaw_turn_about_one_axis_re_22() -> None:
+    exact = ZERO_POSE * Rotation.from_euler('ZYX', [20.0052, 89.8, 10.0048], degrees=True)
+    body = flip(quaternion(exact))
+
+    status = conversions.mount_status(
+        conversions.mount_angles(body, MountFrame.CAMERA), TARGET)
+
+    assert error(recomposed(status), exact) < 0.006
 
 
 @given(rotations)

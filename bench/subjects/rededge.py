@@ -1,0 +1,190 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A camera that is fed over a line of 57,600 baud, beside what a user would write.
+
+The line is a pseudo-terminal, and each byte takes its time of the line from when it arrives, or
+from the end of the byte before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import math
+import os
+import random
+import select
+import threading
+import time
+import tty
+
+from geometry_msgs.msg import Quaternion as QuaternionMessage
+from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.rededge.conversions import (
+    attitude,
+    mount_angles,
+    mount_status,
+    MountFrame,
+)
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
+from std_msgs.msg import Header
+from support.processes import python
+from support.strict_mavlink_1 import OVERHEAD, strict_frames
+
+from ..rig import Bench, Client, cpu, peer, ready
+from ..rows import at_most, one, quantiles, Row, times
+
+# bytes/s
+LINE_RATE = 57600 / 10
+FIX_RATE = 10.0
+GPS_RAW_INT = 24
+ROTATIONS = 100_000
+
+
+class Line:
+    """The far end of a serial line: when each frame has been sent, by what is in it."""
+
+    def __init__(self) -> None:
+        self._far, self._near = os.openpty()
+        tty.setraw(self._near)
+        self.device = os.ttyname(self._near)
+        self.frames = 0
+        # When the last byte of each fix was sent, s, by its latitude.
+        self.sent: dict[int, float] = {}
+        self._stopping, self._stop = os.pipe()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> Line:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        os.write(self._stop, b'\0')
+        self._thread.join()
+        for descriptor in (self._far, self._near, self._stopping, self._stop):
+            os.close(descriptor)
+
+    def _run(self) -> None:
+        rest, free_at = b'', 0.0
+        while self._stopping not in select.select([self._far, self._stopping], [], [])[0]:
+            data = os.read(self._far, 65536)
+            free_at = max(free_at, time.perf_counter()) + len(data) / LINE_RATE
+            found, rest = strict_frames(rest + data)
+            end = free_at - len(rest) / LINE_RATE
+            for frame in reversed(found):
+                if frame.message_id == GPS_RAW_INT:
+                    self.sent[int.from_bytes(frame.payload[8:12], 'little')] = end
+                end -= (len(frame.payload) + OVERHEAD) / LINE_RATE
+            self.frames += len(found)
+
+
+def measure(bench: Bench) -> Iterator[Row]:
+    """Feed both at once, at a rate that the line carries, and at one that it does not."""
+    for rate in (50.0, 200.0):
+        yield from fed(bench, rate)
+    yield orientation(bench)
+
+
+def fed(bench: Bench, rate: float) -> Iterator[Row]:
+    """Yield the rows at a rate of attitudes, Hz."""
+    with contextlib.ExitStack() as stack:
+        ours, theirs = stack.enter_context(Line()), stack.enter_context(Line())
+        node = stack.enter_context(ready(python(
+            'illuminator_ros.rededge', f'serial://{ours.device}:57600', '--ros-args', '-r',
+            '~/fix:=/fix', '-r', '~/imu:=/imu', '-p', f'attitude_rate:={rate}'), 'link open'))
+        script = stack.enter_context(peer('straightforward_feeder', theirs.device))
+        client = stack.enter_context(Client(bench.domain))
+        began, used, seconds = publish(client, rate, bench.amount(20.0, 1.5), node.pid, script.pid)
+        time.sleep(bench.amount(0.5, 0.2))
+        overloaded = time.perf_counter()
+        late = {name: [1e3 * (line.sent.get(number, overloaded) - at)
+                       for number, at in began.items()]
+                for name, line in (('ours', ours), ('theirs', theirs))}
+    found = {name: quantiles(values) for name, values in late.items()}
+    name = 'straightforward script'
+    yield Row(f'fix on a topic to its last byte on the line, beside {rate:g} Hz attitudes', 'ms',
+              found['ours'], {name: found['theirs']}, [at_most(found['ours']['p99'], 25, 'ms')],
+              f'{len(began)} fixes; {ours.frames} frames, all accepted by a strict parser')
+    share = [one(100 * value / seconds) for value in used]
+    yield Row(f'CPU for {rate:g} Hz attitudes and {FIX_RATE:g} Hz fixes', '%', share[0],
+              {name: share[1]}, [times(share[0], share[1], 1.0)] if rate < 100 else [],
+              'the script checks nothing and has no heartbeat')
+
+
+def publish(
+    client: Client, rate: float, seconds: float, *pids: int,
+) -> tuple[dict[int, float], list[float], float]:
+    """
+    Publish for a time.
+
+    Return when each fix was published, the CPU time of the processes, and the time that it took.
+    """
+    node = client.node
+    fixes = node.create_publisher(NavSatFix, '/fix', 10)
+    imus = node.create_publisher(Imu, '/imu', 10)
+    until = time.monotonic() + 30.0
+    while min(fixes.get_subscription_count(), imus.get_subscription_count()) < len(pids):
+        if time.monotonic() > until:
+            raise RuntimeError('the topics have no subscribers')
+        time.sleep(0.01)
+    time.sleep(0.5)
+    began: dict[int, float] = {}
+    start, before = time.perf_counter(), [cpu(pid) for pid in pids]
+    every = round(rate / FIX_RATE)
+    for number in range(round(seconds * rate)):
+        time.sleep(max(start + number / rate - time.perf_counter(), 0.0))
+        header = Header(stamp=node.get_clock().now().to_msg())
+        angle = number / rate
+        imus.publish(Imu(header=header, orientation=QuaternionMessage(
+            w=math.cos(angle), x=0.0, y=0.0, z=math.sin(angle))))
+        if number % every == 0:
+            began[number + 1] = time.perf_counter()
+            fixes.publish(NavSatFix(
+                header=header, status=NavSatStatus(status=0), latitude=(number + 1) * 1e-7,
+                longitude=8.0, altitude=500.0))
+    return (began, [cpu(pid) - first for pid, first in zip(pids, before, strict=True)],
+            time.perf_counter() - start)
+
+
+def orientation(bench: Bench) -> Row:
+    """Compose what is sent of random attitudes and mounts, and compare it with what was given."""
+    from scipy.spatial.transform import Rotation
+
+    chance = random.Random(1)
+    count = bench.amount(ROTATIONS, 100)
+    given: list[list[float]] = []
+    sent: list[list[float]] = []
+    for _ in range(count):
+        vehicle, body = (Quaternion(*(chance.gauss(0, 1) for _ in range(4))).normalized()
+                         for _ in range(2))
+        one_, two = attitude(vehicle, (0.0, 0.0, 0.0), 0), mount_status(
+            mount_angles(body, MountFrame.CAMERA), (1, 100))
+        both = vehicle * body
+        given.append([both.x, both.y, both.z, both.w])
+        sent.append([one_.yaw, one_.pitch, one_.roll, *(
+            math.radians(value / 100)
+            for value in (two.pointing_c, two.pointing_a, two.pointing_b))])
+    enu_ned = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
+    flu_frd = Rotation.from_euler('x', math.pi)
+    zero_pose = Rotation.from_matrix([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    composed = (Rotation.from_euler('ZYX', [row[:3] for row in sent]) * zero_pose
+                * Rotation.from_euler('ZYX', [row[3:] for row in sent]))
+    wanted = enu_ned * Rotation.from_quat(given) * flu_frd
+    error = math.degrees(max((composed.inv() * wanted).magnitude()))
+    return Row(f'greatest error of {count:,} random attitudes with mounts, as sent', 'degrees',
+               one(error), targets=[at_most(error, 0.01, 'degrees')],
+               note='the step of MOUNT_STATUS is 0.01 degrees')
