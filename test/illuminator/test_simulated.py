@@ -29,6 +29,7 @@ from illuminator_ros.mavlink.messages import (
     INFORMATION_ID,
     MavCmd,
     MavResult,
+    MavType,
 )
 from illuminator_ros.payload.identity import Identity
 import pytest
@@ -74,6 +75,12 @@ def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
     assert encode_payload(information)[16:] == (
         b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
         + b'n' * 31 + b'\0')
+
+
+def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start() -> None:
+    beats = [m for m in LightBench().run(4.5) if isinstance(m, Heartbeat)]
+    assert {(m.type, m.autopilot) for m in beats} == {(MavType.ILLUMINATOR, 8)}
+    assert len(beats) == 5
 
 
 @pytest.mark.parametrize(('microseconds', 'expected'), [

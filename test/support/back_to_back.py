@@ -279,11 +279,6 @@ class Pair:
         """Return the commands that the controller has sent, tries included, all or some kinds."""
         return [message for at, message in self.commands_at(*kinds) if at >= since]
 
-    def commands_to(self, target: Address, kind: MavCmd) -> Iterator[tuple[float, Any]]:
-        """Return the commands of a kind that the controller has sent to a target, with times."""
-        return ((at, message) for at, message in self.commands_at(kind)
-                if (message.target_system, message.target_component) == target)
-
     def commands_at(self, *kinds: MavCmd) -> Iterator[tuple[float, Any]]:
         """Return the same with the times of sending."""
         return ((at, message) for at, message in self.near.sent
