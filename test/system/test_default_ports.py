@@ -12,33 +12,41 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``bridge`` and ``simulator``, both without arguments, find each other."""
+"""A node and its simulator, both without a URL, find each other."""
 
+import contextlib
 import socket
 
 import pytest
-from support.processes import ended, python
-from support.ros import Parameters, Ros
+from support.processes import ended, Program, python
 
-DEFAULT_PORT = 14590
+# Node -> its port, the arguments of its simulator, and the line of its log.
+NODES = {
+    'bridge': (14590, (), 'light 1/243 connected'),
+    'rededge': (14592, ('--payload', 'rededge'), '/100 connected'),
+}
 
 
-@pytest.mark.parametrize('first', ['bridge', 'simulator'])
-def test_programs_without_arguments_find_each_other_whichever_starts_first(
-    own_ros: Ros, first: str,
-) -> None:
-    env = {'ROS_DOMAIN_ID': str(own_ros.domain)}
-    names = ['bridge', 'simulator'] if first == 'bridge' else ['simulator', 'bridge']
+@pytest.mark.parametrize('node_first', [True, False])
+@pytest.mark.parametrize('node', NODES)
+def test_programs_without_a_url_find_each_other_whichever_starts_first(
+        domain: int, node: str, node_first: bool) -> None:
+    port, arguments, found = NODES[node]
+    env = {'ROS_DOMAIN_ID': str(domain)}
     with (socket.socket(socket.AF_UNIX) as claim,
-          socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe):
+          socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
+          contextlib.ExitStack() as programs):
         try:
-            claim.bind('\0illuminator_ros_test_default_port')
-            probe.bind(('127.0.0.1', DEFAULT_PORT))
+            claim.bind(f'\0illuminator_ros_test_default_port_{port}')
+            probe.bind(('127.0.0.1', port))
         except OSError:
-            pytest.skip(f'UDP port {DEFAULT_PORT} is taken')
+            pytest.skip(f'UDP port {port} is taken')
         probe.close()
-        with (ended(python(f'illuminator_ros.{names[0]}', env=env)) as one,
-              ended(python(f'illuminator_ros.{names[1]}', env=env)) as other):
-            (one if first == 'bridge' else other).wait_for('light 1/243 connected')
 
-            Parameters(own_ros).wait(brightness=100.0)
+        def start(name: str) -> Program:
+            more = arguments if name == 'simulator' else ()
+            return programs.enter_context(ended(python(f'illuminator_ros.{name}', *more, env=env)))
+
+        started = {name: start(name) for name in (
+            (node, 'simulator') if node_first else ('simulator', node))}
+        started[node].wait_for(found)
