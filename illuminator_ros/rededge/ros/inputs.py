@@ -86,7 +86,8 @@ def _quaternion(message: QuaternionMessage) -> Quaternion:
     return Quaternion(message.w, message.x, message.y, message.z)
 
 
-def _position(message: NavSatFix) -> Position:
+def position(message: NavSatFix) -> Position:
+    """Return the position, with NaN for deviations that are not known."""
     horizontal = vertical = math.nan
     if message.position_covariance_type != NavSatFix.COVARIANCE_TYPE_UNKNOWN:
         horizontal, vertical = standard_deviations(message.position_covariance)
@@ -94,7 +95,8 @@ def _position(message: NavSatFix) -> Position:
                     horizontal, vertical)
 
 
-def _imu(message: Imu) -> tuple[Quaternion | None, Vector]:
+def orientation_and_rates(message: Imu) -> tuple[Quaternion | None, Vector]:
+    """Return orientation and body rates: None and NaN where the message has none."""
     return (
         None if message.orientation_covariance[0] == NO_VALUE
         else _quaternion(message.orientation),
@@ -122,11 +124,11 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
         feeder.take_time_reference(stamp, utc, now)
 
     return (
-        topic(Input.FIX, NavSatFix, lambda one: (_position(one),), feeder.take_fix),
+        topic(Input.FIX, NavSatFix, lambda one: (position(one),), feeder.take_fix),
         topic(Input.VELOCITY, TwistStamped, lambda one: (_vector(one.twist.linear),),
               feeder.take_velocity),
         CommandTopic(Input.SATELLITES.value, UInt32, feeder.take_satellites),
-        topic(Input.IMU, Imu, _imu, take_attitude(Input.IMU)),
+        topic(Input.IMU, Imu, orientation_and_rates, take_attitude(Input.IMU)),
         topic(Input.ATTITUDE, QuaternionStamped,
               lambda one: (_quaternion(one.quaternion), UNKNOWN), take_attitude(Input.ATTITUDE)),
         topic(Input.MOUNT, QuaternionStamped, lambda one: (_quaternion(one.quaternion),),
