@@ -72,6 +72,7 @@ examples:
   conformance udpin://0.0.0.0:14550 --target 1/243 --junit report.xml
   conformance udpin://127.0.0.1:14590 --yes   the simulator, started without arguments
   conformance udp://:14541@127.0.0.1:14540    the emulator of the MAVLink guide
+  conformance udpin://0.0.0.0:14550 --payload gimbal_manager --target 1/1
 
 The checks change the state of the device; afterwards it is restored.
 exit status: 0 if all checked requirements are met, 1 if not or if no device was found,
