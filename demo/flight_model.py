@@ -206,7 +206,7 @@ class Image:
     A line of the simulated camera's CSV, in flight time.
 
     :param time: by the camera's clock.
-    :param position_age: s; None if it is that of its own GPS.
+    :param position_age: s; None for a position of its own GPS.
     :param pair: None without an injected attitude.
     """
 
