@@ -89,6 +89,13 @@ class Line:
         return [decode_payload(CLASSES[frame.message_id], frame.payload)
                 for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
 
+    def drain(self) -> None:
+        """Drop the datagrams that have come."""
+        self.socket.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self.socket.recv(65536)
+
 
 def configure(player: Address) -> CommandLong:
     """Return the command by which a player takes control."""
@@ -144,8 +151,7 @@ def _setpoints(bench: Bench) -> Row:
                     players.send(PLAYERS[0], heartbeat(MavType.GCS), port)
                     time.sleep(0.01)
                 message = setpoint(PLAYERS[0], pitch=0.3 * math.sin(number))
-                while device.receive(0.0):
-                    pass
+                device.drain()
                 began = time.perf_counter()
                 players.send(PLAYERS[0], message, port)
                 while not any(isinstance(got, GimbalDeviceSetAttitude)
@@ -184,8 +190,8 @@ def _competition(bench: Bench) -> Iterator[Row]:
     holders: set[int] = set()
     statuses = sent = 0
     with managed() as (port, device, players):
-        while players.receive(0.05) or device.receive(0.0):
-            pass
+        for line in (players, device):
+            line.drain()
         began, beat = time.monotonic(), 0.0
         # A second more for late answers.
         while (now := time.monotonic()) < began + seconds + 1.0:

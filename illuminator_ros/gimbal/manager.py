@@ -52,6 +52,7 @@ from .manager_vehicle import VehicleState
 from .messages import (
     AutopilotStateForGimbalDevice,
     Capabilities,
+    ErrorFlags,
     GimbalCommand,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
@@ -63,7 +64,7 @@ from .messages import (
     MAV_TYPE_GIMBAL,
 )
 from ..mavlink import messages as mav
-from ..mavlink.command import Command, CommandResult, CommandSender
+from ..mavlink.command import Command, CommandResult, CommandSender, DEGREE_SCALE
 from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, MavResult
@@ -90,8 +91,12 @@ IDENTITY_TIME = 3.0
 # s between two reports of one kind, and kinds that are told apart.
 REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
+# A COMMAND_LONG has no frame: PX4 takes its altitude for one above mean sea level, too.
+NO_FRAME = -1
 # MAV_FRAMEs of altitudes above mean sea level, and above the home position.
-GLOBAL_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
+GLOBAL_FRAMES, RELATIVE_FRAMES = (0, 5, NO_FRAME), (3, 6)
+_LIMIT_FLAGS = {'roll': ErrorFlags.AT_ROLL_LIMIT, 'pitch': ErrorFlags.AT_PITCH_LIMIT,
+                'yaw': ErrorFlags.AT_YAW_LIMIT}
 _ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
@@ -206,6 +211,8 @@ class GimbalManager(Payload):
         self._attitude: MountAttitude | None = None
         self._status_at = self._measured_at = -math.inf
         self._setpoint: Setpoint | None = None
+        self._sent: Setpoint | None = None
+        self._limits_reached = 0
         self._offsets = STILL
         self._place: GeoPoint | None = None
         self._send_due = self._status_due = self._information_due = math.inf
@@ -303,6 +310,9 @@ class GimbalManager(Payload):
         params, frame = _params(command)
         if command.command == mav.MavCmd.REQUEST_MESSAGE:
             return self._send_requested(params[0], now)
+        if command.command == mav.MavCmd.SET_MESSAGE_INTERVAL:
+            # Each player needs the status, so none may stop it.
+            return MavResult.DENIED if params[0] == GimbalManagerStatus.id else None
         handler = self._handlers.get(command.command)
         if handler is None:
             return None
@@ -342,12 +352,15 @@ class GimbalManager(Payload):
         except ValueError:
             self._attitude = None
         if not self.has_mavlink and self.state is ManagerState.ACTIVE:
-            self._commands.send(replace(status, gimbal_device_id=self.device_id))
+            flags = MountFlags(0) if self._setpoint is None else self._setpoint.operation
+            self._commands.send(replace(
+                status, flags=int(status.flags | flags), gimbal_device_id=self.device_id,
+                failure_flags=status.failure_flags | self._limits_reached))
         self.events.emit(AttitudeReceived(status))
 
     def _report_commanded(self, now: float) -> None:
         """Report the setpoint as attitude of a device that reports none."""
-        attitude = self._pointing(YawFrame.VEHICLE, now) or Quaternion()
+        attitude = self._sent and self._sent.attitude or Quaternion()
         heading = self.vehicle.heading(now)
         self._report(GimbalDeviceAttitudeStatus(
             0, 0, _boot_time(now), int(MountFlags.YAW_IN_VEHICLE_FRAME),
@@ -496,6 +509,7 @@ class GimbalManager(Payload):
             attitude, clipped = clip(
                 mix(attitude, self._offsets), self.model.ranges,
                 0.0 if setpoint.frame is YawFrame.VEHICLE else heading)
+            self._limits_reached = sum(_LIMIT_FLAGS[one.axis] for one in clipped)
             if clipped and self._limit('clipped').take(now) is not None:
                 self.events.emit(SetpointClipped(tuple(clipped)))
         sent = replace(setpoint, attitude=attitude, turning=STILL)
@@ -506,6 +520,7 @@ class GimbalManager(Payload):
             sent = in_vehicle_frame(sent, heading)
         if self.device is not None:
             self._commands.send(_device_message(self.device, sent))
+        self._sent = sent
         self.events.emit(SetpointSent(sent))
 
     def _lose(self, reference: str, now: float) -> None:
@@ -519,12 +534,11 @@ class GimbalManager(Payload):
     ) -> MavResult:
         if self.control.holder(Role.PRIMARY) != source:
             return MavResult.DENIED
-        if frame < 0:
-            return MavResult.COMMAND_INT_ONLY
         if frame not in (*GLOBAL_FRAMES, *RELATIVE_FRAMES):
             return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
-        latitude, longitude, altitude = params[4] / 1e7, params[5] / 1e7, params[6]
-        if abs(latitude) > 90 or abs(longitude) > 180 or not math.isfinite(altitude):
+        scale = 1.0 if frame == NO_FRAME else DEGREE_SCALE
+        latitude, longitude, altitude = params[4] / scale, params[5] / scale, params[6]
+        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
             return MavResult.DENIED
         above = 0.0 if frame in GLOBAL_FRAMES else self.vehicle.home_altitude
         if above is None or self.vehicle.position(now) is None or (
@@ -650,12 +664,12 @@ def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttit
 
 
 def _params(command: AnyCommand) -> tuple[Sequence[float], int]:
-    """Return param1 to param7 of a command, and its MAV_FRAME, -1 for a COMMAND_LONG."""
+    """Return param1 to param7 of a command, and its MAV_FRAME."""
     if isinstance(command, mav.CommandInt):
         return (command.param1, command.param2, command.param3, command.param4, command.x,
                 command.y, command.z), command.frame
     return (command.param1, command.param2, command.param3, command.param4, command.param5,
-            command.param6, command.param7), -1
+            command.param6, command.param7), NO_FRAME
 
 
 def _boot_time(now: float) -> int:

@@ -268,9 +268,14 @@ class Setpoint:
             self.turning))
 
     @property
+    def operation(self) -> MountFlags:
+        """The flags without those of the yaw frame."""
+        return self.flags & _PASSED_ON
+
+    @property
     def device_flags(self) -> MountFlags:
         """The flags for the device."""
-        return self.flags & _PASSED_ON | self.frame.flag
+        return self.operation | self.frame.flag
 
 
 def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> Setpoint:

@@ -43,7 +43,14 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetManualControl,
     GimbalManagerStatus,
 )
-from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat, MavResult, MavType
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    heartbeat,
+    MavCmd,
+    MavResult,
+    MavType,
+)
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.mount import MountFlags, UNSET
 from illuminator_ros.payload.rotation import Quaternion
@@ -129,6 +136,17 @@ def test_gm_10_the_status_is_sent_five_times_a_second() -> None:
     assert {(one.gimbal_device_id, one.primary_control_sysid, one.primary_control_compid,
              one.secondary_control_sysid, one.secondary_control_compid)
             for one in statuses[1:]} == {(DEVICE.component, *PILOT, 0, 0)}
+
+
+def test_gm_13_no_player_stops_the_status_for_the_others() -> None:
+    rig = ManagerRig()
+    begun = rig.now
+
+    result = rig.result(PILOT, long(MavCmd.SET_MESSAGE_INTERVAL, GimbalManagerStatus.id, -1))
+    rig.run(1.0)
+
+    assert result is MavResult.DENIED
+    assert len(rig.messages(GimbalManagerStatus, begun)) >= 5
 
 
 def test_the_status_has_the_flags_of_the_setpoint() -> None:
@@ -450,7 +468,8 @@ def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
     (region(47.1, 8.0, 100.0, frame=10), MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
     (region(97.1, 8.0, 100.0), MavResult.DENIED),
     (region(47.1, 8.0, NAN), MavResult.DENIED),
-    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, 47, 8, 0), MavResult.COMMAND_INT_ONLY)])
+    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, 47, 8, 0), MavResult.ACCEPTED),
+    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, NAN, 8, 0), MavResult.DENIED)])
 def test_gm_8_a_region_of_interest_is_answered_with_its_reason(
         command: Any, result: MavResult) -> None:
     rig = following()

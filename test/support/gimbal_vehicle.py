@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import math
+from typing import Any
 
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings
@@ -116,12 +117,13 @@ class Vehicle(Endpoint):
 
 @contextlib.contextmanager
 def managed_gimbal(
-    port: int, control: ControlSettings | None = None,
+    port: int, control: ControlSettings | None = None, **settings: Any,
 ) -> Iterator[tuple[GimbalManager, SimulatedGimbal, Vehicle]]:
-    """Serve a gimbal and its manager to UDP peers that send to a port."""
+    """Serve a gimbal and its manager to UDP peers; ``settings`` are of the manager."""
     url = f'udpin://127.0.0.1:{port}'
     commands = CommandSender(OURS)
-    manager = GimbalManager(commands, ManagerSettings(control or ControlSettings()))
+    manager = GimbalManager(commands, ManagerSettings(
+        control or ControlSettings(), **settings))
     device = SimulatedGimbal(GimbalProperties(DEVICE))
     vehicle = Vehicle(Component(commands, [manager]), Autopilot(), SimulatedComponents(
         [Description(DEVICE, device)], 0.0))

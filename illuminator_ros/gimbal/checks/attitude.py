@@ -151,6 +151,9 @@ async def continuous(tester: GimbalTester) -> str:
         speeds = [math.hypot(*(rate for rate in (
             status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z)
             if math.isfinite(rate))) for status in (one, other)]
+        # Without rates it has not measured how it turned.
+        if not any(math.isfinite(status.angular_velocity_y) for status in (one, other)):
+            continue
         if _content(one) or _content(other) or other.time_boot_ms < one.time_boot_ms:
             continue
         try:

@@ -147,7 +147,9 @@ class ManagerTester(GimbalTester):
             raise one.failure(f'{one.answer}, and then {control_text(control)}')
 
     async def prepare(self) -> None:
-        """Take primary control."""
+        """Take primary control; the second player gives up what an earlier check gave it."""
+        if self.other in await self.control():
+            await self.configure(-3.0, -3.0, -3.0, -3.0, sender=self.other)
         if (await self.control())[0] != self.session.address:
             await self.configure(*self.session.address, *NOBODY)
             await self.pause(0.3)
@@ -581,7 +583,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     set_attitude, *MOTION, angles_with_rates, set_pitchyaw, pitchyaw, pitchyaw_rate, one_axis,
     manual, earth_frame, flags_shown, roi,
     no_control_command, no_control_messages, no_control_roi, other_device, all_devices,
-    other_target,    *component.interval_requirements(MANAGER_STATUS, optional=True),
+    other_target, *component.interval_requirements(MANAGER_STATUS, optional=True),
     component.heartbeat_rate, *CONTENT, continuous, uptime,
     *component.ACKNOWLEDGEMENTS, component.checksums,
 )
