@@ -130,6 +130,7 @@ class GimbalNode:
     def bind(self, key: GimbalKey, now: float) -> None:
         """Serve a gimbal from now on, and publish what is known of it."""
         self.key = key
+        self._host.frame_log.assign(key.address, self._log)
         if (gimbal := self._gimbal()) is not None:
             snapshot = gimbal.snapshot(now)
             self._interface.publish('connected', not snapshot.unreachable)
@@ -139,6 +140,8 @@ class GimbalNode:
 
     def release(self) -> None:
         """Serve no gimbal: it was forgotten."""
+        if self.key:
+            self._host.frame_log.assign(self.key.address, None)
         self.key = None
 
     def absence(self, now: float) -> str:

@@ -118,10 +118,9 @@ class Gimbals(ServedPayload):
     def _forget(self, key: GimbalKey) -> None:
         self._names.pop(key, None)
         node = self._nodes.pop(key, None)
-        if node is self._first:
-            node.release()
-            return
         if node is not None:
+            node.release()
+        if node is not None and node is not self._first:
             self._host.diagnostics.remove(node.source)
             self._host.log.info(
                 f'gimbal {key} was silent for long: {node.full_name} is removed', 'forgotten')
