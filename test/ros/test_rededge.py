@@ -241,6 +241,9 @@ def test_simulated_time_is_no_utc_until_a_reference_tells_it_re_14(own_ros: Ros)
             eventually(lambda: reference.publish(TimeReference(
                 header=Header(stamp=now), time_ref=Time(sec=now.sec + 1_700_000_000)))
                 or camera.messages('GPS_RAW_INT'))
+            # A recording starts again.
+            now = Time(sec=20)
+            eventually(lambda: 'ROS time has jumped: waiting for ~/time_reference' in newest())
         assert camera.messages('GPS_RAW_INT')[0].time_usec // 1_000_000 - 1_700_000_000 < 10_000
 
 
