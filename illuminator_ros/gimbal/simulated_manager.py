@@ -515,4 +515,7 @@ SIMULATED = SimulatedType(
     make=lambda settings, address, several: SimulatedManager(
         manager_properties(settings, address)),
     address=lambda settings: _profile(settings).address, settings=SETTINGS, mavlink_version=2,
-    profiles={name: profile.description for name, profile in PROFILES.items()})
+    profiles={name: profile.description for name, profile in PROFILES.items()},
+    examples=(
+        'simulator --payload gimbal_manager --heading 40',
+        'simulator --payload gimbal_manager --profile ardupilot --fault frozen-axis=yaw'))

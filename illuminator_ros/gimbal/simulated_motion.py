@@ -82,7 +82,6 @@ class GimbalMechanics:
     :param yaw: relative to the vehicle's heading; a full turn has no stop.
     :param rate: highest rate of each axis, rad/s.
     :param drift: of the gimbal's own heading where it gets none from the vehicle, rad/s.
-    :param retracted: roll, pitch and yaw of the retracted position, rad.
     """
 
     roll: Range = Range(*map(math.radians, (-45.0, 45.0)))
@@ -90,13 +89,22 @@ class GimbalMechanics:
     yaw: Range = Range(*map(math.radians, (-170.0, 170.0)))
     rate: float = math.radians(60.0)
     drift: float = math.radians(0.5)
-    retracted: Vector = (0.0, math.radians(45.0), 0.0)
     capabilities: Capabilities = CAPABILITIES
 
     @property
     def ranges(self) -> tuple[Range, Range, Range]:
         """Return the ranges in the order of the axes."""
         return self.roll, self.pitch, self.yaw
+
+    @property
+    def neutral(self) -> Vector:
+        """Return the angles of the neutral position, rad: level and ahead."""
+        return self.roll.clip(0.0), self.pitch.clip(0.0), self.yaw.clip(0.0)
+
+    @property
+    def retracted(self) -> Vector:
+        """Return the angles of the retracted position, rad: as far up as it turns, ahead."""
+        return self.roll.clip(0.0), self.pitch.high, self.yaw.clip(0.0)
 
 
 class VehicleAttitude(NamedTuple):
@@ -216,7 +224,8 @@ class GimbalMotion:
         self.flags, self.frame = MountFlags(flags) & SETTABLE, frame
         if flags & (MountFlags.RETRACT | MountFlags.NEUTRAL):
             # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).
-            angles = self.mechanics.retracted if flags & MountFlags.RETRACT else (0.0,) * 3
+            mechanics = self.mechanics
+            angles = mechanics.retracted if flags & MountFlags.RETRACT else mechanics.neutral
             rates, self.frame = UNSET, YawFrame.VEHICLE
         references = self._references(now)
         for index, (axis, angle, rate) in enumerate(zip(self._axes, angles, rates, strict=True)):
