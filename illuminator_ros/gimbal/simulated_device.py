@@ -457,4 +457,8 @@ SIMULATED = SimulatedType(
     'gimbal', 'gimbals', SimulatedGimbal,
     make=lambda settings, address, several: SimulatedGimbal(properties(settings, address)),
     address=lambda settings: GimbalProperties.address, settings=SETTINGS,
+    examples=(
+        'simulator --payload gimbal',
+        'simulator --payload illuminator,gimbal      a light and a gimbal on one vehicle',
+        'simulator --payload gimbal --pitch-range=-90,30 --lacks has_yaw_lock'),
     mavlink_version=2)
