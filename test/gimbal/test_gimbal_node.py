@@ -40,7 +40,8 @@ from support.fixtures import domain, own_ros, private_home, ros  # noqa: E402, F
 from support.gimbals import ALL, FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program, python, run  # noqa: E402
-from support.ros import bridge_arguments, Parameters, Ros, STREAM  # noqa: E402
+from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM  # noqa: E402
+from support.slow import pass_time_until  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
 NOBODY = Address(0, 0)
@@ -95,8 +96,8 @@ def take_control(ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
     ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
 
 
-def trigger(ros: Ros, name: str) -> Trigger.Response:  # noqa: F811
-    answer: Trigger.Response = ros.call(Trigger, f'/gimbal/{name}', Trigger.Request())
+def trigger(ros: Ros, name: str, node: str = '/gimbal') -> Trigger.Response:  # noqa: F811
+    answer: Trigger.Response = ros.call(Trigger, f'{node}/{name}', Trigger.Request())
     return answer
 
 
@@ -381,6 +382,20 @@ def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:
         own_ros.subscribe(Bool, '/gimbal/connected').wait_value(True)
         assert own_ros.subscribe(Bool, '/illuminator/connected').wait().data is False
         assert {'gimbal_device_id', 'beam_range'} <= {*Parameters(own_ros, '/gimbal').names()}
+
+
+def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
+        own_ros: Ros) -> None:  # noqa: F811
+    port = free_port()
+    # By the slow clock of tests.
+    with running_bridge(own_ros.domain, port, payloads='[gimbal]') as program:
+        with served_gimbals(port, FakeManager(), FakeManager(device_id=2)):
+            program.wait_for('is served by /illuminator_1_')
+            eventually(lambda: len(own_ros.node.get_node_names()) == 3)
+        pass_time_until(lambda: len(own_ros.node.get_node_names()) == 2, step=5.0)
+        program.wait_for('was silent for long: /illuminator_1_')
+        assert trigger(own_ros, 'neutral', '/illuminator').message.startswith(
+            'no gimbal connected: no component announces a gimbal')
 
 
 def test_lost_gimbal_is_reported(own_ros: Ros) -> None:  # noqa: F811
