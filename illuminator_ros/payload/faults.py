@@ -29,13 +29,7 @@ import random
 from typing import TypeVar
 
 from .simulated_settings import integer, number, Values
-from ..mavlink.messages import (
-    MAV_AUTOPILOT_INVALID,
-    MAV_STATE_ACTIVE,
-    MavResult,
-    MavType,
-    Message,
-)
+from ..mavlink import messages
 
 
 @dataclass(frozen=True)
@@ -80,10 +74,10 @@ class Behaviour:
     """
 
     heartbeat_type: int = 0
-    heartbeat_autopilot: int = MAV_AUTOPILOT_INVALID
+    heartbeat_autopilot: int = messages.MAV_AUTOPILOT_INVALID
     heartbeat_base_mode: int = 0
     heartbeat_custom_mode: int = 0
-    heartbeat_state: int = MAV_STATE_ACTIVE
+    heartbeat_state: int = messages.MAV_STATE_ACTIVE
     heartbeat_interval: float = 1.0
     fixed_rate: bool = False
     endless_stream: bool = False
@@ -103,7 +97,7 @@ class Behaviour:
     ignores_changes: bool = False
     silence: float = 0.0
     reboot_interval: float = 0.0
-    refuse: MavResult | None = None
+    refuse: messages.MavResult | None = None
     rejections: int = 0
     progress: float = 0.0
     slow: float = 0.0
@@ -120,11 +114,11 @@ class FaultError(ValueError):
     """A fault that does not exist, or a value that it cannot have; the message says which."""
 
 
-def _result(text: str) -> MavResult:
+def _result(text: str) -> messages.MavResult:
     name = text.upper().removeprefix('MAV_RESULT_')
-    if name not in MavResult.__members__:
+    if name not in messages.MavResult.__members__:
         raise ValueError(f'{text!r} is not a MAV_RESULT')
-    return MavResult[name]
+    return messages.MavResult[name]
 
 
 @dataclass(frozen=True)
@@ -156,7 +150,7 @@ class Fault:
             return ''
         if isinstance(value, str):
             return value
-        return value.name.lower() if isinstance(value, MavResult) else f'{value:.10g}'
+        return value.name.lower() if isinstance(value, messages.MavResult) else f'{value:.10g}'
 
 
 class FaultTable(dict[str, Fault]):
@@ -229,7 +223,7 @@ FAULTS = FaultTable({
     'reboot': Fault('reboot_interval', 'restarts every S seconds; on the console, '
                     'without S, once', 'S', _seconds, 10.0),
     'refuse': Fault('refuse', 'answers changes with RESULT, such as failed',
-                    'RESULT', _result, MavResult.DENIED),
+                    'RESULT', _result, messages.MavResult.DENIED),
     'progress': Fault('progress', 'reports IN_PROGRESS for S seconds before each change',
                       'S', _seconds, 2.5),
     'busy': Fault('rejections', 'rejects N changes temporarily', 'N', integer(1, 1_000_000), 3),
@@ -245,7 +239,7 @@ FAULTS = FaultTable({
     'heartbeat': Fault('heartbeat_interval', 'sends a heartbeat every S seconds',
                        'S', _seconds, 4.0),
     'type': Fault('heartbeat_type', 'sends a heartbeat of MAV_TYPE N',
-                  'N', _uint8, int(MavType.ONBOARD_CONTROLLER)),
+                  'N', _uint8, int(messages.MavType.ONBOARD_CONTROLLER)),
     'autopilot': Fault('heartbeat_autopilot', 'sends a heartbeat with MAV_AUTOPILOT N',
                        'N', _uint8, 3),
     'no-int': Fault('answers_command_int', 'does not answer COMMAND_INT', default=False),
@@ -273,14 +267,16 @@ class FaultInjector:
     def __init__(self, seed: str) -> None:
         self._random = random.Random(seed)
 
-    def inject(self, message: Message, behaviour: Behaviour) -> list[tuple[float, Message]]:
+    def inject(
+        self, message: messages.Message, behaviour: Behaviour,
+    ) -> list[tuple[float, messages.Message]]:
         """Return the messages to send in place of one, each with its delay, s."""
         if self._occurs(behaviour.drop):
             return []
         if self._occurs(behaviour.corrupt):
             message = copy.copy(message)
             # A receiver cannot tell which byte of a frame with a wrong checksum was changed.
-            setattr(message, 'crc_extra', message.crc_extra ^ 0xFF)  # noqa: B010 - a class variable
+            setattr(message, 'crc_extra', message.crc_extra ^ 0xFF)  # noqa: B010 - a ClassVar
         count = 2 if self._occurs(behaviour.duplicate) else 1
         return [(self._random.uniform(0.0, behaviour.delay) if behaviour.delay else 0.0, message)
                 for _ in range(count)]

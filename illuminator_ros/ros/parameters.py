@@ -25,12 +25,7 @@ import re
 import time
 from typing import Any
 
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces import msg
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 import yaml
@@ -97,7 +92,7 @@ class ParameterSpec:
             return ', '.join(self.choices)
         return f'{self.low:g} to {self.high:g}'
 
-    def descriptor(self, *, read_only: bool, high: float | None = None) -> ParameterDescriptor:
+    def descriptor(self, *, read_only: bool, high: float | None = None) -> msg.ParameterDescriptor:
         """
         Return the descriptor that tools show.
 
@@ -107,17 +102,17 @@ class ParameterSpec:
         constraints = self.constraints
         if self.choices:
             constraints = f'one of: {", ".join(self.choices)}'
-        descriptor = ParameterDescriptor(
+        descriptor = msg.ParameterDescriptor(
             description=self.description + unit, additional_constraints=constraints,
             read_only=read_only, type=self.type.value)
         if self.low is not None and self.high is not None:
             top = self.high if high is None else high
             if isinstance(self.default, float):
                 descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=float(self.low), to_value=float(top))]
+                    msg.FloatingPointRange(from_value=float(self.low), to_value=float(top))]
             else:
                 descriptor.integer_range = [
-                    IntegerRange(from_value=int(self.low), to_value=int(top))]
+                    msg.IntegerRange(from_value=int(self.low), to_value=int(top))]
         return descriptor
 
     def check(self, value: object) -> Any:
@@ -368,11 +363,11 @@ class DeviceParameters:
             finally:
                 self._showing = False
 
-    def _may_set(self, parameters: list[Parameter]) -> SetParametersResult:
+    def _may_set(self, parameters: list[Parameter]) -> msg.SetParametersResult:
         """Refuse a value that the device has not accepted."""
         names = [parameter.name for parameter in parameters if parameter.name in self.specs
                  and parameter.type_ != Parameter.Type.NOT_SET]
         if names and not self._showing:
-            return SetParametersResult(successful=False, reason=(
+            return msg.SetParametersResult(successful=False, reason=(
                 f'{", ".join(names)}: only the parameter services reach the device'))
-        return SetParametersResult(successful=True)
+        return msg.SetParametersResult(successful=True)
