@@ -445,8 +445,8 @@ class ConfigurationManager:
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it, once."""
-        exceeded = events.LimitExceeded(self._address, self._safety.excess(reported),
-                                 self._safety.impossible(self._limits))
+        exceeded = events.LimitExceeded(
+            self._address, self._safety.excess(reported), self._safety.impossible(self._limits))
         if exceeded != self.limit_exceeded:
             self.limit_exceeded = exceeded
             self._emit(exceeded)

@@ -101,4 +101,3 @@ class CommandReceiver:
             if len(self._executed) > MAX_RESULTS:
                 del self._executed[next(iter(self._executed))]
         return result
-

@@ -183,4 +183,3 @@ def keyed(
     key = load_key(key_file)
     store = TimestampStore(key_file, name)
     return Signing(mode, key, timestamp=store.begin(unix_time)), store
-

@@ -41,7 +41,6 @@ CONFORMANCE = (DOC / 'conformance.md').read_text()
 SIMULATOR = (DOC / 'simulator.md').read_text()
 
 
-
 @pytest.mark.parametrize(('heading', 'requirements', 'consent'), [
     ('requirement', REQUIREMENTS, 'dazzles'),
     ('requirement on a gimbal', device.REQUIREMENTS, 'moves'),

@@ -360,8 +360,8 @@ def _compared(name: str, title: str, *, accepted: bool) -> Requirement[LightTest
                     and one.accepted == accepted for one in tester.session.transactions)
         if not count:
             raise Skipped(f'no change was {kind}')
-        return component.none_of(tester.disagreements if accepted else tester.rejected_but_applied,
-                       count, f'{kind} changes')
+        failures = tester.disagreements if accepted else tester.rejected_but_applied
+        return component.none_of(failures, count, f'{kind} changes')
     return check
 
 

@@ -157,7 +157,7 @@ def lamp_report(light: LightSnapshot, hardware_id: str, now: float) -> diagnosti
     on = light.status.enabled if light.status else None
     fine = {True: 'on', False: 'off', None: 'connected'}[on]
     return diagnostics.Report('lamp', hardware_id, lamp_findings(light, now), fine,
-                  lambda: _lamp_values(light, now))
+                              lambda: _lamp_values(light, now))
 
 
 def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Value]:

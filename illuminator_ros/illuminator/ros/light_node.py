@@ -185,9 +185,10 @@ class LightNode:
 
         return (
             ros_node.CommandTopic(f'{prefix}cmd/enable', Bool, enable),
-            ros_node.CommandTopic(f'{prefix}cmd/brightness', Float32,
-                         functools.partial(self._set_brightness, source, prefix),
-                         lambda message: checked('brightness', message.data)))
+            ros_node.CommandTopic(
+                f'{prefix}cmd/brightness', Float32,
+                functools.partial(self._set_brightness, source, prefix),
+                lambda message: checked('brightness', message.data)))
 
     # Requests
 
