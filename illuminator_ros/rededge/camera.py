@@ -45,7 +45,7 @@ UNANSWERED_PINGS = 3
 CAPTURE_TIMEOUT = 5.0
 # s in which the answer to a capture that had none may still come.
 LATE_ANSWER = 60.0
-# Image indices that are remembered: an index that was seen is not that of a new request.
+# Image indices that are remembered: a new request has an index that was not seen.
 MAX_INDICES = 32
 # Heartbeats in CONFLICT_WINDOW s that one component does not send; it sends one a second.
 CONFLICT_HEARTBEATS = 10
@@ -302,7 +302,7 @@ class Camera:
                       f'{format_seconds(now - capture.sent_at)}{note}')
 
     def _take_index(self, index: int, now: float) -> None:
-        """Note an image; the first one after a request is that of the request."""
+        """Note an image; a request caused the first one after it."""
         if index in self._indices:
             return
         self._indices.append(index)

@@ -40,7 +40,7 @@ M = TypeVar('M', bound=Message)
 FIRST_UTC, LAST_UTC = 1_420_070_400_000_000, 4_102_444_800_000_000
 # m/s; below it the course is noise.
 SLOWEST_COURSE = 0.3
-# GPS_FIX_TYPE by the status of a NavSatFix: 3D, DGPS, RTK float. All others are no fix.
+# GPS_FIX_TYPE by the status of a NavSatFix: 3D, DGPS, RTK float. The others mean "no fix".
 FIX_TYPES = {0: 3, 1: 4, 2: 5}
 GPS_STATUS_SATELLITES = 20
 UINT16_UNKNOWN, UINT8_UNKNOWN = 65535, 255
@@ -193,7 +193,7 @@ def fix_type(status: int) -> int:
     """
     Return GPS_FIX_TYPE for the status of a NavSatFix.
 
-    :raises ValueError: if that is no fix.
+    :raises ValueError: if that means "no fix".
     """
     if status not in FIX_TYPES:
         raise ValueError(f'no fix (status {status})')

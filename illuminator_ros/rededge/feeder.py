@@ -14,7 +14,7 @@
 
 
 """
-What the camera is fed: position, UTC, attitude and mount, checked, and never repeated.
+Position, UTC, attitude and mount for the camera: checked, and never repeated.
 
 A refused or stale input is not sent. The camera then falls back to its own sensors, 5 s after
 the last message.
@@ -490,8 +490,9 @@ class Feeder:
 
     def link_opened(self, now: float) -> None:
         """Send the fixed mount soon."""
-        if self._fixed_mount is not None:
-            self._mount_due = min(self._mount_due, now)
+        # The link repeats the call while it hears no peer.
+        if self._fixed_mount is not None and self._mount_due == math.inf:
+            self._mount_due = now
 
     def link_closed(self) -> None:
         """Send nothing by itself until the link is open again."""

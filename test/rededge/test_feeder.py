@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the camera is fed, and above all what it is not fed."""
+"""Messages that the camera gets, and above all inputs that it must not get."""
 
 from __future__ import annotations
 
@@ -257,7 +257,9 @@ def test_a_fixed_mount_is_sent_each_second_without_attitude_and_after_a_change_r
         None):
     rig = Rig()
     rig.feeder.link_opened(rig.now)
-    assert rig.run(3.5) == [MountStatus(*CAMERA, 0, 0, 0)] * 4
+    rig.run(0.1)
+    rig.feeder.link_opened(rig.now)
+    assert rig.run(3.4) == [MountStatus(*CAMERA, 0, 0, 0)] * 3
     rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
     assert rig.run(0.0) == [MountStatus(*CAMERA, -200, 100, 350)]
     rig.feeder.link_closed()

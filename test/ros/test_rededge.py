@@ -268,7 +268,7 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
     ('-p mavlink_version:=2', 'parameter mavlink_version: 2, but rededge needs 1'),
     ('-p payloads:=[rededge,illuminator]',
      'parameter mavlink_version: 1, but rededge needs 1, illuminator needs 2'),
-    ('-p component_id:=100', 'parameter component_id: 100 is that of the camera'),
+    ('-p component_id:=100', 'parameter component_id: 100 is the id of the camera'),
     ('-p mount_pitch:=200', 'mount_pitch: 200.0 degrees is out of range: -180 to 180 degrees'),
     ('-p mount_frame:=lens', "mount_frame: 'lens' is not one of camera, optical"),
     ('-p signing_mode:=sign', 'parameter signing_key_file: no key file is given')])

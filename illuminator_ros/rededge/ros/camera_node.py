@@ -90,7 +90,7 @@ class CameraNode(ServedPayload):
         self._clock = host.node.get_clock()
         self._started = host.link.clock()
         if host.link_parameters.address.component == MAV_COMP_ID_CAMERA:
-            raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is that of the camera')
+            raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is the id of the camera')
         self._geoid_is_known = 'geoid_separation' in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
         self._interface = NodeInterface(

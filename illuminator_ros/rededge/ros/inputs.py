@@ -56,7 +56,7 @@ class StampReader:
         self._jumped = jumped
         # The system time less a steady one, s.
         self._offset: float | None = None
-        # rclpy tells of jumps of simulated time only. The handle keeps the callback.
+        # rclpy reports jumps of simulated time only. The handle keeps the callback.
         self._handle = self._clock.create_jump_callback(
             JumpThreshold(min_forward=Duration(seconds=SIMULATED_JUMP),
                           min_backward=Duration(nanoseconds=-1), on_clock_change=True),
