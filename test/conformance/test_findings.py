@@ -192,3 +192,11 @@ def test_a_light_that_stays_in_external_sync_fails_mode_internal() -> None:
     run.light.apply = stuck  # type: ignore[method-assign]
     assert run.finish().failed == {'mode-internal'}
     assert 'then the status differs in mode' in run.result('mode-internal').detail
+
+
+def test_an_accepted_change_passes_where_the_light_reports_no_status() -> None:
+    run = Run(IlluminatorProperties(status_interval=0.0), faults=('lie',), only=('on',))
+    run.link.run_until(lambda: any(
+        one.text.endswith('ON_OFF 1') for one in run.session.transactions), within=60.0)
+    run.fault('no-request')
+    assert run.finish().result('on').verdict is Verdict.PASS

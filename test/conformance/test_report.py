@@ -106,3 +106,9 @@ def test_requirements_that_were_skipped_for_their_own_reason_keep_their_lines() 
     assert sum('not agreed to' in line for line in shown(Run(consent=False).finish())) == 6
     alone = Run(target=Address(9, 9), only=('on',)).finish()
     assert shown(alone) == lines(alone.result('on'))
+
+
+def test_the_catalogue_has_a_line_for_each_requirement_with_its_section() -> None:
+    for one, row in zip(REQUIREMENTS, reports.catalogue(REQUIREMENTS, 'light'), strict=True):
+        assert row.startswith(one.name)
+        assert f'[{one.specification.title}, "{one.section}"' in row

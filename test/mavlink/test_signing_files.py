@@ -217,3 +217,13 @@ def test_each_key_file_and_component_has_one_state_file_in_the_ros_home(
     assert TimestampStore('key', 'x').path.parent == tmp_path / 'ros' / 'illuminator_ros'
     assert len({TimestampStore(key, name).path for key in ('key', 'other')
                 for name in ('bridge 1/194', 'bridge 1/195')}) == 4
+
+
+def test_missing_home_directory_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home() -> Path:
+        raise RuntimeError('Could not determine home directory.')
+
+    monkeypatch.delenv('ROS_HOME', raising=False)
+    monkeypatch.setattr(Path, 'home', no_home)
+    with pytest.raises(KeyFileError, match='set HOME or ROS_HOME'):
+        TimestampStore('key', 'x')

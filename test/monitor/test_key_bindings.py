@@ -186,3 +186,11 @@ def test_each_key_of_the_help_has_one_meaning_and_an_effect(desk: Desk) -> None:
         before = desk.state()
         desk.press(key)
         assert desk.state() != before, key
+
+
+def test_keys_do_nothing_without_lights(desk: Desk) -> None:
+    desk.lights.clear()
+
+    desk.press('down', 'space', '+', 's', 'r', 'a')
+
+    assert (desk.bindings.selected, desk.asked) == (None, [])

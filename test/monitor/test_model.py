@@ -120,3 +120,13 @@ def test_trend_has_the_newest_value_of_each_step_up_to_its_size() -> None:
     for second in range(100):
         short.add(float(second), float(second))
     assert short.last(10, 99.0) == [97.0, 98.0, 99.0]
+
+
+@pytest.mark.parametrize(('text', 'number'), [
+    ('12.5', 12.5), ('0', 0.0), ('n/a', None), ('nan', None), ('inf', None), (None, None)])
+def test_number_of_a_diagnosis_is_finite_or_none(
+    text: str | None, number: float | None,
+) -> None:
+    values = {} if text is None else {'loss_percent': text}
+
+    assert Diagnosis(0, '', values).number('loss_percent') == number
