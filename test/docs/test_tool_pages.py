@@ -122,3 +122,9 @@ def test_the_rules_of_gimbals_have_their_tests_and_requirements() -> None:
     assert {name for _, names in rules.values() for name in names} == {
         one.name for one in requirements if 'GM-' in f'{one.title} {one.section}'}
     assert {name for found, _ in rules.values() for name in found} == set(tests)
+
+
+def test_the_profiles_of_gimbal_managers_are_listed() -> None:
+    assert table((DOC / 'gimbal.md').read_text(), 'profile of a manager') == [
+        [f'`{name}`', profile.description]
+        for name, profile in simulated_manager.PROFILES.items()]
