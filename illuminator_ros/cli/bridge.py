@@ -27,7 +27,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from .entry_point import one_line, run_program
+from .entry_point import discard_output, one_line, run_program
 from .payloads import PAYLOADS
 from .termination import Termination
 from ..payload.registry import PayloadType
@@ -59,6 +59,17 @@ class Executable:
         """Return the ROS half of its payload."""
         payload: RosPayload = self.payloads[self.payload].load('ros')
         return payload
+
+    def show(self, text: str) -> int:
+        """Print a text, and return the exit status."""
+        try:
+            print(text, end='', flush=True)
+        except OSError as error:
+            discard_output()
+            if not isinstance(error, BrokenPipeError):
+                print(f'{self.name}: standard output: {error.strerror}', file=sys.stderr)
+                return 1
+        return 0
 
     def refuse(self, reason: str) -> int:
         """Say in one line what is wrong with the command line, and return the exit status."""
@@ -146,12 +157,10 @@ def _run(arguments: list[str], termination: Termination, executable: Executable)
         except Exception as error:
             return executable.refuse(f'wrong ROS arguments: {error}')
     if '-h' in own or '--help' in own:
-        print(usage(executable), end='')
-        return 0
+        return executable.show(usage(executable))
     if '--version' in own:
         from .. import __version__
-        print(__version__)
-        return 0
+        return executable.show(f'{__version__}\n')
     url = own.pop(0) if own and not own[0].startswith('-') else ''
     if own:
         return executable.refuse(

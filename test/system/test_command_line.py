@@ -109,6 +109,20 @@ def test_missing_package_is_one_line_with_its_remedy_and_status_1(
         1, f'{name}: {package} is not installed: {remedy}\n')
 
 
+@pytest.mark.parametrize('unbuffered', ['', '1'])
+@pytest.mark.parametrize('option', ['--help', '--version'])
+def test_help_that_cannot_be_written_is_one_line_with_status_1(
+    option: str, unbuffered: str,
+) -> None:
+    outcome = subprocess.run(
+        f'exec {sys.executable} -m illuminator_ros.bridge {option} > /dev/full', shell=True,
+        text=True, timeout=30, env=environment({'PYTHONUNBUFFERED': unbuffered}),
+        stderr=subprocess.PIPE, cwd=ROOT)
+
+    assert (outcome.returncode, outcome.stderr) == (
+        1, 'bridge: standard output: No space left on device\n')
+
+
 def test_simulator_needs_no_ros(tmp_path: Path) -> None:
     assert run_without('rclpy', tmp_path, 'simulator', '--version').returncode == 0
 
