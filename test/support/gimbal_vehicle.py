@@ -115,18 +115,24 @@ class Vehicle(Endpoint):
                             one.receive(source, message, now)
 
 
+def managed_vehicle(
+    control: ControlSettings, now: float, **settings: Any,
+) -> tuple[GimbalManager, SimulatedGimbal, Vehicle]:
+    """Return a vehicle with a gimbal and its manager; ``settings`` are of the manager."""
+    commands = CommandSender(OURS)
+    manager = GimbalManager(commands, ManagerSettings(control, **settings))
+    device = SimulatedGimbal(GimbalProperties(DEVICE))
+    devices = SimulatedComponents([Description(DEVICE, device)], now)
+    return manager, device, Vehicle(Component(commands, [manager]), Autopilot(), devices)
+
+
 @contextlib.contextmanager
 def managed_gimbal(
     port: int, control: ControlSettings | None = None, **settings: Any,
 ) -> Iterator[tuple[GimbalManager, SimulatedGimbal, Vehicle]]:
-    """Serve a gimbal and its manager to UDP peers; ``settings`` are of the manager."""
+    """Serve such a vehicle to UDP peers."""
     url = f'udpin://127.0.0.1:{port}'
-    commands = CommandSender(OURS)
-    manager = GimbalManager(commands, ManagerSettings(
-        control or ControlSettings(), **settings))
-    device = SimulatedGimbal(GimbalProperties(DEVICE))
-    vehicle = Vehicle(Component(commands, [manager]), Autopilot(), SimulatedComponents(
-        [Description(DEVICE, device)], 0.0))
+    manager, device, vehicle = managed_vehicle(control or ControlSettings(), 0.0, **settings)
     link = Link(parse_url(url), vehicle, label=url)
     link.start()
     try:
