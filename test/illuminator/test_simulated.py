@@ -168,3 +168,18 @@ def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
     bench.command(CONFIGURE, 1, brightness, period, duty_cycle)
     bench.now = 100.0
     assert bench.status().temp_c == pytest.approx(40.0 + rise, abs=0.1)
+
+
+@pytest.mark.parametrize(('command', 'params', 'result'), [
+    *((REQUEST, (message_id,), DENIED) for message_id in (0, 1, 33, NAN, INF, -1, 440.5)),
+    *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, INFORMATION_ID, NAN)),
+    *((SET_INTERVAL, (STATUS_ID, interval), DENIED) for interval in (NAN, INF, -INF, -2, -0.5)),
+    *((command, (), MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
+    *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
+def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
+    bench: LightBench, command: MavCmd, params: tuple[float, ...], result: MavResult,
+) -> None:
+    (ack,) = bench.command(command, *params)
+    assert ack.result == result
+    assert bench.status().enable == 0
+    assert len(statuses(bench.run(3.0))) == 3

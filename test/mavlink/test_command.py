@@ -433,3 +433,18 @@ def test_sender_counts_tries_and_silence_and_names_the_silent_target_until_it_an
     assert (counters.sent, counters.resent, counters.unanswered, counters.unexpected_acks) == (
         5, 2, 1, 1)
     assert not rig.sender.unanswering
+
+
+def test_callback_may_end_all_other_commands() -> None:
+    rig = Rig(retries=0)
+    ends: list[CommandStatus] = []
+
+    def close(outcome: CommandResult, now: float) -> None:
+        ends.append(outcome.status)
+        rig.sender.end_all(now, STATUS.CANCELLED)
+
+    for target in (LIGHT, OTHER) * 3:
+        rig.sender.start(Command(target, 405), rig.now, close)
+    rig.run(LONG)
+    assert sorted(ends, key=str) == [STATUS.CANCELLED] * 5 + [STATUS.NO_ANSWER]
+    assert rig.idle

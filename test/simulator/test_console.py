@@ -127,3 +127,12 @@ def test_help_has_each_command_and_each_fault(console: Console) -> None:
     text = console.enter('help')
     words = [*(one.usage for one in COMMANDS), *(one.usage for one in LIGHT_COMMANDS), *FAULTS]
     assert [word for word in words if f'  {word}' not in text] == []
+
+
+@pytest.mark.parametrize('line', ['reboot', 'fault reboot'])
+def test_a_restart_without_an_interval_happens_once(console: Console, line: str) -> None:
+    console.enter('on')
+    console.enter(line)
+    assert (console.bow.enabled, console.bow.uptime_ms(10.0)) == (False, 0)
+    console.lights.poll(60.0)
+    assert console.bow.uptime_ms(60.0) == 50_000

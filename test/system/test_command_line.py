@@ -75,6 +75,9 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', '--mavlink-version 1', '--mavlink-version 1: a light needs MAVLink 2'),
     ('simulator', '--payload rededge,gimbal', 'a gimbal needs MAVLink 2: a link sends'),
     ('simulator', '--payload rededge --images /nowhere/x', '/nowhere/x: No such file'),
+    ('simulator', '--signing-mode require', 'no key file is given'),
+    ('simulator', '--signing-key-file /etc/hostname',
+     '--signing-key-file is given, but --signing-mode is off'),
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',
      "key file '/nonexistent': No such file or directory"),
 ])

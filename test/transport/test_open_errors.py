@@ -24,7 +24,7 @@ import sys
 from typing import Any
 
 from illuminator_ros.mavlink.transport import open_channel, tcp
-from illuminator_ros.mavlink.url import parse_url
+from illuminator_ros.mavlink.url import HostPort, parse_url, UdpUrl
 import pytest
 from support.open_channel import bound_socket, listening_socket
 from support.ports import free_port
@@ -109,3 +109,8 @@ def test_connection_with_itself_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     port = free_port(socket.SOCK_STREAM)
     monkeypatch.setattr(socket, 'socket', _Selfish)
     assert reason(f'tcp://127.0.0.1:{port}').endswith('no program listens there')
+
+
+def test_addresses_of_different_ip_versions_are_named() -> None:
+    with pytest.raises(OSError, match=r'127\.0\.0\.1:1.*\[::1\]:2.*different IP versions'):
+        open_channel(UdpUrl(HostPort('127.0.0.1', 1), HostPort('::1', 2)))
