@@ -14,7 +14,7 @@
 # limitations under the License.
 
 """
-Runs the bridge and simulated lights over a faulty line for a given time.
+Runs the bridge, simulated lights and a gimbal over a faulty line for a given time.
 
 Frames are lost, repeated, reordered, delayed and spoilt, the line is cut, the router between
 them is restarted, and so is one of two lights, while services, parameters and setpoints are used
@@ -42,6 +42,7 @@ from typing import Any, NamedTuple
 TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
+from geometry_msgs.msg import Vector3, Vector3Stamped  # noqa: E402
 from std_msgs.msg import Float32  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from support.fault_proxy import FaultProxy, NO_FAULTS  # noqa: E402
@@ -58,6 +59,7 @@ ANSWER_LIMIT = 30.0
 # s; a light that has just restarted gets its configuration back before it is asked for more.
 CALM = 4.0
 REPORT_INTERVAL = 30.0
+GIMBAL = '/gimbal_manager'
 
 FAULTS = {
     'nothing': NO_FAULTS,
@@ -104,22 +106,23 @@ class Soak:
         self.problems: list[str] = []
         port = free_port()
         self.proxy = FaultProxy(port, self.random.randrange(1 << 30))
-        self.bridge = start_bridge(domain, port)
-        self.light = self._simulator(243)
-        self.restarted = self._simulator(244)
+        self.bridge = start_bridge(domain, port, payloads='[illuminator, gimbal_manager]')
+        self.light = self._simulator('--component-id', '243')
+        self.restarted = self._simulator('--component-id', '244')
+        self.gimbal = self._simulator('--payload', 'gimbal')
         self.client = Ros(domain)
         self.parameters = Parameters(self.client)
         self._calls: list[tuple[float, str, Any]] = []
 
-    def _simulator(self, component: int) -> Program:
+    def _simulator(self, *arguments: str) -> Program:
         return python('illuminator_ros.simulator', f'udpout://127.0.0.1:{self.proxy.port}',
-                      '--component-id', str(component))
+                      *arguments)
 
     def close(self) -> None:
         """End it all."""
         self.client.close()
         for program, name in ((self.bridge, 'bridge'), (self.light, 'simulator'),
-                              (self.restarted, 'simulator')):
+                              (self.restarted, 'simulator'), (self.gimbal, 'gimbal')):
             if not program.running:
                 self.problems.append(f'{name} has ended by itself')
             elif program.end() != 0:
@@ -141,23 +144,34 @@ class Soak:
             self.proxy.restart()
         elif fault == 'light restart':
             self.restarted.kill()
-            self.restarted = self._simulator(244)
+            self.restarted = self._simulator('--component-id', '244')
         else:
             self.proxy.set(FAULTS[fault])
 
     def request(self) -> None:
         """Begin one request of some kind."""
-        kind = self.random.choice(('enable', 'refresh', 'set', 'setpoints'))
+        kind = self.random.choice(('enable', 'refresh', 'set', 'setpoints', 'gimbal', 'rates'))
         self.counts[kind] += 1
         if kind == 'setpoints':
             self.client.publish(Float32, '/illuminator/cmd/brightness',
                                 *(self.random.uniform(0, 100) for _ in range(10)))
             return
+        if kind == 'rates':
+            publisher = self.client.publisher(Vector3Stamped, f'{GIMBAL}/cmd/rate', GIMBAL)
+            for _ in range(10):
+                publisher.publish(Vector3Stamped(vector=Vector3(
+                    y=self.random.uniform(-0.5, 0.5), z=self.random.uniform(-0.5, 0.5))))
+            return
         self._calls.append((time.monotonic(), kind, (
             self.client.start_enable(self.random.random() < 0.5) if kind == 'enable' else
             self.client.start(Trigger, '/illuminator/refresh', Trigger.Request())
             if kind == 'refresh' else
+            self.client.start(Trigger, f'{GIMBAL}/{self._control()}', Trigger.Request(), GIMBAL)
+            if kind == 'gimbal' else
             self.parameters.start_set(strobe_duty_cycle=self.random.uniform(0, 100)))))
+
+    def _control(self) -> str:
+        return self.random.choice(('take_control', 'take_control', 'release_control', 'neutral'))
 
     def collect(self) -> None:
         """Take the received answers, and note overdue ones."""
@@ -200,7 +214,7 @@ class Soak:
         time.sleep(CALM)
 
     def check_service(self) -> None:
-        """Check that the light can be commanded as at the beginning."""
+        """Check that light and gimbal can be commanded as at the beginning."""
         for on in (True, False):
             until = time.monotonic() + ANSWER_LIMIT
             # On a machine that stands still meanwhile, a confirmation may come too late.
@@ -208,6 +222,13 @@ class Soak:
                 pass
             if not answer.success:
                 self.problems.append(f'at the end: {answer.message}')
+        until = time.monotonic() + ANSWER_LIMIT
+        while not (taken := self.client.call(
+                Trigger, f'{GIMBAL}/take_control', Trigger.Request())).success and (
+                    time.monotonic() < until):
+            time.sleep(0.5)
+        if not taken.success:
+            self.problems.append(f'at the end: {taken.message}')
 
 
 def soak(seconds: float, seed: str) -> int:
@@ -218,6 +239,7 @@ def soak(seconds: float, seed: str) -> int:
         stack.callback(one.close)
         one.bridge.wait_for('connected')
         one.bridge.wait_for('is served by')
+        one.bridge.wait_for('gimbal 1/154 is managed')
         # Modules that are imported late, and buffers, must be there before usage is compared.
         one.run(warm_up)
         one.calm_down()
