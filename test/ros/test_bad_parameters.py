@@ -43,6 +43,8 @@ COMMAND_LINES = {
     ('--params-file', '/nonexistent.yaml'): "params file: '--params-file /nonexistent.yaml'",
     ('--params-file', 'KEYS/broken.yaml'): 'KEYS/broken.yaml',
     ('-p', 'brightness'): "Couldn't parse parameter override rule: '-p brightness'",
+    ('-r', '__node:=spot', '-p', 'names:=["1/244=spot"]'):
+        "parameter names: '1/244=spot' is the name of the first node",
     ('-r', '__node:=1st'): "Couldn't parse remap rule: '-r __node:=1st'",
     ('--banana',): "wrong ROS arguments: ['--banana']",
     ('-p', 'use_sim_time:=maybe'): "Trying to set parameter 'use_sim_time' to 'maybe'",

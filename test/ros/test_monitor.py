@@ -64,6 +64,8 @@ def test_monitor_shows_a_light_with_the_link_and_identity_and_sends_its_requests
         monitor.ask(ask)
         monitor.outcome(text, Outcome.DONE)
     assert light.fake.fields['strobe_period'] == 0.0
+    light.report(mode=1, error_status=0, brightness=45.0)
+    monitor.wait(lambda light: light.setpoint == 45.0)
 
 
 class FakeBridge:

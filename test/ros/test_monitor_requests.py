@@ -175,3 +175,15 @@ def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Be
     assert bench.light.wanted == {'enabled': False}
     bench.enable.calls[0][1].set_result(SetBool.Response(success=True, message='late'))
     assert bench.light.action.outcome is Outcome.PENDING
+
+
+def test_failed_call_and_missing_service_are_reported(bench: Bench) -> None:
+    bench.ask(switch)
+    bench.enable.calls[0][1].set_exception(RuntimeError('broken'))
+    assert bench.light.action.answer == 'RuntimeError: broken'
+
+    bench.enable.ready = False
+    bench.ask(switch)
+
+    assert bench.switches == [True]
+    assert '/bow/enable' in bench.light.action.answer
