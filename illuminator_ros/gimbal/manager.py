@@ -512,7 +512,9 @@ class GimbalManager(Payload):
             self._limits_reached = sum(_LIMIT_FLAGS[one.axis] for one in clipped)
             if clipped and self._limit('clipped').take(now) is not None:
                 self.events.emit(SetpointClipped(tuple(clipped)))
-        sent = replace(setpoint, attitude=attitude, turning=STILL)
+        sent = setpoint
+        if attitude is not setpoint.attitude:
+            sent = replace(setpoint, attitude=attitude, turning=STILL)
         if converts:
             if heading is None:
                 self._lose('heading', now)

@@ -44,9 +44,14 @@ class Quaternion:
     @staticmethod
     def from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
         """Return the rotation by yaw about z, then pitch about the new y, roll about x, rad."""
-        return (Quaternion(math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-                * Quaternion(math.cos(pitch / 2), 0.0, math.sin(pitch / 2), 0.0)
-                * Quaternion(math.cos(roll / 2), math.sin(roll / 2), 0.0, 0.0))
+        cos_r, sin_r = math.cos(roll / 2), math.sin(roll / 2)
+        cos_p, sin_p = math.cos(pitch / 2), math.sin(pitch / 2)
+        cos_y, sin_y = math.cos(yaw / 2), math.sin(yaw / 2)
+        return Quaternion(
+            cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
+            sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
+            cos_r * sin_p * cos_y + sin_r * cos_p * sin_y,
+            cos_r * cos_p * sin_y - sin_r * sin_p * cos_y)
 
     def euler(self) -> Vector:
         """
