@@ -118,7 +118,7 @@ class ManagerBehaviour(GimbalBehaviour):
     shows_flags: bool = True
 
 
-# Any kind of component may be a manager, so that no heartbeat type is wrong.
+# Each kind of component may be a manager, so that no heartbeat type is wrong.
 FAULTS = FaultTable({
     **{name: fault for name, fault in GIMBAL_FAULTS.items() if name not in ('type', 'autopilot')},
     'stale-control': Fault('frozen_control', 'reports the control of its start'),

@@ -221,7 +221,7 @@ def _known(value: int, scale: float) -> float | None:
     return None if value == UNKNOWN else value / scale
 
 
-def _position(message: GpsRawInt | GlobalPositionInt) -> dict[str, Any]:
+def _position(message: GpsRawInt | GlobalPositionInt) -> Values:
     """Return the columns of an injected position."""
     place = {'latitude_deg': message.lat / 1e7, 'longitude_deg': message.lon / 1e7,
              'altitude_m': message.alt / 1e3}
@@ -236,14 +236,14 @@ def _position(message: GpsRawInt | GlobalPositionInt) -> dict[str, Any]:
             'satellites': None if satellites == UNKNOWN_SATELLITES else satellites}
 
 
-def _own_position(place: Place | None) -> dict[str, Any]:
+def _own_position(place: Place | None) -> Values:
     """Return the columns of the position of its own GPS."""
     return {} if place is None else {
         'fix_type': FIX_3D, 'latitude_deg': place.latitude, 'longitude_deg': place.longitude,
         'altitude_m': place.altitude}
 
 
-def _orientation(attitude: Attitude | None, mount: MountStatus | None) -> dict[str, Any]:
+def _orientation(attitude: Attitude | None, mount: MountStatus | None) -> Values:
     """Return the columns of the angles of vehicle, mount and camera."""
     pitch, roll, yaw = (angle / 100 for angle in (
         mount.pointing_a, mount.pointing_b, mount.pointing_c)) if mount else (0.0, 0.0, 0.0)

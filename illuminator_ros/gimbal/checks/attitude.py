@@ -21,7 +21,6 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 import math
-from typing import Any
 
 from .tester import (
     GimbalTester,
@@ -37,7 +36,7 @@ from .tester import (
 from ..messages import Capabilities, ErrorFlags
 from ...mavlink.messages import MavCmd, MavResult, Message
 from ...payload.checks.component_requirements import none_of
-from ...payload.checks.requirement import Requirement, requirement
+from ...payload.checks.requirement import AnyRequirement, Requirement, requirement
 from ...payload.checks.session import Failed, Skipped
 from ...payload.checks.specification import COMMAND, MESSAGES
 from ...payload.mount import MountFlags, yaw_frame
@@ -295,7 +294,7 @@ def _position(flag: MountFlags, capability: Capabilities) -> Requirement[GimbalT
 
 POSITIONS = (_position(MountFlags.NEUTRAL, Capabilities.HAS_NEUTRAL),
              _position(MountFlags.RETRACT, Capabilities.HAS_RETRACT))
-MOTION: tuple[Requirement[Any], ...] = (
+MOTION: tuple[AnyRequirement, ...] = (
     hold, rate, stop, within_range, limit_flags, *POSITIONS)
 
 
