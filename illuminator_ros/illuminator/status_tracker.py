@@ -160,12 +160,15 @@ class SendingTimes:
         known = min(self._least, self._least_before)
         running, step = self._running_ms / 1000, self._step_ms / 1000
         self._least = min(self._least, now - running)
-        self._last, self._last_at = status, now
+        # One of the same millisecond as another one was sent before that one came.
+        is_equal = self._last is not None and status.uptime_ms == self._last.uptime_ms
+        latest = self._last_at if is_equal and step <= MAX_STEP else now
+        self._last, self._last_at = status, self._last_at if is_equal else now
         if not step or known == math.inf:
             return now, False
         if step > MAX_STEP and not self._has_repeated:
             step = RESOLUTION
-        return min(now, running + known + step), step <= MAX_STEP
+        return min(latest, running + known + step), step <= MAX_STEP
 
 
 # Changes back to a state shown before that prove several lights: the sixth status of A B A B A B
