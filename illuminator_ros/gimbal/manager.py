@@ -680,4 +680,3 @@ def _boot_time(now: float) -> int:
 
 def _ignore(result: CommandResult, now: float) -> None:
     """Take no notice of a result: the message comes by itself or is requested again."""
-
