@@ -162,7 +162,7 @@ class SendingTimes:
         self._least = min(self._least, now - running)
         # One of the same millisecond as another one was sent before that one came.
         is_equal = self._last is not None and status.uptime_ms == self._last.uptime_ms
-        latest = self._last_at if is_equal and step <= MAX_STEP else now
+        latest = math.nextafter(self._last_at, 0.0) if is_equal and step <= MAX_STEP else now
         self._last, self._last_at = status, self._last_at if is_equal else now
         if not step or known == math.inf:
             return now, False
