@@ -78,6 +78,8 @@ from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositi
 STATUS_INTERVAL = 0.2
 HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
+# s between statuses that are sent because control has changed.
+TOLD_INTERVAL = 0.1
 # s between requests for GIMBAL_DEVICE_INFORMATION until it comes.
 INFORMATION_INTERVAL = 5.0
 # s after the last AUTOPILOT_STATE_FOR_GIMBAL_DEVICE of an autopilot in which ours is not sent,
@@ -213,6 +215,7 @@ class GimbalManager(Payload):
         self._setpoint: Setpoint | None = None
         self._sent: Setpoint | None = None
         self._limits_reached = 0
+        self._told_at = -math.inf
         self._offsets = STILL
         self._place: GeoPoint | None = None
         self._send_due = self._status_due = self._information_due = math.inf
@@ -406,6 +409,10 @@ class GimbalManager(Payload):
                 self._setpoint = stopped(self._setpoint, now)
                 self._send(now)
             self.events.emit(change)
+        if changes and self._status_due < math.inf and now >= self._told_at + TOLD_INTERVAL:
+            # Beside the regular ones, so that players need not wait for the next.
+            self._told_at = now
+            self._commands.send(self.status(now))
 
     # Setpoints
 

@@ -138,6 +138,14 @@ def test_gm_10_the_status_is_sent_five_times_a_second() -> None:
             for one in statuses[1:]} == {(DEVICE.component, *PILOT, 0, 0)}
 
 
+def test_a_change_of_control_is_told_at_once_and_seldom() -> None:
+    rig = ManagerRig()
+
+    changes = [rig.give(PILOT, configure(*player)) for player in (PILOT, (-3, -3), PILOT)]
+
+    assert [len(of(GimbalManagerStatus, sent)) for sent in changes] == [1, 0, 0]
+
+
 def test_gm_13_no_player_stops_the_status_for_the_others() -> None:
     rig = ManagerRig()
     begun = rig.now
