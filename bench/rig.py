@@ -124,7 +124,7 @@ def bridge(
     given = {'connection_url': url, **parameters}
     overrides = [text for key, value in given.items() for text in ('-p', f'{key}:={value}')]
     return ready(python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={name}',
-                         *overrides), 'link open')
+                        *overrides), 'link open')
 
 
 def simulator(url: str, *arguments: str) -> AbstractContextManager[Program]:

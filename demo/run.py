@@ -143,7 +143,6 @@ class Demo:
         """Switch the light off."""
         return self._switch(False)
 
-
     def take_control(self) -> str:
         """Take control of the gimbal."""
         self.ros.wait('attitude of the gimbal', self.ros.angles, 20.0)

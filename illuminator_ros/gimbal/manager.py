@@ -232,17 +232,17 @@ class GimbalManager(Payload):
 
     @property
     def state(self) -> ManagerState:
-        """The manager's state."""
+        """Return the manager's state."""
         return self._presence.state
 
     @property
     def device(self) -> Address | None:
-        """The address of the device, None if it is not known, or has none."""
+        """Return the address of the device, None if it is not known, or has none."""
         return self._presence.device
 
     @property
     def device_id(self) -> int:
-        """The id of the device, 0 while none is known."""
+        """Return the id of the device, 0 while none is known."""
         return self._presence.device_id
 
     @property
@@ -252,12 +252,12 @@ class GimbalManager(Payload):
 
     @property
     def other(self) -> Address | None:
-        """The other manager of the device that is heard, None if there is none."""
+        """Return the other manager of the device that is heard, None if there is none."""
         return self._presence.other
 
     @property
     def information(self) -> GimbalDeviceInformation | None:
-        """The last GIMBAL_DEVICE_INFORMATION of the device."""
+        """Return the last GIMBAL_DEVICE_INFORMATION of the device."""
         return self._information
 
     def status(self, now: float) -> GimbalManagerStatus:

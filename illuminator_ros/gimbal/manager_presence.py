@@ -116,7 +116,7 @@ class Presence:
 
     @property
     def device_id(self) -> int:
-        """The id of the device, 0 while none is known."""
+        """Return the id of the device, 0 while none is known."""
         return self.device.component if self.device else self._wanted
 
     def link_opened(self, now: float) -> None:

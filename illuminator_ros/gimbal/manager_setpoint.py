@@ -156,7 +156,7 @@ class Demand:
 
     @cached_property
     def frame(self) -> YawFrame:
-        """The frame of its yaw."""
+        """Return the frame of its yaw."""
         return yaw_frame(self.flags)
 
     @property
@@ -270,12 +270,12 @@ class Setpoint:
 
     @property
     def operation(self) -> MountFlags:
-        """The flags without those of the yaw frame."""
+        """Return the flags without those of the yaw frame."""
         return self.flags & _PASSED_ON
 
     @property
     def device_flags(self) -> MountFlags:
-        """The flags for the device."""
+        """Return the flags for the device."""
         # An operation on an IntFlag takes ten times as long as on an int.
         return MountFlags(int(self.flags) & _PASSED_BITS | int(self.frame.flag))
 

@@ -99,7 +99,7 @@ class VehicleState:
 
     @property
     def home_altitude(self) -> float | None:
-        """The altitude from which relative altitudes count, m above mean sea level."""
+        """Return the altitude from which relative altitudes count, m above mean sea level."""
         return self._home_altitude
 
     def for_device(self, device: Address, now: float) -> AutopilotStateForGimbalDevice | None:

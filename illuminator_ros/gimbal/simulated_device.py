@@ -253,8 +253,8 @@ class SimulatedMount:
         motion = self.motion
         motion.advance(now)
         roll, pitch, yaw = map(math.degrees, motion.angles)
-        state = (*(str(flag.name) for flag in (MountFlags.RETRACT, MountFlags.NEUTRAL,
-                                          MountFlags.YAW_LOCK) if flag & motion.flags),
+        shown_flags = MountFlags.RETRACT, MountFlags.NEUTRAL, MountFlags.YAW_LOCK
+        state = (*(str(flag.name) for flag in shown_flags if flag & motion.flags),
                  *(str(flag.name) for flag in ErrorFlags if flag & motion.limits()),
                  *filter(None, notes))
         shown = tuple(str(one).lower().replace('_', ' ') for one in state)
@@ -337,8 +337,9 @@ class SimulatedGimbal(SimulatedDevice):
         elif isinstance(message, gimbal.AutopilotStateForGimbalDevice):
             if source.system == own.system:
                 self._take_heading(message, now)
-        elif (isinstance(message, gimbal.GimbalDeviceSetAttitude) or behaviour.takes_manager_set
-                ) and (source == self.manager or not behaviour.enforces_control):
+        elif ((source == self.manager or not behaviour.enforces_control)
+              and (isinstance(message, gimbal.GimbalDeviceSetAttitude)
+                   or behaviour.takes_manager_set)):
             self._set(message, now)
         return ()
 

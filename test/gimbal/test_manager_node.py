@@ -32,12 +32,12 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
 from geometry_msgs.msg import QuaternionStamped, Twist, TwistWithCovariance, Vector3  # noqa: E402
-from illuminator_ros.gimbal.ros.manager_node import (
-    MANAGER_PARAMETERS,  # noqa: E402
-    manager_settings,  # noqa: E402
+from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
+    MANAGER_PARAMETERS,
+    manager_settings,
 )
 from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from illuminator_ros.ros.parameters import ParameterError  # noqa: E402

@@ -24,7 +24,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402
+from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402, I100
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS  # noqa: E402
 from support.tables import table  # noqa: E402
 import yaml  # noqa: E402

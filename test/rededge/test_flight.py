@@ -35,7 +35,7 @@ import pytest
 from support.virtual_link import START, VirtualLink
 
 sys.path.insert(0, str(Path(__file__).parents[2] / 'demo'))
-from flight_model import (  # noqa: E402
+from flight_model import (  # noqa: E402, I100
     ATTITUDE_RATE,
     compare,
     Comparison,

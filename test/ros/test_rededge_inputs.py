@@ -53,6 +53,7 @@ class Clock:
 
 
 class Rig:
+
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.clock, self.steady, self.jumps = Clock(), 50.0, 0
         monkeypatch.setattr('illuminator_ros.rededge.ros.inputs.time.monotonic',
