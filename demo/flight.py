@@ -57,7 +57,7 @@ from flight_model import (  # noqa: E402
     VALIDITY,
 )
 from illuminator_ros.cli.simulator.components import SettingError  # noqa: E402
-from illuminator_ros.cli.simulator.record_file import RecordFile  # noqa: E402
+from illuminator_ros.cli.simulator.csv_file import CsvFile  # noqa: E402
 from illuminator_ros.mavlink.link import Link  # noqa: E402
 from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from illuminator_ros.mavlink.url import parse_url  # noqa: E402
@@ -152,7 +152,7 @@ class SimulatedCamera:
         self._url = f'pty://{path}'
         self._device = SimulatedRedEdge(
             address, validity=VALIDITY / speed, own_gps=Place(LATITUDE, LONGITUDE, 0.0))
-        self._device.records.subscribe(RecordFile(str(images), tuple(COLUMNS)).append)
+        self._device.records.subscribe(CsvFile(str(images), tuple(COLUMNS)).append)
         self._device.set_clock(time.time(), time.monotonic())
         self._endpoint = SimulatedComponents(
             [Description(address, self._device)], time.monotonic())

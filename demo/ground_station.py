@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from queue import SimpleQueue
 
-from illuminator_ros.mavlink.command import Command, CommandResult, CommandSender
+from illuminator_ros.mavlink.command_sender import Command, CommandResult, CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address, MavCmd, MavType

@@ -37,8 +37,8 @@ from illuminator_ros.gimbal.messages import (
 )
 from illuminator_ros.mavlink.frame import HEADER_V2
 from illuminator_ros.mavlink.messages import Address, Heartbeat
-from illuminator_ros.payload.mount import MountFlags
-from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountFlags
 from support.frames import frame_of
 
 from ..rig import Bench, bridge, Client, free_port, interleaved, PATIENCE, peer

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 from .entry_point import discard_output, one_line, run_program
 from .payloads import PAYLOADS
 from .termination import Termination
-from ..payload.registry import PayloadType
+from ..payload.payload_type import PayloadType
 
 if TYPE_CHECKING:
     from ..ros.payload import RosPayload  # Slow to import.

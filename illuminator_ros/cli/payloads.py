@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..payload.registry import PayloadType
+from ..payload.payload_type import PayloadType
 
 PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(

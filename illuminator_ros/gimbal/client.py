@@ -30,12 +30,12 @@ from .messages import (
     MAV_TYPE_GIMBAL,
     NON_MAVLINK_IDS,
 )
-from ..mavlink.command import Command, CommandSender
+from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import Address, Heartbeat, MAV_AUTOPILOT_INVALID, MavCmd, Message
-from ..payload.events import Listeners
-from ..payload.vehicle import GimbalDeviceAttitudeStatus
+from ..payload.listeners import Listeners
+from ..payload.messages import GimbalDeviceAttitudeStatus
 
 # Gimbals; one more is ignored, so that memory is bounded.
 MAX_GIMBALS = 32

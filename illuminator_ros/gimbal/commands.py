@@ -21,8 +21,8 @@ import math
 
 from .messages import flag_names, GimbalCommand, GimbalManagerStatus
 from ..mavlink.messages import Address
-from ..payload.mount import MountFlags, YawFrame
-from ..payload.vehicle import GimbalDeviceAttitudeStatus
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import MountFlags, YawFrame
 
 # Roll and pitch are relative to the horizon in each setpoint.
 LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK

@@ -23,7 +23,7 @@ from .commands import Control
 from .messages import Capabilities, ErrorFlags, GimbalDeviceInformation, GimbalManagerInformation
 from ..mavlink.messages import Address
 from ..payload.identity import text
-from ..payload.mount import MountAttitude, MountFlags
+from ..payload.mount_attitude import MountAttitude, MountFlags
 
 
 class GimbalKey(NamedTuple):

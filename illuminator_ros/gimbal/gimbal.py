@@ -45,12 +45,18 @@ from .messages import (
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
 )
-from ..mavlink.command import Command, CommandResult, CommandSender, format_seconds, Position
+from ..mavlink.command_sender import (
+    Command,
+    CommandResult,
+    CommandSender,
+    format_seconds,
+    Position,
+)
 from ..mavlink.messages import Address, MAV_AUTOPILOT_ARDUPILOTMEGA, MavCmd
 from ..payload import request
-from ..payload.mount import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
 from ..payload.rotation import flu_frd, Quaternion, Vector
-from ..payload.vehicle import GimbalDeviceAttitudeStatus
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
@@ -479,7 +485,7 @@ class Gimbal:
         Send an attitude.
 
         :param rotation: with norm 1, from the FLU axes of the gimbal as in
-            :class:`~..payload.mount.MountAttitude`.
+            :class:`~..payload.mount_attitude.MountAttitude`.
         :return: why it was not sent, for people; '' if it was.
         """
         self.was_commanded = True

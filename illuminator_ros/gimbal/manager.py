@@ -48,7 +48,6 @@ from .manager_setpoint import (
     stopped,
     turned_by,
 )
-from .manager_vehicle import VehicleState
 from .messages import (
     AutopilotStateForGimbalDevice,
     Capabilities,
@@ -63,15 +62,17 @@ from .messages import (
     GimbalManagerStatus,
     MAV_TYPE_GIMBAL,
 )
+from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
-from ..mavlink.command import Command, CommandResult, CommandSender, DEGREE_SCALE
 from ..mavlink.command_receiver import AnyCommand
+from ..mavlink.command_sender import Command, CommandResult, CommandSender, DEGREE_SCALE
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, MavResult
-from ..payload.events import Listeners, RateLimit
-from ..payload.mount import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.listeners import Listeners
+from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+from ..payload.mount_attitude import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.rate_limit import RateLimit
 from ..payload.rotation import Quaternion
-from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 
 # s between GIMBAL_MANAGER_STATUS; between repetitions of a setpoint that stays as it is, at most
 # 1 s by the specification; and of one that follows a place, the vehicle or a rate.

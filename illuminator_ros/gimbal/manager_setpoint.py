@@ -16,7 +16,7 @@
 Setpoints of a gimbal: reading, mixing and limiting them. Pure functions; MAVLink's conventions.
 
 Rotations are those of FRD axes. Roll and pitch are relative to the horizon, yaw to north or to the
-vehicle's heading, as the :class:`~..payload.mount.YawFrame` says.
+vehicle's heading, as the :class:`~..payload.mount_attitude.YawFrame` says.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .messages import (
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
 )
-from ..payload.mount import Components, MountFlags, names_frame, yaw_frame, YawFrame
+from ..payload.mount_attitude import Components, MountFlags, names_frame, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 AXES = ('roll', 'pitch', 'yaw')

@@ -36,7 +36,8 @@ from .. import __version__
 from ..mavlink.messages import Address, Message
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
-from ..payload.mount import MountFlags, yaw_frame, YawFrame
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import MountFlags, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 from ..payload.simulated import (
     AnyCommand,
@@ -48,7 +49,6 @@ from ..payload.simulated import (
     Snapshot,
 )
 from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
-from ..payload.vehicle import GimbalDeviceAttitudeStatus
 
 # s without an announcement after which a manager no longer is one.
 MANAGER_TIMEOUT = 5.0

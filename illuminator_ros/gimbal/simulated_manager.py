@@ -50,7 +50,8 @@ from ..mavlink.messages import (
     Message,
 )
 from ..payload.faults import Behaviour, Fault, FaultTable
-from ..payload.mount import MountFlags, yaw_frame, YawFrame
+from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+from ..payload.mount_attitude import MountFlags, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 from ..payload.simulated import (
     AnyCommand,
@@ -62,7 +63,6 @@ from ..payload.simulated import (
     Snapshot,
 )
 from ..payload.simulated_settings import integer, number, one_of, Setting, Values
-from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
 STATUS_INTERVAL = 0.2

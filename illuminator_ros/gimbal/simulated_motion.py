@@ -22,7 +22,7 @@ import math
 from typing import NamedTuple
 
 from .messages import Capabilities, ErrorFlags
-from ..payload.mount import MountFlags, YawFrame
+from ..payload.mount_attitude import MountFlags, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # s without a heading from the vehicle after which its heading is unknown.

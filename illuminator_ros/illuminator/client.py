@@ -24,13 +24,13 @@ from .events import AnyLightEvent, LightForgotten, LightFound
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
-from .mount_directions import MountDirections
-from ..mavlink.command import CommandSender
+from .mount_orientation import MountOrientations
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, MavType, Message
 from ..payload.discovery import Discovery
-from ..payload.events import Listeners
 from ..payload.identity import Identity
+from ..payload.listeners import Listeners
 from ..payload.request import Done, Result
 
 # Lost lights that are asked for a status at once, so that a slow line is not filled.
@@ -58,7 +58,7 @@ class IlluminatorClient(Payload):
         self, commands: CommandSender, settings: Settings, *,
         wanted: Callable[[Address], bool] = lambda address: True, needs_mounts: bool = False,
     ) -> None:
-        self.mounts = MountDirections()
+        self.mounts = MountOrientations()
         self.mount_moved: Listeners[int] = Listeners()
         self.commands = commands
         self.settings = settings

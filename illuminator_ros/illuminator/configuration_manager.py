@@ -35,7 +35,7 @@ from .model import (
     Status,
     unexpected_differences,
 )
-from ..payload.events import RateLimit, RepeatLimit
+from ..payload.rate_limit import RateLimit, RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
 # s; rqt_reconfigure gives up after 1.0 s, and a set must have answered by then.

@@ -21,17 +21,17 @@ from dataclasses import dataclass, field
 import math
 
 from . import configuration_manager, events
+from .command_sources import DEFAULT, Sources, SourceSettings
 from .commands import Switch
 from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
 from .model import Changes, DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
-from .sources import DEFAULT, Sources, SourceSettings
 from .status_tracker import RESTART_PROOF_TIME, StatusTracker
-from ..mavlink.command import CommandResult, CommandSender, CommandStatus, format_seconds
+from ..mavlink.command_sender import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
-from ..payload.events import RateLimit, RepeatLimit
 from ..payload.identity import Identity, IdentityQuery
+from ..payload.rate_limit import RateLimit, RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
 # s without a status after which the light is asked for one, and between the requests.

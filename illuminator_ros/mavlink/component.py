@@ -22,8 +22,9 @@ from collections.abc import Sequence
 import math
 from typing import Protocol
 
-from .command import CommandSender, CommandStatus
 from .command_receiver import AnyCommand, CommandReceiver
+from .command_sender import CommandSender, CommandStatus
+from .conflating_queue import StreamGroup
 from .frame import Frame
 from .messages import (
     Address,
@@ -36,7 +37,6 @@ from .messages import (
     MavType,
     Message,
 )
-from .stream_queue import StreamGroup
 
 # s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0

@@ -31,6 +31,7 @@ import threading
 import time
 
 from .component import Endpoint
+from .conflating_queue import ConflatingQueue
 from .connector import Connector
 from .frame import Frame, MAX_ID_V1
 from .frame_reader import FrameReader
@@ -41,7 +42,6 @@ from .routing_table import RoutingTable
 from .signing import Signing
 from .signing_files import TimestampStore
 from .statistics import Traffic
-from .stream_queue import StreamQueue
 from .transport import Channel, Peer
 from .url import Url
 
@@ -131,7 +131,7 @@ class Link:
         self._router = RoutingTable()
         self._traffic = Traffic()
         # Messages that wait for the line, and when it will have sent all that was written, s.
-        self._streams = StreamQueue(endpoint.streams)
+        self._streams = ConflatingQueue(endpoint.streams)
         self._line_free_at = -math.inf
         self._status = LinkStatus(label, clock())
         # When the channel is proved without a frame, and whether a frame was received over it.

@@ -33,7 +33,7 @@ from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTupl
 
 from fastcrc.crc16 import mcrf4xx
 
-from .layouts import DIALECT
+from .crc_extra import DIALECT
 
 UInt8 = Annotated[int, 'B']
 UInt16 = Annotated[int, 'H']

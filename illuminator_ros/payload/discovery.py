@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator
 import math
 from typing import Generic, Protocol, TypeVar
 
-from ..mavlink.command import CommandSender, CommandStatus
+from ..mavlink.command_sender import CommandSender, CommandStatus
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import Address
 

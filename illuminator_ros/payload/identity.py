@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import math
 
 from .request import Target
-from ..mavlink.command import CommandResult, CommandStatus
+from ..mavlink.command_sender import CommandResult, CommandStatus
 from ..mavlink.messages import ComponentInformationBasic, result_name
 
 # s from the acknowledgement to the message.

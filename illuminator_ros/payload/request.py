@@ -29,7 +29,13 @@ from enum import Enum
 import math
 from typing import Generic, Protocol, TypeVar
 
-from ..mavlink.command import Command, CommandResult, CommandSender, CommandStatus, format_seconds
+from ..mavlink.command_sender import (
+    Command,
+    CommandResult,
+    CommandSender,
+    CommandStatus,
+    format_seconds,
+)
 from ..mavlink.messages import Address, MavCmd, MavResult
 
 # s from the acknowledgement to the status that shows the change.

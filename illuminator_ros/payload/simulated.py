@@ -27,8 +27,8 @@ import itertools
 import math
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
-from .events import Listeners
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
+from .listeners import Listeners
 from .simulated_settings import integer, Setting, Values
 from ..mavlink import messages
 from ..mavlink.component import Endpoint

@@ -32,7 +32,7 @@ from .messages import (
     Ping,
     Shot,
 )
-from ..mavlink.command import format_seconds
+from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message
 
 # s between PINGs, and the wait for a reply; a requested PING is tried twice.

@@ -50,7 +50,7 @@ from ..payload.checks.requirement import (
 )
 from ..payload.checks.session import Failed, Session, Skipped
 from ..payload.checks.specification import Specification
-from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 
 SERIAL_API = Specification(
     'RedEdge serial API', 'https://micasense.github.io/rededge-api/api/serial.html')

@@ -32,11 +32,11 @@ from .messages import (
     MountStatus,
     Ping,
 )
-from ..mavlink.command import CommandSender
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, Heartbeat, Message
-from ..payload.events import Listeners
-from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+from ..payload.listeners import Listeners
+from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,8 @@ from typing import TypeVar
 
 from .messages import CameraFeedback, GpsRawInt, GpsStatus, MountStatus
 from ..mavlink.messages import Message
+from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 from ..payload.rotation import enu_flu, enu_ned, flip, flu_frd, ned_frd, Quaternion, Vector
-from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
 
 M = TypeVar('M', bound=Message)
 

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 from . import conversions
 from .conversions import FIRST_UTC, LAST_UTC, MountFrame, Position
-from ..mavlink.command import format_seconds
+from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message
 from ..payload.rotation import Quaternion, Vector
 

@@ -45,9 +45,9 @@ from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
+from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import number, Setting, Values
-from ..payload.vehicle import Attitude, GlobalPositionInt, SystemTime
 
 # Until the camera hears a host.
 DEFAULT_SYSTEM_ID = 255

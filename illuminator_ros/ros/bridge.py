@@ -44,11 +44,11 @@ from .parameters import (
 )
 from .payload import Host, RosPayload, ServedPayload
 from .throttled_log import LogForwarder, NodeLog
-from ..mavlink.command import CommandSender, format_seconds
+from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
-from ..payload.registry import PayloadType
+from ..payload.payload_type import PayloadType
 
 # s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
 OFF_LIMIT = 0.6

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..mavlink import link_state
-from ..mavlink.command import format_seconds
+from ..mavlink.command_sender import format_seconds
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.messages import Address

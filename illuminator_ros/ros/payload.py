@@ -26,7 +26,7 @@ from .diagnostics_publisher import DiagnosticsPublisher
 from .node_manager import NodeManager
 from .parameters import LinkParameters, ParameterSpec, Values
 from .throttled_log import LogForwarder, NodeLog
-from ..mavlink.command import CommandSender
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.link import Link
 

@@ -19,7 +19,8 @@ from pathlib import Path
 import re
 from types import ModuleType
 
-from illuminator_ros.mavlink import command, link_state
+from illuminator_ros.mavlink import command_sender as command
+from illuminator_ros.mavlink import link_state
 from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload import request
 import pytest

@@ -28,9 +28,9 @@ from illuminator_ros.gimbal.messages import GimbalCommand
 from illuminator_ros.gimbal.simulated_motion import UNSET
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
-from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
 from illuminator_ros.payload.simulated import SimulatedType
-from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
 import pytest
 from support.gimbal_checks import GimbalRun
 

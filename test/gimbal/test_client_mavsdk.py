@@ -26,12 +26,12 @@ from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.events import ControlChanged
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.simulated_manager import ManagerProperties, SimulatedManager
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url
-from illuminator_ros.payload.mount import to_mavlink, YawFrame
+from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.payload.simulated import Description, SimulatedComponents

@@ -30,7 +30,7 @@ from illuminator_ros.mavlink.messages import (
     MAV_AUTOPILOT_ARDUPILOTMEGA,
     MavResult,
 )
-from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.request import Done
 import pytest
 from support.gimbals import ALL, DEVICE, FakeManager, in_control, OTHER, OURS, Rig

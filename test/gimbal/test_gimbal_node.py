@@ -23,7 +23,7 @@ from typing import Any
 
 from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags, GimbalCommand
 from illuminator_ros.mavlink.messages import Address, CommandInt, MavResult
-from illuminator_ros.payload.mount import from_mavlink, MountFlags, to_mavlink, YawFrame
+from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 

@@ -27,7 +27,7 @@ pytest.importorskip('rclpy')
 
 from illuminator_ros.gimbal.ros.gimbal_node import PUBLICATIONS, REQUESTS  # noqa: E402, I100
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402
-from illuminator_ros.payload.mount import to_mavlink, YawFrame  # noqa: E402
+from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame  # noqa: E402
 from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from support.tables import table  # noqa: E402
 import yaml  # noqa: E402

@@ -52,9 +52,9 @@ from illuminator_ros.mavlink.messages import (
     MavType,
 )
 from illuminator_ros.payload.arbitration import Cause, Policy
-from illuminator_ros.payload.mount import MountFlags, UNSET
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountFlags, UNSET
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
 import pytest
 from support.gimbal_manager import (
     attitude_status,

@@ -23,13 +23,13 @@ from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
 from illuminator_ros.gimbal.manager_setpoint import Range
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Policy
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
 from illuminator_ros.payload.checks.runner import CheckRunner
-from illuminator_ros.payload.mount import YawFrame
+from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion
 import pytest

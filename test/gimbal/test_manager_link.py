@@ -20,7 +20,7 @@ from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role
 from illuminator_ros.gimbal.manager_presence import ManagerState
 from illuminator_ros.gimbal.messages import MAV_TYPE_GIMBAL
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, heartbeat, Message
 from illuminator_ros.mavlink.signing import Signing, SigningMode

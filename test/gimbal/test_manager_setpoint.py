@@ -34,7 +34,7 @@ from illuminator_ros.gimbal.manager_setpoint import (
     stopped,
     turned_by,
 )
-from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from illuminator_ros.gimbal import messages
-from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.mount_attitude import MountFlags
 from pymavlink.dialects.v20 import common
 import pytest
 

@@ -20,7 +20,7 @@ import math
 
 from illuminator_ros.gimbal.gimbal import REPEATS
 from illuminator_ros.gimbal.messages import Capabilities, GimbalManagerSetAttitude
-from illuminator_ros.payload.mount import from_mavlink, MountFlags, to_mavlink, YawFrame
+from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx

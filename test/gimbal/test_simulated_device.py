@@ -29,10 +29,10 @@ from illuminator_ros.gimbal.simulated_device import (
     SimulatedGimbal,
 )
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, MavResult, Message
-from illuminator_ros.payload.mount import MountFlags, YawFrame
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
-from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
 import pytest
 
 NAN = math.nan

@@ -30,14 +30,14 @@ from illuminator_ros.mavlink.messages import (
     MavCmd,
     MavResult,
 )
-from illuminator_ros.payload.mount import MountFlags, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
-from illuminator_ros.payload.vehicle import (
+from illuminator_ros.payload.messages import (
     Attitude,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
+from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.payload.simulated import Description, SimulatedComponents
 import pytest
 
 NAN = math.nan

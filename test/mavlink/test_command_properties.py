@@ -19,7 +19,7 @@ from __future__ import annotations
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
-from illuminator_ros.mavlink.command import CommandStatus, MAX_WAITING
+from illuminator_ros.mavlink.command_sender import CommandStatus, MAX_WAITING
 from illuminator_ros.mavlink.messages import Address
 from support.command_rig import LIGHT, LONG, Rig, Run
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command import CommandSender
 from illuminator_ros.mavlink.command_receiver import AnyCommand, MAX_RESULTS, REPEAT_TIME
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Payload
 from illuminator_ros.mavlink.messages import (
     Address,

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Payload
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (

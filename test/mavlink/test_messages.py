@@ -24,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink import messages
-from illuminator_ros.mavlink.layouts import DIALECT
+from illuminator_ros.mavlink.crc_extra import DIALECT
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,

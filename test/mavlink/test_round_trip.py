@@ -18,7 +18,12 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.command import MAX_SAMPLES, MIN_SAMPLES, MIN_TIMEOUT, RttEstimator
+from illuminator_ros.mavlink.command_sender import (
+    MAX_SAMPLES,
+    MIN_SAMPLES,
+    MIN_TIMEOUT,
+    RttEstimator,
+)
 from illuminator_ros.mavlink.messages import Address, MavResult
 import pytest
 from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig

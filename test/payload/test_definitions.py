@@ -22,7 +22,7 @@ from typing import Any, cast
 
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.mavlink.messages import decode_payload, encode_payload, Message
-from illuminator_ros.payload import vehicle
+from illuminator_ros.payload import messages as vehicle
 from illuminator_ros.rededge import messages as rededge
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink_2

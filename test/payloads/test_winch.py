@@ -23,7 +23,7 @@ from illuminator_ros.cli.simulator.options import parser, payload_types
 from illuminator_ros.cli.simulator.view import look
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
 from illuminator_ros.payload.request import Result

@@ -27,13 +27,13 @@ from functools import partial
 import math
 
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.payload import request, simulated
 from illuminator_ros.payload.discovery import Discovery
-from illuminator_ros.payload.events import Listeners
 from illuminator_ros.payload.faults import Behaviour
-from illuminator_ros.payload.registry import PayloadType
+from illuminator_ros.payload.listeners import Listeners
+from illuminator_ros.payload.payload_type import PayloadType
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
                     simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS')

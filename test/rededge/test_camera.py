@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
 from illuminator_ros.rededge.camera import CameraConnected, CameraLost, ImageTaken

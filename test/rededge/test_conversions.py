@@ -24,8 +24,8 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.messages import decode_payload, encode_payload
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
 from illuminator_ros.payload.rotation import flip, Quaternion, Vector
-from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt
 from illuminator_ros.rededge import conversions
 from illuminator_ros.rededge.conversions import MountFrame, Position
 from illuminator_ros.rededge.messages import CameraFeedback, GpsRawInt, MountStatus

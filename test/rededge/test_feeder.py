@@ -23,8 +23,8 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.messages import Address, Message
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Quaternion, Vector
-from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.rededge.conversions import MountFrame, Position
 from illuminator_ros.rededge.feeder import (
     Feeder,

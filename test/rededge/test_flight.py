@@ -22,7 +22,7 @@ import heapq
 from pathlib import Path
 import sys
 
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion

@@ -21,8 +21,8 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
-from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
     CameraFeedbackFlags,

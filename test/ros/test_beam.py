@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import math
 from pathlib import Path
 
-from illuminator_ros.payload.mount import to_mavlink, YawFrame
+from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy

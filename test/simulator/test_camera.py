@@ -23,7 +23,7 @@ import select
 import signal
 
 from illuminator_ros.cli.simulator.components import SettingError
-from illuminator_ros.cli.simulator.record_file import RecordFile
+from illuminator_ros.cli.simulator.csv_file import CsvFile
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.rededge.messages import DigicamControl, Ping
 from illuminator_ros.rededge.simulated import COLUMNS
@@ -80,13 +80,13 @@ def test_console_and_view_show_the_images() -> None:
 
 def test_file_that_cannot_be_written_is_named_at_the_start(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=f'{tmp_path}/no/file: No such file or directory'):
-        RecordFile(f'{tmp_path}/no/file', ['a'])
+        CsvFile(f'{tmp_path}/no/file', ['a'])
 
 
 def test_full_disk_is_said_once_and_ends_the_records(
         tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / 'records'
-    file = RecordFile(str(path), ['a', 'b'])
+    file = CsvFile(str(path), ['a', 'b'])
     file.append(['1', 'x,y'])
     assert path.read_text() == 'a,b\n1,"x,y"\n'
     path.unlink()

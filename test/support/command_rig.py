@@ -22,7 +22,12 @@ import heapq
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command import Command, CommandResult, CommandSender, CommandStatus
+from illuminator_ros.mavlink.command_sender import (
+    Command,
+    CommandResult,
+    CommandSender,
+    CommandStatus,
+)
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, MavResult
 
 OURS = Address(1, 194)

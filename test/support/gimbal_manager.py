@@ -31,7 +31,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetPitchyaw,
     MAV_TYPE_GIMBAL,
 )
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -44,9 +44,13 @@ from illuminator_ros.mavlink.messages import (
     MavType,
     Message,
 )
-from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.messages import (
+    Attitude,
+    GimbalDeviceAttitudeStatus,
+    GlobalPositionInt,
+)
+from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.vehicle import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 
 OURS, DEVICE, AUTOPILOT = Address(1, 194), Address(1, 154), Address(1, 1)
 PILOT, GUEST, OWNER = Address(255, 190), Address(255, 191), Address(1, 191)

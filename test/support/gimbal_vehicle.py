@@ -24,13 +24,13 @@ from typing import Any
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address, CommandAck, Message
 from illuminator_ros.mavlink.url import parse_url
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
-from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt
 from support.gimbal_manager import AUTOPILOT, DEVICE, OURS
 
 HERE = 47.0, 8.0, 500.0

@@ -26,7 +26,7 @@ from illuminator_ros.gimbal import messages as gm
 from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.events import GimbalEvent, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
@@ -42,9 +42,9 @@ from illuminator_ros.mavlink.messages import (
     Message,
 )
 from illuminator_ros.mavlink.url import parse_url
-from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.request import Result
-from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
 
 OURS, AUTOPILOT, DEVICE, OTHER = Address(1, 194), Address(1, 1), Address(1, 154), Address(1, 195)
 NAN = math.nan

@@ -23,7 +23,7 @@ from typing import Any, cast
 
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
-from illuminator_ros.mavlink.command import MAX_WAITING
+from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS

@@ -22,7 +22,7 @@ import sys
 from ..entry_point import run_program
 from ..payloads import PAYLOADS
 from ..termination import Termination
-from ...payload.registry import PayloadType
+from ...payload.payload_type import PayloadType
 
 
 def main(

@@ -24,7 +24,7 @@ from .console import describe_commands
 from ..options import add_mavlink_version, add_signing, option, Parser
 from ..payloads import PAYLOADS
 from ... import __version__
-from ...payload.registry import PayloadType
+from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer
 
 DEFAULT_PAYLOAD = 'illuminator'

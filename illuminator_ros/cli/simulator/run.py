@@ -30,8 +30,8 @@ import time
 
 from .components import components, load, Scenario, SettingError, Types
 from .console import execute
+from .csv_file import write_records
 from .options import parser, payload_types
-from .record_file import write_records
 from .view import LiveView, Look, look, PlainView
 from ..options import mavlink_version, signing
 from ..termination import Termination
@@ -39,7 +39,7 @@ from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.messages import Address
 from ...mavlink.signing_files import KeyFileError
 from ...mavlink.url import parse_url, Url, UrlError
-from ...payload.registry import PayloadType
+from ...payload.payload_type import PayloadType
 from ...payload.simulated import Description, SimulatedComponents, SimulatedDevice
 
 # s between updates of the view.

@@ -39,9 +39,9 @@ from ...payload.checks.component_requirements import none_of
 from ...payload.checks.requirement import AnyRequirement, Requirement, requirement
 from ...payload.checks.session import Failed, Skipped
 from ...payload.checks.specification import COMMAND, MESSAGES
-from ...payload.mount import MountFlags, yaw_frame
+from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
+from ...payload.mount_attitude import MountFlags, yaw_frame
 from ...payload.rotation import Quaternion
-from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
 
 STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
 # Degrees that an attitude may differ from what the angular velocity explains.

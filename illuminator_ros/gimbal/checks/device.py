@@ -65,9 +65,9 @@ from ...payload.checks.requirement import (
 )
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.checks.specification import MESSAGES, ROUTING
-from ...payload.mount import MountFlags
+from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
+from ...payload.mount_attitude import MountFlags
 from ...payload.rotation import Quaternion
-from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
 
 # s
 ANNOUNCE_INTERVAL = 0.4

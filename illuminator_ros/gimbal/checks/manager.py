@@ -65,9 +65,9 @@ from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, requirement
 from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transaction
 from ...payload.checks.specification import MESSAGES, ROUTING
-from ...payload.mount import MountFlags
-from ...payload.vehicle import Attitude, GlobalPositionInt
-from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
+from ...payload.messages import Attitude, GlobalPositionInt
+from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
+from ...payload.mount_attitude import MountFlags
 
 INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
 PITCHYAW, CONFIGURE = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW,

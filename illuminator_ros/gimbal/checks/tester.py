@@ -29,9 +29,9 @@ from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.requirement import Conditions
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.checks.specification import Specification
-from ...payload.mount import MountFlags, yaw_frame, YawFrame
+from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
+from ...payload.mount_attitude import MountFlags, yaw_frame, YawFrame
 from ...payload.rotation import Quaternion
-from ...payload.vehicle import GimbalDeviceAttitudeStatus as AttitudeStatus
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
 PROPOSAL = Specification(

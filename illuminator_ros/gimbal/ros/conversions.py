@@ -24,7 +24,7 @@ from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Header
 
-from ...payload.mount import YawFrame
+from ...payload.mount_attitude import YawFrame
 from ...payload.rotation import Quaternion, Vector
 from ...ros.parameters import ParameterError, ParameterSpec, Values
 

@@ -22,8 +22,8 @@ import math
 from ..commands import Control
 from ..events import GimbalKey, GimbalSnapshot
 from ..messages import ErrorFlags, flag_names
-from ...mavlink.command import format_seconds
-from ...payload.mount import MountFlags
+from ...mavlink.command_sender import format_seconds
+from ...payload.mount_attitude import MountFlags
 from ...ros.diagnostics import (
     ERROR,
     Finding,

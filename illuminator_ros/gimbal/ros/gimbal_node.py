@@ -49,7 +49,7 @@ from ..events import (
 from ..gimbal import Gimbal, GimbalSettings
 from ..messages import ErrorFlags, flag_names
 from ...payload import request
-from ...payload.mount import MountFlags, YawFrame
+from ...payload.mount_attitude import MountFlags, YawFrame
 from ...payload.rotation import Quaternion, Vector
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly

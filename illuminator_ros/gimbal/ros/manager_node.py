@@ -37,16 +37,16 @@ from ..manager import (
     SetpointClipped,
     SetpointSent,
 )
-from ..manager_client import ManagerWithClient
 from ..manager_control import ControlChanged, ControlSettings, Role
 from ..manager_presence import ManagerState, StateChanged
 from ..manager_setpoint import GeoPoint, Range
-from ...mavlink.command import CommandSender
+from ..manager_with_client import ManagerWithClient
+from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
-from ...payload.mount import from_mavlink, to_mavlink, YawFrame
+from ...payload.messages import GimbalDeviceAttitudeStatus
+from ...payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
-from ...payload.vehicle import GimbalDeviceAttitudeStatus
 from ...ros.diagnostics import ERROR, Finding, LinkSnapshot, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication, STREAM_QOS

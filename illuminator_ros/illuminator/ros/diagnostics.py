@@ -21,7 +21,7 @@ import math
 
 from ..events import LightSnapshot
 from ..model import ErrorFlag, flag_names, KNOWN_FLAGS
-from ...mavlink.command import format_seconds
+from ...mavlink.command_sender import format_seconds
 from ...mavlink.messages import Address
 from ...ros import diagnostics
 

@@ -25,7 +25,7 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 from .diagnostics import FlagLog
 from .. import events, model
-from ..sources import DEFAULT
+from ..command_sources import DEFAULT
 from ...payload.arbitration import Cause as HolderCause
 from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN

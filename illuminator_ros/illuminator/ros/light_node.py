@@ -29,10 +29,10 @@ from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
 from .event_publisher import EventPublisher, PUBLICATIONS
 from .parameters import BeamGeometry, device_parameters
 from ..client import IlluminatorClient
+from ..command_sources import DEFAULT
 from ..events import AnyLightEvent
 from ..light import Light
 from ..model import checked, InvalidValue, SafetyLimits
-from ..sources import DEFAULT
 from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...payload.rotation import Quaternion

@@ -30,7 +30,7 @@ from .light_node import LightNode
 from .. import events
 from ..client import enable_all, IlluminatorClient
 from ..light import Light
-from ...mavlink.command import CommandSender
+from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.link_call import LatestOnly

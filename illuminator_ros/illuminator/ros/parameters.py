@@ -24,9 +24,9 @@ import reprlib
 
 from rclpy.node import Node
 
+from ..command_sources import DEFAULT, SourceSettings
 from ..light import Settings
 from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
-from ..sources import DEFAULT, SourceSettings
 from ...mavlink.messages import Address
 from ...ros.parameters import (
     declare_read_only,
@@ -52,8 +52,7 @@ LIGHT_PARAMETERS = (
                   10_000.0),
     ParameterSpec('beam_angle', 0.5, 'full opening angle of the cone on ~/beam', 'rad', 0.01,
                   3.0),
-    ParameterSpec('mounted_on', 0,
-                  'gimbal device id of the gimbal that the light is on; 0 = as the light reports',
+    ParameterSpec('mounted_on', 0, 'gimbal device id of the mount; 0 = as the light reports',
                   low=0, high=255),
     ParameterSpec('off_on_shutdown', False, 'switch the lights off when the node ends'),
     ParameterSpec('restore_configuration', True,

@@ -35,7 +35,7 @@ from ..client import RedEdgeClient, Settings
 from ..conversions import image_attitude, image_position, MountFrame
 from ..feeder import FeederSettings, Input, InputChanged, InputState, PositionSource
 from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
-from ...mavlink.command import CommandSender
+from ...mavlink.command_sender import CommandSender
 from ...payload.rotation import Vector
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, NodeInterface, Publication, RequestService, STREAM_QOS

@@ -24,7 +24,7 @@ from ..camera import CameraSnapshot
 from ..client import ClientSnapshot
 from ..feeder import FeederSnapshot, Input, InputSnapshot, InputState
 from ..messages import MAV_COMP_ID_CAMERA
-from ...mavlink.command import format_seconds
+from ...mavlink.command_sender import format_seconds
 from ...ros.diagnostics import (
     ERROR,
     Finding,

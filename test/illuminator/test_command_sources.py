@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable
 import random
 
+from illuminator_ros.illuminator.command_sources import SourceSettings
 from illuminator_ros.illuminator.events import LightHeld, WishFailed
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
-from illuminator_ros.illuminator.sources import SourceSettings
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 from illuminator_ros.payload.arbitration import Cause
 import pytest

@@ -20,15 +20,15 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
-from illuminator_ros.illuminator.mount_directions import (
+from illuminator_ros.illuminator.mount_orientation import (
     ATTITUDE_LIFETIME,
     MAX_MOUNTS,
-    MountDirections,
+    MountOrientations,
 )
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.mount import MountFlags
+from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.rotation import Quaternion, Vector
-from illuminator_ros.payload.vehicle import Attitude, GimbalDeviceAttitudeStatus
 import pytest
 from pytest import approx
 
@@ -54,7 +54,7 @@ def vehicle(roll: float, pitch: float, yaw: float) -> Attitude:
     return Attitude(0, roll, pitch, yaw, 0.0, 0.0, 0.0)
 
 
-def pointed(mounts: MountDirections, now: float = 0.0, device_id: int = 154) -> Vector | None:
+def pointed(mounts: MountOrientations, now: float = 0.0, device_id: int = 154) -> Vector | None:
     """Return the direction of the beam in the vehicle's body: ahead, left, up."""
     rotation = mounts.direction(1, device_id, now)
     return None if rotation is None else rotation.rotate((1.0, 0.0, 0.0))
@@ -63,7 +63,7 @@ def pointed(mounts: MountDirections, now: float = 0.0, device_id: int = 154) -> 
 @given(st.tuples(tilts, tilts, angles), st.tuples(tilts, tilts, angles), st.booleans())
 def test_beam_points_where_the_gimbal_points_whatever_the_vehicle_does(
         gimbal: Vector, body: Vector, in_earth: bool) -> None:
-    mounts = MountDirections()
+    mounts = MountOrientations()
     mounts.take(AUTOPILOT, vehicle(*body), 0.0)
     assert mounts.take(GIMBAL, status(gimbal, EARTH if in_earth else VEHICLE), 0.0)
 
@@ -87,14 +87,14 @@ def test_beam_points_where_the_gimbal_points_whatever_the_vehicle_does(
     (status((0.0, 0.0, 0.0), EARTH | VEHICLE), None)])
 def test_vehicle_without_attitude_counts_as_level_and_its_heading_must_be_known(
         message: GimbalDeviceAttitudeStatus, direction: Vector | None) -> None:
-    mounts = MountDirections()
+    mounts = MountOrientations()
     mounts.take(GIMBAL, message, 0.0)
 
     assert pointed(mounts) == (None if direction is None else approx(direction, abs=1e-9))
 
 
 def test_direction_ends_with_the_attitude_and_belongs_to_one_gimbal() -> None:
-    mounts = MountDirections()
+    mounts = MountOrientations()
     mounts.take(GIMBAL, status((0.0, 0.0, 0.0)), 0.0)
     mounts.take(AUTOPILOT, status((0.0, -1.0, 0.0), number=2), 1.0)
     # Of another component than the autopilot.
@@ -108,7 +108,7 @@ def test_direction_ends_with_the_attitude_and_belongs_to_one_gimbal() -> None:
 
 
 def test_forged_gimbals_take_no_memory_without_end() -> None:
-    mounts = MountDirections()
+    mounts = MountOrientations()
     taken = [mounts.take(Address(system, 154), status((0.0, 0.0, 0.0)), 0.0)
              for system in range(1, 100)]
 

@@ -17,9 +17,9 @@
 from __future__ import annotations
 
 from ..mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message
-from ..payload.mount import MountAttitude, YawFrame
+from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.rotation import flip, Quaternion
-from ..payload.vehicle import Attitude, GimbalDeviceAttitudeStatus
 
 # s for which an attitude counts.
 ATTITUDE_LIFETIME = 2.0
@@ -27,7 +27,7 @@ ATTITUDE_LIFETIME = 2.0
 MAX_MOUNTS = 32
 
 
-class MountDirections:
+class MountOrientations:
     """The last attitudes of mounts and vehicles on a link; times are s."""
 
     messages: tuple[type[Message], ...] = (GimbalDeviceAttitudeStatus, Attitude)

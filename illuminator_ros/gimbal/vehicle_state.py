@@ -22,8 +22,8 @@ from typing import Generic, TypeVar
 from .manager_setpoint import GeoPoint
 from .messages import AutopilotStateForGimbalDevice
 from ..mavlink.messages import Address
+from ..payload.messages import Attitude, GlobalPositionInt
 from ..payload.rotation import Quaternion, Vector
-from ..payload.vehicle import Attitude, GlobalPositionInt
 
 T = TypeVar('T')
 

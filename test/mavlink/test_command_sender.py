@@ -20,7 +20,7 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command import (
+from illuminator_ros.mavlink.command_sender import (
     Command,
     CommandResult,
     CommandSender,

@@ -20,10 +20,10 @@ import math
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from illuminator_ros.payload import mount
-from illuminator_ros.payload.mount import MountAttitude, MountFlags, YawFrame
+from illuminator_ros.payload import mount_attitude as mount
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import MountAttitude, MountFlags, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.vehicle import GimbalDeviceAttitudeStatus
 import pytest
 from pytest import approx
 

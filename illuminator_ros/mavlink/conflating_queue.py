@@ -25,7 +25,7 @@ from .messages import Address, Message
 StreamGroup = Sequence[type[Message]]
 
 
-class StreamQueue:
+class ConflatingQueue:
     """
     Holds messages of streams until the line has room, and drops those that newer ones replace.
 

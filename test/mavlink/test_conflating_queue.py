@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.conflating_queue import ConflatingQueue
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import Address, decode_payload, heartbeat, Message
-from illuminator_ros.mavlink.stream_queue import StreamQueue
-from illuminator_ros.payload.vehicle import Attitude, GlobalPositionInt, SystemTime
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from support.simulated_link import SimulatedLink
 
 SOURCE = Address(1, 191)
@@ -42,7 +42,7 @@ def pair(number: int) -> tuple[Message, Message]:
 
 
 def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first() -> None:
-    queue = StreamQueue(GROUPS)
+    queue = ConflatingQueue(GROUPS)
     for message in (*pair(1), *pair(2), position(3)):
         assert queue.hold(SOURCE, message)
 

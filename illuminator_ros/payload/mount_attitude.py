@@ -27,8 +27,8 @@ from dataclasses import dataclass
 from enum import Enum, IntFlag
 import math
 
+from .messages import GimbalDeviceAttitudeStatus
 from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
-from .vehicle import GimbalDeviceAttitudeStatus
 
 # w, x, y, z of a message.
 Components = tuple[float, float, float, float]

@@ -23,15 +23,15 @@ from typing import Any
 from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
-from illuminator_ros.gimbal.manager_client import ManagerWithClient
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
 from illuminator_ros.gimbal.manager_setpoint import Range
+from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
-from illuminator_ros.mavlink.command import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload.arbitration import Policy
-from illuminator_ros.payload.mount import YawFrame
+from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion
 import pytest

@@ -30,8 +30,8 @@ from typing import Any, TypeVar
 from .client import GimbalClient
 from .gimbal import GimbalSettings
 from .manager import GimbalManager, ManagerSettings
-from ..mavlink.command import CommandSender, CommandStatus
 from ..mavlink.command_receiver import AnyCommand, CommandReceiver
+from ..mavlink.command_sender import CommandSender, CommandStatus
 from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
 from ..mavlink.messages import (
     Address,
@@ -43,7 +43,7 @@ from ..mavlink.messages import (
     MavType,
     Message,
 )
-from ..payload.vehicle import GimbalDeviceAttitudeStatus
+from ..payload.messages import GimbalDeviceAttitudeStatus
 
 T = TypeVar('T')
 

@@ -27,7 +27,7 @@ from ...payload.simulated import Description, SimulatedDevice
 _log = logging.getLogger(__name__)
 
 
-class RecordFile:
+class CsvFile:
     """
     A file with records; an existing one is overwritten.
 
@@ -67,7 +67,7 @@ def write_records(
     """
     for one in types:
         if one.records and (path := getattr(options, one.records.option)):
-            file = RecordFile(path, one.records.columns)
+            file = CsvFile(path, one.records.columns)
             for description in described:
                 if isinstance(description.device, one.device):
                     description.device.records.subscribe(file.append)
