@@ -36,7 +36,6 @@ from rclpy.qos import DurabilityPolicy  # noqa: E402
 from sensor_msgs.msg import NavSatFix  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
-from support.fixtures import domain, own_ros, private_home, ros  # noqa: E402, F401
 from support.gimbals import ALL, FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program, python, run  # noqa: E402
@@ -52,13 +51,13 @@ TURNED = Quaternion.from_euler(*ROS_ANGLES)
 TRIGGERS = ('take_control', 'release_control', 'neutral', 'retract', 'clear_roi')
 
 
-def start_gimbal(ros: Ros, port: int, **parameters: Any) -> Program:  # noqa: F811
+def start_gimbal(ros: Ros, port: int, **parameters: Any) -> Program:
     return python('illuminator_ros.gimbal', *bridge_arguments(port, **parameters),
                   env={'ROS_DOMAIN_ID': str(ros.domain)})
 
 
 @contextlib.contextmanager
-def bridge(ros: Ros, *managers: FakeManager, **parameters: Any) -> Iterator[Program]:  # noqa: F811
+def bridge(ros: Ros, *managers: FakeManager, **parameters: Any) -> Iterator[Program]:
     """Run a bridge that serves gimbals, and fake managers that are connected to it."""
     port = free_port()
     with (ended(start_gimbal(ros, port, **parameters)) as program,
@@ -68,7 +67,7 @@ def bridge(ros: Ros, *managers: FakeManager, **parameters: Any) -> Iterator[Prog
 
 
 @pytest.fixture(scope='module')
-def served(ros: Ros) -> Iterator[tuple[Program, FakeManager]]:  # noqa: F811
+def served(ros: Ros) -> Iterator[tuple[Program, FakeManager]]:
     manager = FakeManager(
         q=to_mavlink(TURNED, YawFrame.VEHICLE), rates=(0.1, 0.2, 0.3), delta_yaw=0.5)
     with bridge(ros, manager, setpoint_timeout=0.2, geoid_separation=47.5) as program:
@@ -91,17 +90,17 @@ def program(served: tuple[Program, FakeManager]) -> Program:
     return served[0]
 
 
-def take_control(ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+def take_control(ros: Ros, gimbal: FakeManager) -> None:
     gimbal.primary = OURS
     ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
 
 
-def trigger(ros: Ros, name: str, node: str = '/gimbal') -> Trigger.Response:  # noqa: F811
+def trigger(ros: Ros, name: str, node: str = '/gimbal') -> Trigger.Response:
     answer: Trigger.Response = ros.call(Trigger, f'{node}/{name}', Trigger.Request())
     return answer
 
 
-def publish(ros: Ros, name: str, message: Any) -> None:  # noqa: F811
+def publish(ros: Ros, name: str, message: Any) -> None:
     ros.publisher(type(message), f'/gimbal/{name}', '/gimbal').publish(message)
 
 
@@ -112,7 +111,7 @@ def values(vector: Any) -> tuple[float, float, float]:
 # Published
 
 def test_gm_2_attitude_is_flu_and_its_frame_tells_what_yaw_is_relative_to(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     attitude = ros.subscribe(QuaternionStamped, '/gimbal/attitude', STREAM)
     angles = ros.subscribe(Vector3Stamped, '/gimbal/angles', STREAM)
     rates = ros.subscribe(Vector3Stamped, '/gimbal/angular_velocity', STREAM)
@@ -138,7 +137,7 @@ def test_gm_2_attitude_is_flu_and_its_frame_tells_what_yaw_is_relative_to(
 
 
 def test_state_topics_give_late_subscribers_the_last_value(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     for name, type_ in (('connected', Bool), ('yaw_lock', Bool), ('in_control', Bool),
                         ('controller', String)):
         assert ros.subscribe(type_, f'/gimbal/{name}').wait()
@@ -147,7 +146,7 @@ def test_state_topics_give_late_subscribers_the_last_value(
 
 
 def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
-        ros: Ros, gimbal: FakeManager, program: Program) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:
     controller = ros.subscribe(String, '/gimbal/controller')
     gimbal.primary = OTHER
     controller.wait_value('primary 1/195, secondary none')
@@ -165,7 +164,7 @@ def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
 # Services
 
 def test_gm_16_control_is_taken_and_released_by_services(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     for name, primary in (('take_control', OURS), ('release_control', NOBODY)):
         answer = trigger(ros, name)
         assert answer.success, answer.message
@@ -180,7 +179,7 @@ def test_gm_16_control_is_taken_and_released_by_services(
 @pytest.mark.parametrize(('name', 'flag'), [
     ('neutral', MountFlags.NEUTRAL), ('retract', MountFlags.RETRACT)])
 def test_positions_are_taken_by_services(
-        name: str, flag: MountFlags, ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        name: str, flag: MountFlags, ros: Ros, gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
 
     assert trigger(ros, name).success
@@ -188,7 +187,7 @@ def test_positions_are_taken_by_services(
 
 
 def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_service(
-        ros: Ros, gimbal: FakeManager, program: Program) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:
     take_control(ros, gimbal)
 
     publish(ros, 'cmd/roi', NavSatFix(latitude=47.39, longitude=8.54, altitude=535.5))
@@ -203,7 +202,7 @@ def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_serv
 
 
 def test_gm_3_yaw_lock_is_set_by_a_service_unless_the_gimbal_lacks_it(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
     lock = ros.subscribe(Bool, '/gimbal/yaw_lock')
     for on in (True, False):
@@ -213,7 +212,7 @@ def test_gm_3_yaw_lock_is_set_by_a_service_unless_the_gimbal_lacks_it(
 
 
 def test_gm_14_services_without_control_say_who_has_it(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     gimbal.primary = OTHER
     ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
     for name in ('neutral', 'retract', 'clear_roi'):
@@ -228,7 +227,7 @@ def test_gm_14_services_without_control_say_who_has_it(
     (EARTH, YawFrame.EARTH), (VEHICLE, YawFrame.VEHICLE)])
 @pytest.mark.parametrize('as_angles', [True, False])
 def test_gm_4_attitude_and_angles_are_the_same_setpoint(
-        header: Header, frame: YawFrame, as_angles: bool, ros: Ros,  # noqa: F811
+        header: Header, frame: YawFrame, as_angles: bool, ros: Ros,
         gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
     if as_angles:
@@ -246,7 +245,7 @@ def test_gm_4_attitude_and_angles_are_the_same_setpoint(
 
 
 def test_angle_that_is_nan_is_left_as_it_is(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
     publish(ros, 'cmd/angles', Vector3Stamped(header=VEHICLE, vector=Vector3(x=NAN, y=0.1, z=NAN)))
 
@@ -257,7 +256,7 @@ def test_angle_that_is_nan_is_left_as_it_is(
 
 
 def test_rate_is_sent_and_zero_follows_once_after_the_time_out(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
     publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(y=0.2, z=-0.1)))
 
@@ -280,7 +279,7 @@ def test_rate_is_sent_and_zero_follows_once_after_the_time_out(
     ('cmd/rate', Vector3Stamped(vector=Vector3(z=NAN)),
      '(0.0, 0.0, nan) is not finite')])
 def test_wrong_setpoint_is_refused_with_the_reason(
-        topic: str, message: Any, text: str, ros: Ros, gimbal: FakeManager,  # noqa: F811
+        topic: str, message: Any, text: str, ros: Ros, gimbal: FakeManager,
         program: Program) -> None:
     take_control(ros, gimbal)
     publish(ros, topic, message)
@@ -290,7 +289,7 @@ def test_wrong_setpoint_is_refused_with_the_reason(
 
 
 def test_gm_14_setpoint_without_control_is_not_sent_and_the_log_names_the_controller(
-        ros: Ros, gimbal: FakeManager, program: Program) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:
     gimbal.primary = OTHER
     ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
     publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=0.1)))
@@ -301,7 +300,7 @@ def test_gm_14_setpoint_without_control_is_not_sent_and_the_log_names_the_contro
 
 # Diagnostics
 
-def report(ros: Ros, wanted: str) -> DiagnosticStatus:  # noqa: F811
+def report(ros: Ros, wanted: str) -> DiagnosticStatus:
     """Return the first status of the device whose message has a text."""
     def statuses(array: DiagnosticArray) -> list[DiagnosticStatus]:
         return [one for one in array.status
@@ -313,7 +312,7 @@ def report(ros: Ros, wanted: str) -> DiagnosticStatus:  # noqa: F811
 
 
 def test_diagnostics_name_flags_limits_identity_and_control(
-        ros: Ros, gimbal: FakeManager) -> None:  # noqa: F811
+        ros: Ros, gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
     status = report(ros, 'in control')
     shown = {one.key: one.value for one in status.values}
@@ -337,7 +336,7 @@ def test_diagnostics_name_flags_limits_identity_and_control(
 # Several gimbals, parameters, start and end
 
 def test_gm_26_each_further_gimbal_has_a_node_and_a_second_manager_is_reported(
-        own_ros: Ros) -> None:  # noqa: F811
+        own_ros: Ros) -> None:
     managers = [FakeManager(), FakeManager(device_id=2, primary=OTHER), FakeManager(OTHER, 2),
                 FakeManager(OTHER, device_alive=False)]
     with bridge(own_ros, *managers, gimbal_device_id=154) as program:
@@ -352,7 +351,7 @@ def test_gm_26_each_further_gimbal_has_a_node_and_a_second_manager_is_reported(
 
 
 def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
-        own_ros: Ros) -> None:  # noqa: F811
+        own_ros: Ros) -> None:
     manager = FakeManager(autopilot=3)
     with bridge(own_ros, manager, auto_take_control='true') as program:
         own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
@@ -363,7 +362,7 @@ def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
 
 
 def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
-        own_ros: Ros) -> None:  # noqa: F811
+        own_ros: Ros) -> None:
     lacking = ALL & ~Capabilities.HAS_YAW_LOCK & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
     manager = FakeManager(primary=OURS, capabilities=lacking)
     with bridge(own_ros, manager, attitude_interval=0.05, earth_frame='odom') as program:
@@ -377,7 +376,7 @@ def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
                             and (one.param1, one.param2) == (285, 50_000)])
 
 
-def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:  # noqa: F811
+def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:
     with bridge(own_ros, FakeManager(), payloads='[gimbal, illuminator]'):
         own_ros.subscribe(Bool, '/gimbal/connected').wait_value(True)
         assert own_ros.subscribe(Bool, '/illuminator/connected').wait().data is False
@@ -385,7 +384,7 @@ def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:
 
 
 def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
-        own_ros: Ros) -> None:  # noqa: F811
+        own_ros: Ros) -> None:
     port = free_port()
     # By the slow clock of tests.
     with running_bridge(own_ros.domain, port, payloads='[gimbal]') as program:
@@ -398,7 +397,7 @@ def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
             'no gimbal connected: no component announces a gimbal')
 
 
-def test_lost_gimbal_is_reported(own_ros: Ros) -> None:  # noqa: F811
+def test_lost_gimbal_is_reported(own_ros: Ros) -> None:
     manager = FakeManager()
     with bridge(own_ros, manager) as program:
         connected = own_ros.subscribe(Bool, '/gimbal/connected')
@@ -409,7 +408,7 @@ def test_lost_gimbal_is_reported(own_ros: Ros) -> None:  # noqa: F811
         assert report(own_ros, 'nothing from').level == DiagnosticStatus.ERROR
 
 
-def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:  # noqa: F811
+def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:
     with ended(start_gimbal(own_ros, free_port())) as program:
         program.wait_for('link open')
         for name in TRIGGERS:

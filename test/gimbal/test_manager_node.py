@@ -45,7 +45,6 @@ from nav_msgs.msg import Odometry  # noqa: E402
 from sensor_msgs.msg import Imu  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
-from support.fixtures import own_ros, private_home  # noqa: E402, F401
 from support.gimbal_manager import DEVICE, OURS  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program  # noqa: E402
@@ -106,7 +105,7 @@ def report(ros: Ros, text: str) -> DiagnosticStatus:
 
 @pytest.mark.timeout(180)
 def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
-        own_ros: Ros) -> None:  # noqa: F811
+        own_ros: Ros) -> None:
     port = free_port()
     with manager(own_ros, port) as program, device(port) as gimbal:
         own_ros.subscribe(Bool, f'{NODE}/connected').wait_value(True)
@@ -143,7 +142,7 @@ def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
 
 
 @pytest.mark.timeout(180)
-def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:  # noqa: F811
+def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:
     port = free_port()
     # The link is open once a peer is heard.
     with manager(own_ros, port, gimbal_device_id=1, pitch_max=0.5, auto_take_control='true'), \
@@ -192,7 +191,7 @@ class Other(Endpoint):
 
 
 @pytest.mark.timeout(180)
-def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:  # noqa: F811
+def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:
     port = free_port()
     with manager(own_ros, port) as program, device(port), served(port, Other()):
         program.wait_for('[ERROR]')
