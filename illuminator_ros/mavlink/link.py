@@ -446,7 +446,7 @@ class Link:
     def _write(self, frames: list[bytes], source: Address, message: Message, now: float) -> None:
         try:
             frames.append(self._writer.frame(source, message, now, self._wall_clock()))
-        except (ValueError, struct.error):
+        except (ValueError, OverflowError, struct.error):
             self._log_fault()
         else:
             if _frame_log.isEnabledFor(logging.DEBUG):

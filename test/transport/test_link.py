@@ -26,9 +26,10 @@ from typing import Any
 
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink import link as link_module
+from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.link import Link, LinkThreadError
 from illuminator_ros.mavlink.link_state import LinkEvent
-from illuminator_ros.mavlink.messages import heartbeat
+from illuminator_ros.mavlink.messages import CommandLong, decode_payload, heartbeat
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.signing_files import TimestampStore
 from illuminator_ros.mavlink.transport import open_channel, tcp
@@ -135,6 +136,18 @@ def test_fault_of_the_endpoint_is_logged_and_costs_no_other_frame(
     assert endpoint.wait_heard() == LIGHT
     endpoint.failures.wait_for(lambda one: True)
     assert faults() == [method]
+
+
+def test_message_with_a_value_that_does_not_fit_costs_no_other_message(
+        run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
+    link = run(LiveLink(URL))
+    other.receive()
+    link.send(*(CommandLong(1, 243, 405, confirmation, value, 0, 0, 0, 0, 0, 0)
+                for confirmation, value in ((0, 1.0), (256, 1.0), (0, 1e39), (2, 1.0))))
+    frames = b''.join(data for _, data in other.receive())
+    sent = [decode_payload(CommandLong, frame.payload) for frame in Decoder().feed(frames)]
+    assert [one.confirmation for one in sent] == [0, 2]
+    assert 'internal error in the link' in caplog.text
 
 
 @pytest.mark.parametrize('failing', ['link_closed', 'opening', 'loss'])
