@@ -42,21 +42,21 @@ setup(
           for folder in ('config', 'config/sros2', 'launch')),
     ],
     python_requires='>=3.10',
-    # The oldest versions that the tests have passed with. pymavlink brings fastcrc.
-    install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
+    # The oldest versions that the tests have passed with.
+    install_requires=['setuptools', 'fastcrc>=0.3'],
     extras_require={
         'monitor': ['rich>=13.3'],
         'serial': ['pyserial>=3.5'],
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
-        # scipy is the oracle for rotations, mavsdk another player at a gimbal.
-        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich', 'scipy',
-                 'mavsdk>=4.1'],
+        # Oracles: pymavlink for frames, scipy for rotations; mavsdk is another player at a gimbal.
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pymavlink>=2.4.50', 'pyserial',
+                 'pyyaml', 'rich', 'scipy', 'mavsdk>=4.1'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',
-    description='A MAVLink illuminator (searchlight, torch, strobe) as an ordinary ROS 2 device',
+    description='MAVLink lights, gimbals and MicaSense cameras as ordinary ROS 2 devices',
     license='Apache-2.0',
     entry_points={
         'console_scripts': [

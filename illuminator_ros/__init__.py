@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A MAVLink illuminator (searchlight, torch, strobe) as an ordinary ROS 2 device."""
+"""MAVLink payloads (lights, gimbals, MicaSense cameras) as ordinary ROS 2 devices."""
 
 from typing import TYPE_CHECKING
 
