@@ -54,7 +54,8 @@ class Endpoint(ABC):
     :ivar sends: the classes of messages that it sends; those that it also receives, and those of
         the command protocol, may be left out.
     :ivar streams: groups of classes of messages that newer ones replace, the most urgent first. A
-        group is sent as one when the line has room; all other messages are sent at once.
+        group is sent as one when the line has room, and dropped where it has none for
+        :data:`~.conflating_queue.MAX_AGE`; all other messages are sent at once.
     :ivar outgoing: messages to send, each with the address that sends it.
     """
 

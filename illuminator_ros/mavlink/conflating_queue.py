@@ -23,6 +23,8 @@ from .messages import Address, Message
 
 # Classes of messages that are sent together, and replaced together.
 StreamGroup = Sequence[type[Message]]
+# s for which a group is worth sending: a line may be blocked for long.
+MAX_AGE = 0.5
 
 
 class ConflatingQueue:
@@ -32,13 +34,15 @@ class ConflatingQueue:
     A slow line would otherwise carry them late, and other messages behind them.
 
     :param groups: the most urgent first.
-    :ivar replaced: messages that were dropped for newer ones.
+    :ivar dropped: messages that were dropped for newer ones, or for their age.
     """
 
     def __init__(self, groups: Sequence[StreamGroup]) -> None:
-        self.replaced = 0
+        self.dropped = 0
         self._places = {cls: place for place, group in enumerate(groups) for cls in group}
         self._held: list[list[tuple[Address, Message]]] = [[] for _ in groups]
+        # When the first message of each group was taken, s.
+        self._since = [0.0 for _ in groups]
 
     def __bool__(self) -> bool:
         return any(self._held)
@@ -48,23 +52,28 @@ class ConflatingQueue:
         """Return whether a message of the most urgent group is held."""
         return bool(self._held and self._held[0])
 
-    def hold(self, source: Address, message: Message) -> bool:
+    def hold(self, source: Address, message: Message, now: float) -> bool:
         """Take a message, if it belongs to a stream; return whether it does."""
         place = self._places.get(type(message))
         if place is None:
             return False
         held = self._held[place]
         if any(type(other) is type(message) for _, other in held):
-            self.replaced += len(held)
+            self.dropped += len(held)
             held.clear()
+        if not held:
+            self._since[place] = now
         held.append((source, message))
         return True
 
-    def take(self) -> list[tuple[Address, Message]]:
-        """Return the messages of the most urgent group that has some."""
+    def take(self, now: float) -> list[tuple[Address, Message]]:
+        """Return the messages of the most urgent group that has some; none if they are old."""
         place = next(place for place, held in enumerate(self._held) if held)
         held, self._held[place] = self._held[place], []
-        return held
+        if now < self._since[place] + MAX_AGE:
+            return held
+        self.dropped += len(held)
+        return []
 
     def clear(self) -> None:
         """Drop all: the link is closed."""

@@ -402,16 +402,17 @@ class Link:
 
     def _flush(self) -> None:
         """Send the messages of the endpoint; without a channel they are dropped."""
-        outgoing, replaced = self.endpoint.outgoing, self._streams.replaced
+        outgoing, dropped = self.endpoint.outgoing, self._streams.dropped
         if outgoing:
-            urgent = deque(one for one in outgoing if not self._streams.hold(*one))
+            now = self.clock()
+            urgent = deque(one for one in outgoing if not self._streams.hold(*one, now))
             outgoing.clear()
-            self._traffic.frames_dropped += self._streams.replaced - replaced
             if any(getattr(message, 'target_system', 0) for _, message in urgent):
-                self._hurry_until = self.clock() + HURRY
+                self._hurry_until = now + HURRY
             self._send_messages(urgent)
         while self._streams and self._stream_due() <= self.clock():
-            self._send_messages(deque(self._streams.take()))
+            self._send_messages(deque(self._streams.take(self.clock())))
+        self._traffic.frames_dropped += self._streams.dropped - dropped
         if self._channel is None:
             outgoing.clear()
             self._streams.clear()

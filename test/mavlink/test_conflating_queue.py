@@ -44,11 +44,11 @@ def pair(number: int) -> tuple[Message, Message]:
 def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first() -> None:
     queue = ConflatingQueue(GROUPS)
     for message in (*pair(1), *pair(2), position(3)):
-        assert queue.hold(SOURCE, message)
+        assert queue.hold(SOURCE, message, 0.0)
 
-    assert not queue.hold(SOURCE, heartbeat(18))
-    assert queue.replaced == 2
-    assert [[message for _, message in queue.take()] for _ in range(2)] == [
+    assert not queue.hold(SOURCE, heartbeat(18), 0.0)
+    assert queue.dropped == 2
+    assert [[message for _, message in queue.take(0.0)] for _ in range(2)] == [
         [position(3)], [*pair(2)]]
     assert not queue
 
@@ -92,10 +92,13 @@ class Sender(Endpoint):
         return min(stream.due(self.start) for stream in self.due)
 
 
-def run(rate: float, seconds: float) -> tuple[SimulatedLink, list[tuple[float, Message]], int]:
+def run(
+    rate: float, seconds: float, *streams: Stream,
+) -> tuple[SimulatedLink, list[tuple[float, Message]], int]:
     """Return what a link of a rate sends, when, and how many bytes."""
     sent: list[tuple[float, bytes]] = []
     sender = Sender(1000.0)
+    sender.due = list(streams) or sender.due
     link = SimulatedLink(sender, lambda data, peer: sent.append((link.now, data)))
     link.udp.rate = rate
     link.udp.heard(('127.0.0.1', 14550), link.now)
@@ -124,6 +127,15 @@ def test_on_a_slow_line_nothing_waits_and_whole_pairs_of_the_newest_are_sent() -
     dropped = link.snapshot(link.now).traffic.frames_dropped
     # The newest may still wait.
     assert 2 * 1990 - 2 <= dropped + len(others) <= 2 * 1991
+
+
+def test_messages_that_a_blocked_line_has_held_for_long_are_dropped_and_counted() -> None:
+    # The first position occupies the line for 2 s.
+    link, sent, _ = run(
+        5.0, 10.0, Stream(lambda number: [position(number)] if number < 2 else [], 0.2))
+
+    assert [message for _, message in sent] == [position(0)]
+    assert link.snapshot(link.now).traffic.frames_dropped == 1
 
 
 def test_on_a_fast_link_each_message_is_sent() -> None:
