@@ -405,9 +405,10 @@ class GimbalManager(Payload):
         for change in changes:
             if change.role is Role.SECONDARY:
                 self._offsets = STILL
-            elif self._setpoint is not None:
+            else:
                 # The gimbal stays where it points until the next player says more.
-                self._setpoint = stopped(self._setpoint, now)
+                self._place = None
+                self._setpoint = self._setpoint and stopped(self._setpoint, now)
                 self._send(now)
             self.events.emit(change)
         if changes and self._status_due < math.inf and now >= self._told_at + TOLD_INTERVAL:

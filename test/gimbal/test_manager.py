@@ -461,6 +461,19 @@ def test_gm_8_a_new_setpoint_or_clearing_ends_the_region_of_interest() -> None:
         assert euler(last(rig)) == before
 
 
+@pytest.mark.parametrize('after', [None, GUEST])
+def test_gm_8_a_region_of_interest_ends_with_the_control_of_its_player(
+        after: Address | None) -> None:
+    rig = following()
+    before = euler(last(rig))
+
+    assert rig.result(PILOT, configure(*(after or (0, 0)))) is MavResult.ACCEPTED
+    rig.give(AUTOPILOT, position(46.0, 8.0, 1500.0))
+    rig.run(1.0)
+
+    assert euler(last(rig)) == before
+
+
 def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
     rig = following()
     before = euler(last(rig))
