@@ -635,10 +635,11 @@ class GimbalManager(Payload):
         active = change.after is ManagerState.ACTIVE
         self._status_due = now if active else math.inf
         self._send_due = now if active else math.inf
-        if change.after is ManagerState.INACTIVE:
+        if change.after in (ManagerState.INACTIVE, ManagerState.NO_DEVICE):
+            # Another manager has moved the device, or the next device may be another one.
             self._setpoint = self._place = None
             self._offsets = STILL
-        elif change.after is ManagerState.LISTENING:
+        if change.after is ManagerState.LISTENING:
             # A manager that sends no status answers a request.
             self._commands.send(Command(
                 Address(0, 0), mav.MavCmd.REQUEST_MESSAGE,
@@ -646,7 +647,6 @@ class GimbalManager(Payload):
             if self.has_mavlink and self._information is None:
                 self._information_due = now
         elif change.after is ManagerState.NO_DEVICE and self.has_mavlink:
-            # The next device may be another one.
             self._information, self._information_due = None, math.inf
             self.model = GimbalModel()
         self.events.emit(change)

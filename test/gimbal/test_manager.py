@@ -626,13 +626,17 @@ def test_commands_are_rejected_for_now_until_the_manager_is_active() -> None:
 
 
 def test_the_manager_follows_a_device_that_is_exchanged() -> None:
-    rig = ManagerRig()
+    rig = in_control()
+    rig.points(PILOT)
     rig.device_is_there = False
-    rig.run(3.5)
+    rig.run(3.5, each=rig.heartbeats(PILOT))
     assert rig.manager.state is ManagerState.NO_DEVICE
 
     rig.device_information = information(pitch_max=0.25)
     rig.device_is_there = True
-    rig.run(5.0)
+    begun = rig.now
+    rig.run(5.0, each=rig.heartbeats(PILOT))
 
     assert rig.manager.model.ranges[1].high == 0.25
+    assert rig.messages(GimbalDeviceSetAttitude, begun) == []
+    assert len(rig.points(PILOT)) == 1
