@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 import math
+import random
 from typing import TypeAlias
 
 from .manager_control import Control, ControlChanged, ControlSettings, Role
@@ -185,6 +186,7 @@ class GimbalManager(Payload):
     The manager of one gimbal.
 
     :param commands: sends everything, from the manager's address.
+    :param draw: returns a random number, 0..1.
     :ivar events: see above.
     :ivar control: who has which kind of control.
     :ivar vehicle: takes the vehicle's state from ROS.
@@ -199,14 +201,18 @@ class GimbalManager(Payload):
     sends = (GimbalManagerInformation, GimbalManagerStatus, GimbalDeviceInformation,
              GimbalDeviceSetAttitude, GimbalDeviceAttitudeStatus, AutopilotStateForGimbalDevice)
 
-    def __init__(self, commands: CommandSender, settings: ManagerSettings) -> None:
+    def __init__(
+        self, commands: CommandSender, settings: ManagerSettings,
+        draw: Callable[[], float] = random.random,
+    ) -> None:
         self.events: Listeners[ManagerEvent] = Listeners()
         self.settings = settings
         self.address = commands.address
         self.control = Control(settings.control)
         self.vehicle = VehicleState()
         self._commands = commands
-        self._presence = Presence(commands.address, settings.device_id, self._state_changed)
+        self._presence = Presence(
+            commands.address, settings.device_id, self._state_changed, draw)
         self.model = (GimbalModel() if self._presence.has_mavlink
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
@@ -308,6 +314,11 @@ class GimbalManager(Payload):
             elif isinstance(message, Attitude | GlobalPositionInt):
                 self.vehicle.take(message, now)
                 self.vehicle_changed(now)
+
+    def receive_conflicting(self, message: mav.Message, now: float) -> None:
+        """See :meth:`Payload.receive_conflicting`."""
+        if isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
+            self._presence.hear_manager(self.address, message.gimbal_device_id, now)
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """See :meth:`Payload.execute`."""

@@ -27,9 +27,9 @@ from ..mavlink.messages import Address
 # s without a message after which a device, or another manager, is lost.
 DEVICE_TIMEOUT = 3.0
 MANAGER_TIMEOUT = 3.0
-# s for which a manager listens for others: at least, and more for each of eight addresses, so that
-# of two that begin together one announces the device first.
-LISTENING_TIME, ADDRESS_TIME = 2.0, 0.25
+# s for which a manager listens for others: at least, and at random more, so that of two that begin
+# together one announces the device first. Their addresses may be equal.
+LISTENING_TIME, RANDOM_TIME = 2.0, 2.0
 
 
 class ManagerState(Enum):
@@ -92,13 +92,14 @@ class Presence:
     :param address: of the manager.
     :param device_id: of the device; 1..6 for one without MAVLink, 0 for the first that is heard.
     :param changed: takes each change of the state.
+    :param draw: returns a random number, 0..1.
     :ivar device: the address of the device, None while none is known.
     :ivar other: the other manager, None if none is heard.
     """
 
     def __init__(
         self, address: Address, device_id: int,
-        changed: Callable[[StateChanged, float], None],
+        changed: Callable[[StateChanged, float], None], draw: Callable[[], float],
     ) -> None:
         self.state = ManagerState.NO_DEVICE
         self.device: Address | None = None
@@ -106,6 +107,7 @@ class Presence:
         self._address = address
         self._wanted = device_id
         self._changed = changed
+        self._draw = draw
         self._device_heard = self._other_heard = -math.inf
         self._listening_until = math.inf
 
@@ -173,7 +175,6 @@ class Presence:
             return
         self._listening_until = math.inf
         if self.state is ManagerState.LISTENING:
-            self._listening_until = (
-                now + LISTENING_TIME + ADDRESS_TIME * (self._address.component % 8))
+            self._listening_until = now + LISTENING_TIME + RANDOM_TIME * self._draw()
         self._changed(
             StateChanged(before, self.state, self.device_id, self.device, self.other), now)

@@ -90,6 +90,10 @@ class ManagerWithClient(Payload):
                 self.client.receive(source, message, now)
         self._serve_client(now)
 
+    def receive_conflicting(self, message: Message, now: float) -> None:
+        """See :meth:`Payload.receive_conflicting`."""
+        self.manager.receive_conflicting(message, now)
+
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """See :meth:`Payload.execute`."""
         result = self._manage(self.manager.execute, source, command, now)

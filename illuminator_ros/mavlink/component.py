@@ -120,6 +120,10 @@ class Payload(Protocol):
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Receive a message from another address, of one of the classes of ``messages``."""
 
+    def receive_conflicting(self, message: Message, now: float) -> None:
+        """Receive a message, of one of these classes, of another sender with our address."""
+        return
+
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """
         Execute a command to this component, or to all components, and return its result.
@@ -218,6 +222,8 @@ class Component(Endpoint):
         if source == self.address:
             # The link has dropped our own frames that came back.
             self._conflict_at = now
+            for payload in self._receivers.get(type(message), ()):
+                payload.receive_conflicting(message, now)
             return
         if isinstance(message, CommandAck):
             self.commands.acknowledge(source, message, now)

@@ -167,22 +167,26 @@ def test_gm_18_managers_that_send_no_status_are_asked_before_ours_announces_anyt
     assert rig.messages(GimbalManagerStatus) == []
 
 
+@pytest.mark.parametrize('address', [Address(1, 195), Address(1, 194), Address(1, 186)])
 @pytest.mark.parametrize('apart', [0.0, 1.0])
-def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(apart: float) -> None:
-    first = ManagerRig(active=False)
+def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
+        apart: float, address: Address) -> None:
+    # At first the two listen until the same moment.
+    first = ManagerRig(active=False, draws=(0.5, 0.0))
     first.run(apart)
-    second = ManagerRig(active=False, address=Address(1, 195))
+    second = ManagerRig(active=False, address=address, draws=(0.5 - apart / 2, 0.5))
     second.now = first.now
     seen = [0, 0]
-    for _ in range(200):
+    for _ in range(400):
         for index, rig in enumerate((first, second)):
             rig.run(0.05)
             for _, message in rig.sent[seen[index]:]:
                 (second, first)[index].give(rig.component.address, message)
             seen[index] = len(rig.sent)
 
-    assert {first.manager.state, second.manager.state} == {
-        ManagerState.ACTIVE, ManagerState.INACTIVE}
+    assert first.manager.state is ManagerState.ACTIVE
+    assert second.manager.state is ManagerState.INACTIVE
+    assert second.manager.other == first.component.address
 
 
 def test_a_gimbal_of_another_system_is_not_managed() -> None:

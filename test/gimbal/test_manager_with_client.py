@@ -24,9 +24,10 @@ from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
+from illuminator_ros.gimbal.manager_presence import ManagerState
 from illuminator_ros.gimbal.manager_setpoint import Range
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
-from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
+from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import MavResult
@@ -37,6 +38,7 @@ from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (
     AUTOPILOT,
+    DEVICE,
     euler,
     GUEST,
     ManagerRig,
@@ -148,3 +150,12 @@ def test_the_client_ends_its_requests_when_the_link_is_lost() -> None:
 
     assert rig.gimbal.set_rates((0.0, 0.1, 0.0), rig.now) != ''
     assert len(rig.both._own) == 0
+
+
+def test_gm_18_another_manager_with_our_own_address_makes_ours_inactive() -> None:
+    rig = Rig()
+
+    rig.give(OURS, GimbalManagerStatus(0, 0, DEVICE.component, 0, 0, 0, 0))
+
+    assert rig.manager.state is ManagerState.INACTIVE
+    assert rig.manager.other == OURS

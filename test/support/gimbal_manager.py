@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+import itertools
 from typing import Any, TypeVar
 
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerEvent, ManagerSettings
@@ -80,6 +81,7 @@ class ManagerRig:
     """
     A manager, and what it sends.
 
+    :param draws: the random numbers that the manager draws, the last of them again and again.
     :ivar now: s.
     :ivar sent: everything that it has sent, with the time.
     :ivar device_information: what the device answers with; None for no device.
@@ -89,7 +91,7 @@ class ManagerRig:
     def __init__(
         self, control: ControlSettings | None = None, *, device_id: int = 0,
         device: GimbalDeviceInformation | None = None, address: Address = OURS,
-        active: bool = True, **settings: Any,
+        active: bool = True, draws: Sequence[float] = (0.25,), **settings: Any,
     ) -> None:
         self.now = 1000.0
         self.sent: list[tuple[float, Any]] = []
@@ -97,6 +99,7 @@ class ManagerRig:
         self.device_information = device or information()
         self.device_is_there = not 0 < device_id < 7
         self.heading = NAN
+        self.draw = itertools.chain(draws, itertools.repeat(draws[-1])).__next__
         self.manager, self.component = self.make(CommandSender(address), ManagerSettings(
             control or ControlSettings(), device_id=device_id, **settings))
         self.manager.events.subscribe(self.events.append)
@@ -110,7 +113,7 @@ class ManagerRig:
         self, commands: CommandSender, settings: ManagerSettings,
     ) -> tuple[GimbalManager, Component]:
         """Return a manager and its component."""
-        manager = GimbalManager(commands, settings)
+        manager = GimbalManager(commands, settings, self.draw)
         return manager, Component(commands, [manager])
 
     def run(self, seconds: float, *, each: Callable[[], None] = lambda: None) -> None:
