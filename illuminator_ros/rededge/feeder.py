@@ -209,9 +209,7 @@ class _History:
 
     def add(self, sample: _Sample) -> None:
         if self.samples:
-            _check_newer(sample.time, self.samples[-1].time, self.timeout)
-            if sample.time < self.samples[-1].time:
-                self.samples.clear()
+            _check_newer(sample.time, self.samples[-1].time)
         self.samples.append(sample)
 
     def at(self, time: int) -> _Sample | None:
@@ -295,7 +293,7 @@ class Feeder:
         utc = self._utc(stamp)
         _check_age(stamp, settings.position_timeout)
         if self._fix_time is not None:
-            _check_newer(stamp.time, self._fix_time, settings.position_timeout)
+            _check_newer(stamp.time, self._fix_time)
         velocity = self._velocity if self._is_fresh(Input.VELOCITY, now) else None
         if settings.position_source is PositionSource.RAW:
             satellites = self._satellites if self._is_fresh(Input.SATELLITES, now) else None
@@ -523,7 +521,7 @@ def _check_age(stamp: Stamp, timeout: float) -> None:
         raise ValueError(f'its stamp is {format_seconds(-stamp.age)} ahead of the ROS clock')
 
 
-def _check_newer(time: int, last: int, timeout: float) -> None:
-    """Refuse a repeated or overtaken message; after a longer step back the clock has jumped."""
-    if last - timeout * NANO <= time <= last:
+def _check_newer(time: int, last: int) -> None:
+    """Refuse a repeated or overtaken message."""
+    if time <= last:
         raise ValueError('its stamp is not newer than the last')

@@ -211,11 +211,25 @@ def test_an_old_reference_or_a_jump_of_ros_time_ends_the_position_until_a_new_re
     assert classes(rig.fix()) == [GpsRawInt]
 
 
-def test_after_a_step_back_of_the_clock_fixes_are_sent_again() -> None:
+def test_after_a_step_back_of_the_clock_fixes_and_attitudes_are_sent_again() -> None:
     rig = Rig()
     rig.fix()
+    rig.imu()
+    rig.run(0.1)
     rig.clock -= 3600.0
+    rig.feeder.clock_jumped()
     assert classes(rig.fix()) == [GpsRawInt]
+    assert classes(rig.imu()) == [Attitude, MountStatus]
+
+
+@pytest.mark.parametrize(('take', 'ahead', 'behind'), [(Rig.fix, -0.9, 0.5), (Rig.imu, -0.4, 0.3)])
+def test_a_message_that_another_has_overtaken_is_refused_however_old_it_is_re_29(
+        take: Callable[..., list[Message]], ahead: float, behind: float) -> None:
+    rig = Rig()
+    assert take(rig, age=ahead)
+    rig.run(0.1)
+    assert take(rig, age=behind) == []
+    assert take(rig, age=ahead + 0.1) == []
 
 
 def test_satellites_are_sent_for_the_web_page_if_that_is_asked_for_re_28() -> None:
