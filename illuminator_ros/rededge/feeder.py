@@ -255,6 +255,7 @@ class Feeder:
         self._inputs = {name: _Tracker(settings.timeout(name)) for name in Input}
         self._fix_time: int | None = None
         self._velocity: Vector | None = None
+        self._velocity_time: int | None = None
         self._satellites: int | None = None
         self._gps_status_due = -math.inf
         self._reference: _Reference | None = None
@@ -347,11 +348,14 @@ class Feeder:
         """Take the velocity of the vehicle, ENU, m/s."""
         def take() -> None:
             _check_age(stamp, self._settings.position_timeout)
+            if self._velocity_time is not None:
+                _check_newer(stamp.time, self._velocity_time)
             if not all(map(math.isfinite, velocity)):
                 raise ValueError('a component is not a finite number')
-            self._velocity = velocity
+            self._velocity, self._velocity_time = velocity, stamp.time
 
-        self._take(Input.VELOCITY, now, take)
+        # It is sent with later fixes, so its age counts from its stamp.
+        self._take(Input.VELOCITY, now, take, age=max(0.0, stamp.age))
 
     def take_satellites(self, count: int, now: float) -> None:
         """Take the number of satellites."""
@@ -373,7 +377,7 @@ class Feeder:
 
     def clock_jumped(self) -> None:
         """Forget what is bound to ROS time, which has jumped."""
-        self._reference = self._fix_time = None
+        self._reference = self._fix_time = self._velocity_time = None
         self._pair_time = 0
         for history in (*self._attitudes.values(), self._mounts):
             history.samples.clear()
@@ -462,7 +466,9 @@ class Feeder:
     def _is_fresh(self, name: Input, now: float) -> bool:
         return self._inputs[name].state(now) is InputState.OK
 
-    def _take(self, name: Input, now: float, take: Callable[[], None]) -> bool:
+    def _take(
+        self, name: Input, now: float, take: Callable[[], None], *, age: float = 0.0,
+    ) -> bool:
         """Take a message; return whether it was accepted."""
         tracker = self._inputs[name]
         try:
@@ -472,7 +478,7 @@ class Feeder:
             tracker.refused_at, tracker.refusal = now, str(error)
             accepted = False
         else:
-            tracker.accepted_at, accepted = now, True
+            tracker.accepted_at, accepted = now - age, True
         self._report(name, now)
         return accepted
 
