@@ -183,10 +183,10 @@ class Position:
 
 def standard_deviations(covariance: Sequence[float]) -> tuple[float, float]:
     """Return the larger horizontal and the vertical one of an ENU covariance (row-major), m."""
-    def root(variance: float) -> float:
-        return math.sqrt(variance) if variance >= 0 else math.nan
+    def root(*variances: float) -> float:
+        return math.sqrt(max(variances)) if all(one >= 0 for one in variances) else math.nan
 
-    return root(max(covariance[0], covariance[4])), root(covariance[8])
+    return root(covariance[0], covariance[4]), root(covariance[8])
 
 
 def fix_type(status: int) -> int:

@@ -201,7 +201,11 @@ def test_whatever_comes_either_fits_its_fields_or_is_refused(
 
 def test_standard_deviations_are_the_roots_of_the_variances() -> None:
     assert conversions.standard_deviations([4, 0, 0, 0, 9, 0, 0, 0, 16]) == (3, 4)
-    assert math.isnan(conversions.standard_deviations([-1, 0, 0, 0, -1, 0, 0, 0, 1])[0])
+    for east, north in ((-1, -1), (4, -9), (-9, 4), (4, math.nan), (math.nan, 4)):
+        horizontal, vertical = conversions.standard_deviations(
+            [east, 0, 0, 0, north, 0, 0, 0, 1])
+        assert math.isnan(horizontal)
+        assert vertical == 1
 
 
 def test_satellites_are_counted_and_no_single_one_is_invented_re_28() -> None:
