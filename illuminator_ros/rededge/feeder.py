@@ -43,6 +43,8 @@ TIME_REFERENCE_LIFETIME = 60.0
 # Attitudes, and mounts, of which one instant is chosen.
 MAX_SAMPLES = 256
 NANO = 1_000_000_000
+# The first ROS time, ns, whose seconds do not fit into the int32 of a stamp.
+END_OF_STAMPS = 2**31 * NANO
 UNKNOWN: Vector = (math.nan, math.nan, math.nan)
 
 
@@ -368,12 +370,12 @@ class Feeder:
         self._take(Input.SATELLITES, now, take)
 
     def ros_time(self, time: int) -> int | None:
-        """Return the ROS time of a UTC in ns; None if that is not known."""
-        if not FIRST_UTC <= time // 1000 <= LAST_UTC:
+        """Return the ROS time of a UTC in ns; None if it is not known, or no stamp has it."""
+        if (not FIRST_UTC <= time // 1000 <= LAST_UTC
+                or self._needs_reference and self._reference is None):
             return None
-        if self._reference is not None:
-            return time - self._reference.offset
-        return None if self._needs_reference else time
+        ros = time - (self._reference.offset if self._reference else 0)
+        return ros if 0 <= ros < END_OF_STAMPS else None
 
     def clock_jumped(self) -> None:
         """Forget what is bound to ROS time, which has jumped."""

@@ -204,6 +204,16 @@ def test_time_that_is_not_utc_is_not_sent_unless_a_reference_tells_it_re_14(
     assert rig.feeder.ros_time(round((EPOCH + 7.5) * 1e9)) == rig.stamp().time
 
 
+def test_time_of_an_image_that_no_stamp_can_have_is_not_known_re_14() -> None:
+    rig = Rig()
+    assert [rig.feeder.ros_time(seconds * 10**9) for seconds in (2**31 - 1, 2**31, 4 * 10**9)] == [
+        (2**31 - 1) * 10**9, None, None]
+    # ROS time began with the boot, after this image.
+    since_boot(rig)
+    rig.reference(EPOCH)
+    assert rig.feeder.ros_time((EPOCH - 1000) * 10**9) is None
+
+
 def test_a_reference_that_cannot_be_utc_is_refused_re_14() -> None:
     rig = Rig()
     rig.reference(1e9)
