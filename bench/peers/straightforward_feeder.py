@@ -14,7 +14,7 @@
 
 
 """
-What a user would write to feed the camera: rclpy subscribers that pack with pymavlink.
+A straightforward feeder of the camera: rclpy subscribers that pack with pymavlink.
 
 It checks nothing, and has neither a heartbeat nor a service. Its argument is the device.
 """

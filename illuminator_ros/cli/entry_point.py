@@ -43,7 +43,7 @@ def run_program(
 
     :param run: must import what it needs itself, so that a signal meanwhile ends the process.
     :param more: signals that end it too, see :class:`Termination`.
-    :param queued: descriptors that are written to through an :class:`~.output.OutputQueue`.
+    :param queued: descriptors that are written to through an :class:`~.output_queue.OutputQueue`.
     """
     escape_output()
     termination = Termination(more, queued)

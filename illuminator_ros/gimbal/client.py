@@ -39,7 +39,7 @@ from ..payload.messages import GimbalDeviceAttitudeStatus
 
 # Gimbals; one more is ignored, so that memory is bounded.
 MAX_GIMBALS = 32
-# Components that may be managers. One more takes the place of one that was silent for long.
+# Components that may be managers. A further component replaces a long silent one.
 MAX_COMPONENTS = 256
 # s of silence after which a component or a gimbal that was never commanded is forgotten.
 FORGET_AFTER = 60.0

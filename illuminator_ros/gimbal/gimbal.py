@@ -55,7 +55,13 @@ from ..mavlink.command_sender import (
 from ..mavlink.messages import Address, MAV_AUTOPILOT_ARDUPILOTMEGA, MavCmd
 from ..payload import request
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.mount_attitude import (
+    MountAttitude,
+    MountFlags,
+    to_mavlink,
+    UNSET_QUATERNION,
+    YawFrame,
+)
 from ..payload.rotation import flu_frd, Quaternion, Vector
 
 # s of silence after which a manager or a device is lost.
@@ -539,7 +545,7 @@ class Gimbal:
 
     def _send_rates(self, rates: Vector, now: float) -> None:
         frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
-        message = self._message(setpoint_flags(frame), UNSET, flu_frd(rates))
+        message = self._message(setpoint_flags(frame), UNSET_QUATERNION, flu_frd(rates))
         self._setpoint = _Setpoint(message, zero_at=math.inf if rates == _STILL else
                                    now + self._settings.setpoint_timeout)
         self._send(message)

@@ -27,7 +27,7 @@ import math
 import random
 from typing import TypeAlias
 
-from .manager_control import Control, ControlChanged, ControlSettings, Role
+from .manager_control import ControlArbiter, ControlChanged, ControlSettings, Role
 from .manager_presence import ManagerState, Presence, StateChanged
 from .manager_setpoint import (
     AnySetpoint,
@@ -71,7 +71,13 @@ from ..mavlink.component import Payload
 from ..mavlink.messages import Address, MavResult
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
-from ..payload.mount_attitude import MountAttitude, MountFlags, to_mavlink, UNSET, YawFrame
+from ..payload.mount_attitude import (
+    MountAttitude,
+    MountFlags,
+    to_mavlink,
+    UNSET_QUATERNION,
+    YawFrame,
+)
 from ..payload.rate_limit import RateLimit
 from ..payload.rotation import Quaternion
 
@@ -208,7 +214,7 @@ class GimbalManager(Payload):
         self.events: Listeners[ManagerEvent] = Listeners()
         self.settings = settings
         self.address = commands.address
-        self.control = Control(settings.control)
+        self.control = ControlArbiter(settings.control)
         self.vehicle = VehicleState()
         self._commands = commands
         self._presence = Presence(
@@ -681,7 +687,7 @@ class GimbalManager(Payload):
 
 def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttitude:
     attitude = setpoint.attitude
-    q = UNSET if attitude is None else (attitude.w, attitude.x, attitude.y, attitude.z)
+    q = UNSET_QUATERNION if attitude is None else (attitude.w, attitude.x, attitude.y, attitude.z)
     return GimbalDeviceSetAttitude(*device, int(setpoint.device_flags), q, *setpoint.rates)
 
 

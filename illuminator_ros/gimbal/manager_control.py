@@ -67,7 +67,7 @@ class ControlChanged:
     by: Address | None = None
 
 
-class Control:
+class ControlArbiter:
     """
     Decides who is in primary and in secondary control. No I/O; times are s.
 

@@ -34,11 +34,17 @@ from .messages import (
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
 )
-from ..payload.mount_attitude import Components, MountFlags, names_frame, yaw_frame, YawFrame
+from ..payload.mount_attitude import (
+    Components,
+    MountFlags,
+    names_frame,
+    UNSET_VECTOR,
+    yaw_frame,
+    YawFrame,
+)
 from ..payload.rotation import Quaternion, Vector
 
 AXES = ('roll', 'pitch', 'yaw')
-NONE: Vector = (math.nan,) * 3
 STILL: Vector = (0.0,) * 3
 # The attitude is set by the flag alone.
 POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
@@ -145,8 +151,8 @@ class Demand:
     """
 
     flags: MountFlags = MountFlags(0)
-    angles: Vector = NONE
-    rates: Vector = NONE
+    angles: Vector = UNSET_VECTOR
+    rates: Vector = UNSET_VECTOR
     attitude: Quaternion | None = None
 
     def __post_init__(self) -> None:
@@ -246,7 +252,7 @@ class Setpoint:
     flags: MountFlags
     frame: YawFrame
     attitude: Quaternion | None
-    rates: Vector = NONE
+    rates: Vector = UNSET_VECTOR
     turning: Vector = STILL
     since: float = 0.0
 
@@ -316,7 +322,7 @@ def stopped(setpoint: Setpoint, now: float) -> Setpoint:
         return setpoint
     attitude = setpoint.at(now)
     return replace(setpoint, attitude=attitude, turning=STILL, since=now,
-                   rates=STILL if attitude is None else NONE)
+                   rates=STILL if attitude is None else UNSET_VECTOR)
 
 
 def nudge(demand: Demand, limit: float) -> Vector:

@@ -30,6 +30,7 @@ import math
 from typing import Any, NamedTuple
 
 from . import messages as gimbal
+from .manager_setpoint import GeoPoint
 from .messages import Capabilities, GimbalCommand
 from .simulated_device import (
     COMMANDS,
@@ -40,7 +41,7 @@ from .simulated_device import (
     properties,
     SimulatedMount,
 )
-from .simulated_motion import Range, UNSET, wrapped
+from .simulated_motion import Range, wrapped
 from ..mavlink.messages import (
     Address,
     CommandInt,
@@ -51,7 +52,7 @@ from ..mavlink.messages import (
 )
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
-from ..payload.mount_attitude import MountFlags, yaw_frame, YawFrame
+from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 from ..payload.simulated import (
     AnyCommand,
@@ -62,7 +63,7 @@ from ..payload.simulated import (
     SimulatedType,
     Snapshot,
 )
-from ..payload.simulated_settings import integer, number, one_of, Setting, Values
+from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
 STATUS_INTERVAL = 0.2
@@ -71,7 +72,7 @@ NUDGE_LIMIT = math.radians(20.0)
 # rad/s of the full rate of manual control.
 MANUAL_RATE = math.radians(30.0)
 EARTH_RADIUS = 6_371_000.0
-NOBODY = Address(0, 0)
+NO_COMPONENT = Address(0, 0)
 MAV_TYPE_QUADROTOR = 2
 MAV_AUTOPILOT_PX4 = 12
 # MAV_FRAME_GLOBAL and its _INT, whose altitude is above mean sea level; those relative to home.
@@ -126,7 +127,7 @@ FAULTS = FaultTable({
 
 
 class Profile(NamedTuple):
-    """A gimbal manager seen in the field."""
+    """The behaviour of a gimbal manager that exists."""
 
     description: str
     behaviour: ManagerBehaviour = ManagerBehaviour()
@@ -162,14 +163,6 @@ PROFILES = {
 }
 
 
-class Position(NamedTuple):
-    """A place: degrees, and m above mean sea level."""
-
-    latitude: float
-    longitude: float
-    altitude: float
-
-
 @dataclass(frozen=True)
 class ManagerProperties:
     """
@@ -183,7 +176,7 @@ class ManagerProperties:
 
     gimbal: GimbalProperties = GimbalProperties(behaviour=ManagerBehaviour())
     device_id: int = 1
-    position: Position = Position(47.397742, 8.545594, 488.0)
+    position: GeoPoint = GeoPoint(47.397742, 8.545594, 488.0)
     heading: float = 0.0
 
 
@@ -221,10 +214,10 @@ class SimulatedManager(SimulatedDevice):
         self.restart(0.0)
 
     def restart(self, now: float) -> None:
-        """See :meth:`SimulatedDevice.restart`; nobody has control."""
-        self.primary = self.secondary = NOBODY
-        self._roi: Position | None = None
-        self._base = UNSET
+        """See :meth:`SimulatedDevice.restart`; no component has control."""
+        self.primary = self.secondary = NO_COMPONENT
+        self._roi: GeoPoint | None = None
+        self._base = UNSET_VECTOR
         self.mount = SimulatedMount(self.properties.gimbal, self.properties.device_id, now)
         self.mount.behave(self.behaviour, now)
         self.mount.motion.take_heading(
@@ -245,7 +238,7 @@ class SimulatedManager(SimulatedDevice):
         behaviour, mount, device_id = self.behaviour, self.mount, self.properties.device_id
         if message_id == gimbal.GimbalManagerStatus.id and behaviour.reports:
             flags = mount.flags(behaviour) if behaviour.shows_flags else CONSTANT_FLAGS
-            control = (NOBODY, NOBODY) if behaviour.frozen_control else (
+            control = (NO_COMPONENT, NO_COMPONENT) if behaviour.frozen_control else (
                 self.primary, self.secondary)
             return gimbal.GimbalManagerStatus(
                 mount.uptime_ms(now), int(flags), device_id, *control[0], *control[1])
@@ -277,7 +270,7 @@ class SimulatedManager(SimulatedDevice):
             self.mount.motion.take_heading(
                 message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:
-            self._position = Position(
+            self._position = GeoPoint(
                 message.lat / 1e7, message.lon / 1e7, message.alt / 1000.0)
             self._point_at_roi(now)
 
@@ -298,7 +291,7 @@ class SimulatedManager(SimulatedDevice):
             frame = self._frame(message.flags)
             if isinstance(message, gimbal.GimbalManagerSetAttitude):
                 angles = Quaternion(*message.q).normalized().euler() if all(
-                    map(math.isfinite, message.q)) else UNSET
+                    map(math.isfinite, message.q)) else UNSET_VECTOR
                 rates = (message.angular_velocity_x, message.angular_velocity_y,
                          message.angular_velocity_z)
             else:
@@ -324,7 +317,7 @@ class SimulatedManager(SimulatedDevice):
         _, pitch, yaw = setpoint.angles
         if math.isnan(pitch) and math.isnan(yaw):
             # Roll stays level where only rates are set.
-            return setpoint._replace(angles=UNSET)
+            return setpoint._replace(angles=UNSET_VECTOR)
         if (math.isnan(pitch) or math.isnan(yaw)) and self.behaviour.partial_angles is not None:
             return None
         return setpoint
@@ -343,7 +336,7 @@ class SimulatedManager(SimulatedDevice):
             angles = [own + nudge.clip(added) if math.isfinite(added) else math.nan
                       for own, added in zip(base, setpoint.angles, strict=True)]
             setpoint = setpoint._replace(
-                angles=(angles[0], angles[1], angles[2]), rates=UNSET)
+                angles=(angles[0], angles[1], angles[2]), rates=UNSET_VECTOR)
         else:
             self._base = setpoint.angles
         self._roi = None
@@ -371,7 +364,7 @@ class SimulatedManager(SimulatedDevice):
         change: Change = partial(self._clear_roi, now)
         if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
             place = self._place(command, last)
-            if not isinstance(place, Position):
+            if not isinstance(place, GeoPoint):
                 return CommandReply(place)
             change = partial(self._set_roi, place, now)
         allowed = not self.behaviour.enforces_roi or source == self.primary
@@ -408,7 +401,7 @@ class SimulatedManager(SimulatedDevice):
         primary = self._resolved(self.primary, values[:2], source)
         secondary = self._resolved(self.secondary, values[2:], source)
         return CommandReply(MavResult.ACCEPTED, partial(
-            self._give_control, primary, secondary if behaviour.has_secondary else NOBODY))
+            self._give_control, primary, secondary if behaviour.has_secondary else NO_COMPONENT))
 
     def _resolved(
         self, current: Address, values: tuple[float, ...], source: Address,
@@ -424,12 +417,12 @@ class SimulatedManager(SimulatedDevice):
 
     def _give_control(self, primary: Address, secondary: Address) -> None:
         if primary != self.primary:
-            self._base = UNSET
+            self._base = UNSET_VECTOR
         self.primary, self.secondary = primary, secondary
 
     # Region of interest
 
-    def _place(self, command: AnyCommand, last: tuple[float, ...]) -> Position | MavResult:
+    def _place(self, command: AnyCommand, last: tuple[float, ...]) -> GeoPoint | MavResult:
         latitude, longitude, altitude = last
         if isinstance(command, CommandInt):
             latitude, longitude = latitude / 1e7, longitude / 1e7
@@ -438,18 +431,18 @@ class SimulatedManager(SimulatedDevice):
             elif command.frame not in ABSOLUTE_FRAMES:
                 return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
         if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
-            return Position(latitude, longitude, altitude)
+            return GeoPoint(latitude, longitude, altitude)
         return MavResult.DENIED
 
-    def _set_roi(self, place: Position, now: float) -> None:
+    def _set_roi(self, place: GeoPoint, now: float) -> None:
         self._roi = place
         self._point_at_roi(now)
 
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.set(MountFlags.NEUTRAL | CONSTANT_FLAGS, YawFrame.VEHICLE, UNSET, UNSET,
-                       self.behaviour, now)
+        self.mount.set(MountFlags.NEUTRAL | CONSTANT_FLAGS, YawFrame.VEHICLE, UNSET_VECTOR,
+                       UNSET_VECTOR, self.behaviour, now)
 
     def _point_at_roi(self, now: float) -> None:
         if self._roi is None:
@@ -460,23 +453,15 @@ class SimulatedManager(SimulatedDevice):
                 * EARTH_RADIUS * math.cos(math.radians(own.latitude)))
         pitch = math.atan2(place.altitude - own.altitude, math.hypot(north, east))
         self.mount.set(CONSTANT_FLAGS | MountFlags.YAW_LOCK, YawFrame.EARTH,
-                       (0.0, pitch, math.atan2(east, north)), UNSET, self.behaviour, now)
+                       (0.0, pitch, math.atan2(east, north)), UNSET_VECTOR, self.behaviour, now)
 
     def snapshot(self, now: float) -> Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
         control = ', '.join(
             f'{name} {one}' for name, one in (
-                ('primary', self.primary), ('secondary', self.secondary)) if one != NOBODY)
+                ('primary', self.primary), ('secondary', self.secondary)) if one != NO_COMPONENT)
         return self.mount.describe(
             now, control or 'no control', 'region of interest' if self._roi else '')
-
-
-def _position(text_: str) -> Position:
-    parts = text_.split(',')
-    if len(parts) != 3:
-        raise ValueError(f'{text_!r} is not LAT,LON,ALT')
-    readers = (number(-90, 90), number(-180, 180), number(-1000, 100_000))
-    return Position(*(read(part) for read, part in zip(readers, parts, strict=True)))
 
 
 SETTINGS: dict[str, Setting] = {
@@ -486,7 +471,7 @@ SETTINGS: dict[str, Setting] = {
     'device_id': Setting('ID', 'gimbal_device_id, 1 to 6 (default: 1)', integer(1, 6)),
     'position': Setting('LAT,LON,ALT', 'of the vehicle until it sends GLOBAL_POSITION_INT, '
                         'degrees and m above mean sea level (default: '
-                        '47.397742,8.545594,488)', _position),
+                        '47.397742,8.545594,488)', lambda text: GeoPoint(*geo_point(text))),
     'heading': Setting('DEG', 'of the vehicle until it sends ATTITUDE (default: 0)',
                        number(-180, 360)),
 }

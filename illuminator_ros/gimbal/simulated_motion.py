@@ -22,14 +22,13 @@ import math
 from typing import NamedTuple
 
 from .messages import Capabilities, ErrorFlags
-from ..payload.mount_attitude import MountFlags, YawFrame
+from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # s without a heading from the vehicle after which its heading is unknown.
 HEADING_TIMEOUT = 2.0
 # Angles that are equal, rad.
 RESOLUTION = 1e-6
-UNSET: Vector = (math.nan,) * 3
 # The flags that a setpoint may set.
 SETTABLE = (MountFlags.RETRACT | MountFlags.NEUTRAL | MountFlags.ROLL_LOCK
             | MountFlags.PITCH_LOCK | MountFlags.YAW_LOCK)
@@ -226,7 +225,7 @@ class GimbalMotion:
             # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).
             mechanics = self.mechanics
             angles = mechanics.retracted if flags & MountFlags.RETRACT else mechanics.neutral
-            rates, self.frame = UNSET, YawFrame.VEHICLE
+            rates, self.frame = UNSET_VECTOR, YawFrame.VEHICLE
         references = self._references(now)
         for index, (axis, angle, rate) in enumerate(zip(self._axes, angles, rates, strict=True)):
             axis.rate, axis.speed = 0.0, self.mechanics.rate

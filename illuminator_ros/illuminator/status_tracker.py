@@ -204,7 +204,7 @@ class _Sender:
 
 class _Senders:
     """
-    Lights that are told apart by a value; one is proved when statuses return to it.
+    Lights that a value distinguishes; one is proved when statuses return to it.
 
     :param is_same: whether two values are those of one light.
     :ivar newest: the number of the light that has sent the newest status.

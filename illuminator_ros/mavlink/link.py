@@ -130,7 +130,7 @@ class Link:
         self._receiver = FrameReader(self._signing, self._classes)
         self._router = RoutingTable()
         self._traffic = Traffic()
-        # Messages that wait for the line, and when it will have sent all that was written, s.
+        # Messages that wait for the line, and when it will have sent everything written, s.
         self._streams = ConflatingQueue(endpoint.streams)
         self._line_free_at = -math.inf
         self._status = LinkStatus(label, clock())

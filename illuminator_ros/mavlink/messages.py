@@ -253,7 +253,7 @@ def command_name(command: int) -> str:
 
 
 def _shown(name: str, value: object) -> str:
-    """Return the value of a field for people; the name is that of a field of a command."""
+    """Return the value of a field for people, by the field's name."""
     if isinstance(value, bytes):
         return repr(value.partition(b'\0')[0].decode(errors='replace'))
     if isinstance(value, float):

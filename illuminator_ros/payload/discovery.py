@@ -166,7 +166,7 @@ class Discovery(Generic[D]):
             self._forgotten(device)
 
     def poll(self, now: float) -> None:
-        """Poll the devices that have something to do, and forget those that were silent."""
+        """Poll the devices that have something to do, and forget silent ones."""
         self._enter_deadlines()
         for address in self._deadlines.due(now):
             device = self.get(address)

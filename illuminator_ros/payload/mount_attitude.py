@@ -32,8 +32,9 @@ from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
 
 # w, x, y, z of a message.
 Components = tuple[float, float, float, float]
-# A quaternion or a vector that the receiver must ignore.
-UNSET: Components = (math.nan,) * 4
+# Fields of a setpoint that the receiver must ignore.
+UNSET_QUATERNION: Components = (math.nan,) * 4
+UNSET_VECTOR: Vector = (math.nan,) * 3
 
 
 class MountFlags(IntFlag):
@@ -65,10 +66,10 @@ class YawFrame(Enum):
 
 _FLAGS = {YawFrame.EARTH: MountFlags.YAW_IN_EARTH_FRAME,
           YawFrame.VEHICLE: MountFlags.YAW_IN_VEHICLE_FRAME}
-
-
-_EARTH, _VEHICLE, _LOCK = int(MountFlags.YAW_IN_EARTH_FRAME), int(
-    MountFlags.YAW_IN_VEHICLE_FRAME), int(MountFlags.YAW_LOCK)
+# An operation on an IntFlag takes ten times as long as on an int.
+_EARTH_BIT = int(MountFlags.YAW_IN_EARTH_FRAME)
+_VEHICLE_BIT = int(MountFlags.YAW_IN_VEHICLE_FRAME)
+_LOCK_BIT = int(MountFlags.YAW_LOCK)
 
 
 def names_frame(flags: int) -> bool:
@@ -84,12 +85,11 @@ def yaw_frame(flags: int) -> YawFrame:
 
     :raises ValueError: if the flags name both frames.
     """
-    # An operation on an IntFlag takes ten times as long as on an int.
     bits = int(flags)
-    earth, vehicle = bits & _EARTH, bits & _VEHICLE
+    earth, vehicle = bits & _EARTH_BIT, bits & _VEHICLE_BIT
     if earth and vehicle:
         raise ValueError('the flags name both yaw frames')
-    if not vehicle and (earth or bits & _LOCK):
+    if not vehicle and (earth or bits & _LOCK_BIT):
         return YawFrame.EARTH
     return YawFrame.VEHICLE
 

@@ -416,7 +416,7 @@ class Request(Generic[S]):
         answer = self._answer
         answered = answer.status is CommandStatus.ANSWERED
         if self._was_repeated and answer.result is None:
-            self._end(f'{self._sent.goal} not confirmed: the acknowledgement may be that of an '
+            self._end(f'{self._sent.goal} not confirmed: the acknowledgement may belong to an '
                       'earlier command', now)
         else:
             self._end(f'{"refused: " if answered else ""}{answer.describe()}', now,

@@ -123,15 +123,16 @@ def flu_frd(vector: Vector) -> Vector:
 
 
 def ned_frd(attitude: Quaternion) -> Quaternion:
-    """Return the attitude of an FRD body in NED from that of its FLU body in ENU."""
+    """Return the attitude of an FRD body in NED, given the attitude of its FLU body in ENU."""
     return _ENU_NED * attitude * _FLU_FRD
 
 
 def enu_flu(attitude: Quaternion) -> Quaternion:
-    """Return the attitude of an FLU body in ENU from that of its FRD body in NED."""
-    return _ENU_NED * attitude * _FLU_FRD
+    """Return the attitude of an FLU body in ENU, given the attitude of its FRD body in NED."""
+    # Both changes of axes are their own inverses.
+    return ned_frd(attitude)
 
 
 def flip(rotation: Quaternion) -> Quaternion:
-    """Return the rotation between two FRD bodies from that between their FLU bodies, and back."""
+    """Return the rotation between two FRD bodies, given that between their FLU bodies."""
     return Quaternion(rotation.w, rotation.x, -rotation.y, -rotation.z)

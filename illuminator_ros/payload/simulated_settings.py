@@ -65,6 +65,20 @@ def integer(low: int, high: int) -> Callable[[str], int]:
     return read
 
 
+def geo_point(text: str) -> tuple[float, float, float]:
+    """
+    Read ``LAT,LON,ALT``: degrees, and m above mean sea level.
+
+    :raises ValueError: if it is not that.
+    """
+    parts = text.split(',')
+    if len(parts) != 3:
+        raise ValueError(f'{text!r} is not LAT,LON,ALT')
+    latitude, longitude, altitude = parts
+    return (number(-90, 90)(latitude), number(-180, 180)(longitude),
+            number(-1000, 100_000)(altitude))
+
+
 def text(value: str) -> str:
     """Read a text of at most 200 bytes."""
     if len(value.encode()) > 200:

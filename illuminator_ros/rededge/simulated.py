@@ -47,7 +47,7 @@ from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import number, Setting, Values
+from ..payload.simulated_settings import geo_point, number, Setting, Values
 
 # Until the camera hears a host.
 DEFAULT_SYSTEM_ID = 255
@@ -519,14 +519,7 @@ def read_place(text: str) -> Place | None:
 
     :raises ValueError: if it is neither.
     """
-    if text == 'none':
-        return None
-    parts = text.split(',')
-    if len(parts) != 3:
-        raise ValueError(f'{text!r} is neither LAT,LON,ALT nor none')
-    latitude, longitude, altitude = parts
-    return Place(number(-90, 90)(latitude), number(-180, 180)(longitude),
-                 number(-1000, 100_000)(altitude))
+    return None if text == 'none' else Place(*geo_point(text))
 
 
 # Over a field near Zurich.

@@ -25,11 +25,10 @@ from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.gimbal.messages import GimbalCommand
-from illuminator_ros.gimbal.simulated_motion import UNSET
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
+from illuminator_ros.payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
 from illuminator_ros.payload.simulated import SimulatedType
 import pytest
 from support.gimbal_checks import GimbalRun
@@ -160,8 +159,8 @@ def _moves_when_unset(one: GimbalRun) -> None:
 
     def moved(flags: int, frame: YawFrame, angles: Any, rates: Any, *others: Any) -> None:
         unset = all(map(math.isnan, (*angles, *rates))) and not flags & 3
-        original(flags, frame, (0.0, 0.5, 0.0) if unset else angles, UNSET if unset else rates,
-                 *others)
+        original(flags, frame, (0.0, 0.5, 0.0) if unset else angles,
+                 UNSET_VECTOR if unset else rates, *others)
     mount.set = moved
 
 
@@ -276,7 +275,7 @@ def test_a_gimbal_that_cannot_be_turned_back_is_reported_with_its_former_pose() 
 def test_the_gimbal_keeps_its_yaw_lock(kind: str) -> None:
     one = run(kind, drift=0.0)
     motion, lock = one.device.mount.motion, MountFlags.YAW_LOCK | MountFlags.PITCH_LOCK
-    motion.set(lock, YawFrame.VEHICLE, (0.0, -0.2, 0.1), UNSET, one.link.now)
+    motion.set(lock, YawFrame.VEHICLE, (0.0, -0.2, 0.1), UNSET_VECTOR, one.link.now)
     one.finish()
     assert motion.flags == lock
     assert motion.angles[1:] == pytest.approx((-0.2, 0.1), abs=0.05)

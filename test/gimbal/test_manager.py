@@ -53,7 +53,7 @@ from illuminator_ros.mavlink.messages import (
 )
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags, UNSET
+from illuminator_ros.payload.mount_attitude import MountFlags, UNSET_QUATERNION
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (
@@ -241,7 +241,7 @@ def test_a_setpoint_to_another_manager_is_ignored() -> None:
 def test_gm_16_the_gimbal_stays_where_it_points_when_its_player_falls_silent() -> None:
     rig = in_control()
     rig.give(PILOT, pitch_yaw(pitch_rate=0.1, yaw_rate=0.0))
-    assert last(rig).q == pytest.approx(UNSET, nan_ok=True)
+    assert last(rig).q == pytest.approx(UNSET_QUATERNION, nan_ok=True)
 
     rig.run(3.5)
 
@@ -274,7 +274,7 @@ SETPOINTS: dict[str, tuple[Any, Any, Any, MountFlags]] = {
         GimbalManagerSetAttitude(*OURS, int(F.YAW_LOCK), 0, HALF, NAN, 0.2, 0.3),
         (0.1, 0.2, 0.3), (NAN, 0.2, 0.3), F.YAW_LOCK | F.YAW_IN_EARTH_FRAME),
     'rates of a quaternion message': (
-        GimbalManagerSetAttitude(*OURS, 0, 0, UNSET, 0.1, NAN, 0.3),
+        GimbalManagerSetAttitude(*OURS, 0, 0, UNSET_QUATERNION, 0.1, NAN, 0.3),
         None, (0.1, 0.0, 0.3), F.YAW_IN_VEHICLE_FRAME),
     'angles': (
         pitch_yaw(0.2, 0.3, flags=F.ROLL_LOCK | F.YAW_IN_EARTH_FRAME),
@@ -321,7 +321,7 @@ def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
 @pytest.mark.parametrize('message', [
     GimbalManagerSetAttitude(*OURS, 0, 0, (0.0, 0.0, 0.0, 0.0), NAN, NAN, NAN),
     GimbalManagerSetAttitude(*OURS, 0, 0, (1.0, NAN, 0.0, 0.0), NAN, NAN, NAN),
-    GimbalManagerSetAttitude(*OURS, 0, 0, UNSET, math.inf, NAN, NAN),
+    GimbalManagerSetAttitude(*OURS, 0, 0, UNSET_QUATERNION, math.inf, NAN, NAN),
     pitch_yaw(math.inf, 0.0), pitch_yaw(0.0, 0.0, flags=32 | 64),
     GimbalManagerSetManualControl(*OURS, 0, 0, 1.5, 0.0, NAN, NAN),
     pitch_yaw_command(math.inf, 0.0), pitch_yaw_command(0.0, 0.0, flags=96)], ids=repr)

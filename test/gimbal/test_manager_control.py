@@ -19,7 +19,12 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from illuminator_ros.gimbal.manager_control import Control, ControlChanged, ControlSettings, Role
+from illuminator_ros.gimbal.manager_control import (
+    ControlArbiter,
+    ControlChanged,
+    ControlSettings,
+    Role,
+)
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Cause, Policy
 import pytest
@@ -42,12 +47,12 @@ EVENTS = {
 NAMES = {player: name for name, player in HOLDERS.items()} | {THIRD: 'the other'}
 
 
-def control(policy: Policy = Policy.HOLD, *, overrules: bool = False) -> Control:
-    return Control(ControlSettings(
+def control(policy: Policy = Policy.HOLD, *, overrules: bool = False) -> ControlArbiter:
+    return ControlArbiter(ControlSettings(
         policy, (HIGHER, PLAYER, LOWER), frozenset({OVERRULING, *([PLAYER] * overrules)}), LEASE))
 
 
-def held(policy: Policy, holder: Address | None, *, overrules: bool = False) -> Control:
+def held(policy: Policy, holder: Address | None, *, overrules: bool = False) -> ControlArbiter:
     one = control(policy, overrules=overrules)
     if holder is not None:
         assert one.configure(holder, (*holder, -1, -1), 0.0) is not None

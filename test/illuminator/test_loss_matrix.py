@@ -160,7 +160,7 @@ def untruth(pair: Pair, witness: Witness, request: Request) -> str:
         return 'acknowledged' if accepted else ''
     if 'but ILLUMINATOR_STATUS shows' in message:
         return '' if accepted and not all(matches) else 'not accepted, or as wished all the time'
-    known = ('ILLUMINATOR_STATUS came within', 'may be that of an earlier command',
+    known = ('ILLUMINATOR_STATUS came within', 'may belong to an earlier command',
              'is lost: no heartbeat for')
     return '' if any(text in message for text in known) else 'an unknown outcome'
 

@@ -127,7 +127,7 @@ def test_a_clock_that_is_a_little_wrong_shows_no_restart(drift: float, interval:
     ([(5000, 100.0), (6001, 101.0), (6301, 103.3), (6401, 103.4)], 101.401, True),
     # Nor does the time since the last quick one, which the error of a clock may explain.
     ([(5000, 100.0), (6001, 101.0), (9301, 104.36), (9901, 104.95)], 104.901, True),
-    # One of the same millisecond as one that has come was sent before that came.
+    # A status of the same millisecond as a received one was sent before that was received.
     ([(5000, 100.0), (6001, 101.0), (6304, 101.302), (6304, 101.5, ON)], 101.302, True),
     # Nor a pause.
     ([(5000, 100.0), (6001, 101.0), (8802, 108.9)], 103.802, True),

@@ -348,7 +348,7 @@ def test_overtaking_command_is_sent_beside_one_in_progress(rejections: int) -> N
     rig.ack(IN_PROGRESS)
     off, waiting = rig.start(overtake=True), rig.start()
     for _ in range(rejections):
-        # A command in progress is not rejected: the rejection is that of the other.
+        # A command in progress is not rejected: the rejection belongs to the other.
         rig.ack(REJECTED)
         rig.run(0.15)
     assert [len(run.frames) for run in (on, off, waiting)] == [1, 1 + rejections, 0]

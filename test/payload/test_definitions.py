@@ -28,8 +28,8 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink_2
 import pytest
 
-# The camera gets MAVLink 1, so its messages have no extension fields (RE-2), but for the one that
-# it sends and that recorders count by.
+# The camera gets MAVLink 1, so its messages have no extension fields (RE-2), except the field
+# of CAMERA_FEEDBACK by which recorders count.
 MODULES: dict[ModuleType, ModuleType] = {
     vehicle: mavlink_2, gimbal: mavlink_2, rededge: mavlink_1}
 CLASSES: list[tuple[type[Message], ModuleType]] = [

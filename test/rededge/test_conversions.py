@@ -43,7 +43,7 @@ OPTICAL = Rotation.from_matrix([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 ZERO_POSE = Rotation.from_matrix([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
 
 angles = st.floats(-math.pi, math.pi)
-# The singular pitch of 90 degrees of the vehicle and its neighbours, and that of the mount.
+# The singular pitches of the vehicle, 90 degrees, and of the mount, and their neighbours.
 pitches = st.sampled_from((-90.0, 90.0, -89.999, 89.99, 0.0, 0.3, -1.0)).map(math.radians) | angles
 rotations = st.builds(Quaternion.from_euler, angles, pitches, angles)
 anything = st.floats(allow_nan=True, allow_infinity=True)

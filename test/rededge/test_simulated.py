@@ -328,7 +328,7 @@ def test_command_of_the_console_has_its_effect(
 
 @pytest.mark.parametrize(('line', 'reason'), [
     ('capture sky', "'sky' is not panel"), ('own-gps 91,0,0', '91 is outside -90 to 90'),
-    ('own-gps 1,2', 'neither LAT,LON,ALT nor none'), ('interval -1', 'outside'),
+    ('own-gps 1,2', 'is not LAT,LON,ALT'), ('interval -1', 'outside'),
     ('interval 1e-12', '1e-12 is shorter than 0.05')])
 def test_wrong_argument_of_the_console_is_named(line: str, reason: str) -> None:
     name, *words = line.split()

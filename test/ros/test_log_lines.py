@@ -47,7 +47,7 @@ def test_light_that_is_missed_found_changed_by_others_lost_and_restarted_is_logg
             assert parameters.set(brightness=80.0)[0].successful
             events = parameters.events()
             light.forget()
-            # Float32 carries 80.1 as 80.099998; heat and values without a meaning are no change.
+            # Float32 carries 80.1 as 80.099998; heat and values without a meaning change nothing.
             for report in ({'brightness': 80.000003}, {'brightness': 40.0, 'error_status': 1},
                            {'brightness': float('nan'), 'error_status': 0}, {'mode': 0}):
                 light.report(**report)

@@ -123,7 +123,7 @@ class FakeCamera:
 
 @contextlib.contextmanager
 def running_camera(**options: Any) -> Iterator[FakeCamera]:
-    """Run a camera; all that it receives must be MAVLink 1."""
+    """Run a camera; every frame that it receives must be MAVLink 1."""
     far, near = os.openpty()
     tty.setraw(near)
     stopping, stop = os.pipe()

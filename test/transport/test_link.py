@@ -93,7 +93,7 @@ class Faulty(Talker):
     """
     Fails in the method of this name, so often.
 
-    :param deadline: of every poll, s; None for that of the heartbeat.
+    :param deadline: of every poll, s; None for the heartbeat's.
     :ivar failures: the calls that failed.
     """
 

@@ -38,7 +38,6 @@ from .attitude import (
     uptime,
 )
 from .tester import (
-    angles_of,
     describe,
     free_address,
     GIMBAL,
@@ -47,10 +46,10 @@ from .tester import (
     NAN,
     Pose,
     PROPOSAL,
+    quaternion_of,
     radians,
     STEP,
     TOLERANCE,
-    UNSET,
 )
 from .. import messages as gimbal
 from ..messages import Capabilities, GimbalCommand
@@ -66,7 +65,7 @@ from ...payload.checks.requirement import (
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.checks.specification import MESSAGES, ROUTING
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags
+from ...payload.mount_attitude import MountFlags, UNSET_VECTOR
 from ...payload.rotation import Quaternion
 
 # s
@@ -120,12 +119,12 @@ class DeviceTester(GimbalTester):
 
     def point(
         self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET, sender: Address | None = None,
+        rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
         target: Address | None = None,
     ) -> None:
         """See :class:`GimbalTester`; the manager sends it if no other address is given."""
         self.session.send(gimbal.GimbalDeviceSetAttitude(
-            *(target or self.session.device), flags, angles_of(pose), *radians(rates)),
+            *(target or self.session.device), flags, quaternion_of(pose), *radians(rates)),
             sender or self.manager)
 
 
@@ -222,7 +221,7 @@ async def manager_set(tester: DeviceTester) -> None:
     pitch, yaw = math.radians(pose.pitch), math.radians(pose.yaw)
     ids = (*device, int(LEVEL), device.component)
     for message in (
-            gimbal.GimbalManagerSetAttitude(*ids, angles_of(pose), *UNSET),
+            gimbal.GimbalManagerSetAttitude(*ids, quaternion_of(pose), *UNSET_VECTOR),
             gimbal.GimbalManagerSetPitchyaw(*ids, pitch, yaw, NAN, NAN),
             gimbal.GimbalManagerSetManualControl(*ids, -0.5, 0.5, NAN, NAN),
             CommandLong(*device, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,

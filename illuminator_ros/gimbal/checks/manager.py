@@ -40,7 +40,6 @@ from .attitude import (
     uptime,
 )
 from .tester import (
-    angles_of,
     Control,
     control_of,
     control_text,
@@ -52,11 +51,11 @@ from .tester import (
     NAN,
     Pose,
     PROPOSAL,
+    quaternion_of,
     radians,
     RATE,
     STEP,
     TOLERANCE,
-    UNSET,
 )
 from .. import messages as gimbal
 from ..messages import Capabilities, GimbalCommand
@@ -67,13 +66,13 @@ from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transac
 from ...payload.checks.specification import MESSAGES, ROUTING
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags
+from ...payload.mount_attitude import MountFlags, UNSET_VECTOR
 
 INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
 PITCHYAW, CONFIGURE = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW,
                        GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE)
 VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
-NOBODY = Address(0, 0)
+NO_COMPONENT = Address(0, 0)
 # s from an acknowledgement to the status that shows the control.
 SHOWN_TIMEOUT = 1.5
 # Degrees 1e7 and mm: the vehicle that is played, which heads 15 degrees from north, and degrees
@@ -137,7 +136,7 @@ class ManagerTester(GimbalTester):
             await self.pause(0.1)
         return control
 
-    async def take(self, primary: Address, secondary: Address = NOBODY) -> None:
+    async def take(self, primary: Address, secondary: Address = NO_COMPONENT) -> None:
         """Give control to two players; raise Failed if that is refused or not shown."""
         one = await self.configure(*primary, *secondary)
         if not one.accepted:
@@ -151,7 +150,7 @@ class ManagerTester(GimbalTester):
         if self.other in await self.control():
             await self.configure(-3.0, -3.0, -3.0, -3.0, sender=self.other)
         if (await self.control())[0] != self.session.address:
-            await self.configure(*self.session.address, *NOBODY)
+            await self.configure(*self.session.address, *NO_COMPONENT)
             await self.pause(0.3)
 
     async def pause(self, seconds: float) -> None:
@@ -168,13 +167,13 @@ class ManagerTester(GimbalTester):
 
     def point(
         self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET, sender: Address | None = None,
+        rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
         device_id: int | None = None,
     ) -> None:
         """See :class:`GimbalTester`: GIMBAL_MANAGER_SET_ATTITUDE of a player."""
         self.session.send(gimbal.GimbalManagerSetAttitude(
             *self.session.device, flags, self.device_id if device_id is None else device_id,
-            angles_of(pose), *radians(rates)), sender)
+            quaternion_of(pose), *radians(rates)), sender)
 
     def send(self, cls: type[Any], pitch: float, yaw: float, pitch_rate: float,
              yaw_rate: float, sender: Address | None = None) -> None:
@@ -269,8 +268,8 @@ async def release(tester: ManagerTester) -> None:
     """Send -3."""
     await tester.prepare()
     one = await tester.configure(-3, -3, -3, -3)
-    control = await tester.shown(lambda control: control[0] == NOBODY)
-    if not one.accepted or control[0] != NOBODY:
+    control = await tester.shown(lambda control: control[0] == NO_COMPONENT)
+    if not one.accepted or control[0] != NO_COMPONENT:
         raise one.failure(f'{one.answer}, and then {control_text(control)}')
 
 
@@ -329,7 +328,7 @@ async def configure_values(tester: ManagerTester) -> None:
 async def one_player(tester: ManagerTester) -> str:
     """Let the second player take control; the one that the status does not show must not move."""
     before, other = await tester.begin(), tester.other
-    one = await tester.configure(*other, *NOBODY, sender=other)
+    one = await tester.configure(*other, *NO_COMPONENT, sender=other)
     await tester.pause(0.5)
     holder = (await tester.control())[0]
     if one.accepted is not (holder == other):
@@ -523,7 +522,7 @@ async def other_target(tester: ManagerTester) -> None:
     before, session = await tester.begin(), tester.session
     other, pose = free_address(session, 200), await tester.target(-2 * STEP, STEP)
     session.send(gimbal.GimbalManagerSetAttitude(
-        *other, int(LEVEL | VEHICLE_FRAME), tester.device_id, angles_of(pose), *UNSET))
+        *other, int(LEVEL | VEHICLE_FRAME), tester.device_id, quaternion_of(pose), *UNSET_VECTOR))
     one = await session.send_to_other(
         other, PITCHYAW, pose.pitch, pose.yaw, NAN, NAN, float(LEVEL), 0.0, tester.device_id)
     await tester.stays(before, f'setpoints for {other}')

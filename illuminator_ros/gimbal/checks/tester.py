@@ -30,7 +30,7 @@ from ...payload.checks.requirement import Conditions
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.checks.specification import Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags, yaw_frame, YawFrame
+from ...payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
 from ...payload.rotation import Quaternion
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
@@ -50,7 +50,6 @@ TOLERANCE = 3.0
 STEP = 15.0
 RATE = 6.0
 NAN = math.nan
-UNSET = (NAN, NAN, NAN)
 LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
 Control = tuple[Address, Address]
 _LIMIT_NAMES = [f'{axis}_{end}' for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')]
@@ -208,7 +207,7 @@ class GimbalTester(ABC):
     @abstractmethod
     def point(
         self, pose: Pose | None, *, flags: int = LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET,
+        rates: tuple[float, float, float] = UNSET_VECTOR,
     ) -> None:
         """Send a setpoint: an attitude if there is one, and rates, deg/s."""
 
@@ -329,7 +328,7 @@ class GimbalTester(ABC):
         await self.pause(0.5)
 
 
-def angles_of(pose: Pose | None) -> tuple[float, float, float, float]:
+def quaternion_of(pose: Pose | None) -> tuple[float, float, float, float]:
     """Return the quaternion of a pose for a message, NaN without one."""
     if pose is None:
         return (NAN,) * 4
