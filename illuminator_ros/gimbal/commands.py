@@ -44,6 +44,10 @@ class Control:
         return cls(_component(status.primary_control_sysid, status.primary_control_compid),
                    _component(status.secondary_control_sysid, status.secondary_control_compid))
 
+    def includes(self, component: Address) -> bool:
+        """Return whether a component has primary or secondary control."""
+        return component in (self.primary, self.secondary)
+
     def __str__(self) -> str:
         return f'primary {self.primary or "none"}, secondary {self.secondary or "none"}'
 
@@ -90,7 +94,8 @@ class Configure:
 
     def shown_by(self, status: GimbalManagerStatus) -> bool:
         """See :class:`~..payload.request.Change`."""
-        return (Control.of(status).primary == self.us) is self.take
+        control = Control.of(status)
+        return control.primary == self.us if self.take else not control.includes(self.us)
 
     def evidence(self, status: GimbalManagerStatus) -> str:
         """See :class:`~..payload.request.Change`."""

@@ -354,6 +354,11 @@ class Gimbal:
         return '' if self.in_control else f'no control of gimbal {self.key}: {self._control}'
 
     @property
+    def has_any_control(self) -> bool:
+        """Whether we have primary or secondary control, and its manager is heard."""
+        return self._control is not None and self._control.includes(self._commands.address)
+
+    @property
     def enforces_control(self) -> bool:
         """Whether the manager is not known to obey components without control."""
         manager = self._active
@@ -396,7 +401,8 @@ class Gimbal:
         manager = self._active
         if manager is None or not self._manager_heard:
             done(request.Result(False, self.obstacle(now)), now)
-        elif self._control is not None and self.in_control is take:
+        elif self._control is not None and (
+                self.in_control if take else not self.has_any_control):
             state = 'in control already' if take else 'not in control'
             done(request.Result(True, f'{state}: {self._control}'), now)
         else:

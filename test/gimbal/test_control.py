@@ -100,6 +100,20 @@ def test_request_for_what_the_status_shows_already_sends_nothing(
     assert commands(rig, CONFIGURE) == []
 
 
+@pytest.mark.parametrize('primary', [OURS, NONE])
+def test_gm_16_release_includes_secondary_control(primary: Address) -> None:
+    rig = Rig(FakeManager(primary=primary, secondary=OURS)).run(3.0)
+
+    success, message = asked(rig, Gimbal.release_control)
+
+    assert success, message
+    assert rig.managers[0].secondary == NONE
+    rig.managers[0].secondary, rig.managers[0].applies = OURS, False
+    success, message = asked(rig.run(1.0), Gimbal.release_control, 6.0)
+    assert not success
+    assert 'secondary 1/194' in message
+
+
 def test_gm_17_lost_control_is_told_and_not_taken_back() -> None:
     rig = in_control(auto_take_control=True)
 

@@ -350,14 +350,19 @@ def test_gm_26_each_further_gimbal_has_a_node_and_a_second_manager_is_reported(
         assert report(own_ros, 'announce the gimbal too: only 1/').level == DiagnosticStatus.WARN
 
 
+@pytest.mark.parametrize('primary_is_lost', [False, True])
 def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
-        own_ros: Ros) -> None:
+        own_ros: Ros, primary_is_lost: bool) -> None:
     manager = FakeManager(autopilot=3)
     with bridge(own_ros, manager, auto_take_control='true') as program:
         own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
         assert 'exclusive control is not guaranteed' in report(own_ros, 'ArduPilot').message
+        manager.secondary = OURS
+        if primary_is_lost:
+            manager.primary = NOBODY
+            own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
         assert program.end() == 0
-        assert manager.primary == NOBODY
+        assert (manager.primary, manager.secondary) == (NOBODY, NOBODY)
         assert program.count('gimbal 1/154: control released') == 1
 
 

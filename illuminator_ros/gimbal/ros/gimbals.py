@@ -139,7 +139,7 @@ class Gimbals(ServedPayload):
             severity = logging.INFO if result.success else logging.ERROR
             report(key, severity, f'gimbal {key}: {result.message}')
 
-        controlled = [one for one in self._client.gimbals.values() if one.in_control]
+        controlled = [one for one in self._client.gimbals.values() if one.has_any_control]
         for gimbal in controlled:
             gimbal.release_control(now, functools.partial(done, gimbal.key))
         return {one.key: f'control of gimbal {one.key} may not be released: no confirmation'
