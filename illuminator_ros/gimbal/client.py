@@ -37,7 +37,7 @@ from ..mavlink.messages import Address, Heartbeat, MAV_AUTOPILOT_INVALID, MavCmd
 from ..payload.listeners import Listeners
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
-# Gimbals; one more is ignored, so that memory is bounded.
+# Gimbals, and one more if it is wanted; others are ignored, so that memory is bounded.
 MAX_GIMBALS = 32
 # Components that may be managers. A further component replaces a long silent one.
 MAX_COMPONENTS = 256
@@ -127,7 +127,7 @@ class GimbalClient(Payload):
                GimbalKey(Address(manager.system, device_id)))
         gimbal = self._gimbals.get(key)
         if gimbal is None:
-            if len(self._gimbals) >= MAX_GIMBALS:
+            if len(self._gimbals) >= MAX_GIMBALS + (device_id == self._settings.device_id):
                 self.limit_reached = True
                 return None
             gimbal = self._gimbals[key] = Gimbal(

@@ -129,11 +129,13 @@ class GimbalSettings:
     :param attitude_interval: s between attitudes of the device; 0 for its own.
     :param auto_take_control: whether control is taken once a gimbal is connected that no
         component controls.
+    :param device_id: gimbal device id of the gimbal that is found whatever others there are.
     """
 
     setpoint_timeout: float = 0.5
     attitude_interval: float = 0.0
     auto_take_control: bool = False
+    device_id: int = 0
 
 
 @dataclass

@@ -157,6 +157,18 @@ def test_forged_components_take_no_memory_without_end() -> None:
     assert not rig.client.limit_reached
 
 
+def test_wanted_gimbal_is_found_among_forged_ones() -> None:
+    rig = Rig(device_id=154)
+    for component in range(10, 250):
+        if component != 154:
+            rig.receive(Address(1, 60), FakeManager(device_id=component).status())
+    rig.managers.append(FakeManager())
+    rig.run(3.0)
+
+    assert [event.key for event in rig.all_of(GimbalConnected)] == [GimbalKey(DEVICE)]
+    assert len(keys(rig)) == limits.MAX_GIMBALS + 1
+
+
 @pytest.mark.parametrize(('silent', 'reason'), [
     ('alive', 'nothing from manager 1/1 for 3.'),
     ('device_alive', 'nothing from device 1/154 for 3.')])

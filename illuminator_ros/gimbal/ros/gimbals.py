@@ -53,7 +53,7 @@ GIMBAL_PARAMETERS = (
 def settings(values: Values) -> GimbalSettings:
     """Return how gimbals are treated."""
     return GimbalSettings(values['setpoint_timeout'], values['attitude_interval'],
-                          values['auto_take_control'])
+                          values['auto_take_control'], values['gimbal_device_id'])
 
 
 class Gimbals(ServedPayload):
