@@ -22,16 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from .messages import (
-    CameraFeedback,
-    CameraFeedbackFlags,
-    CameraStatus,
-    CameraStatusType,
-    DigicamControl,
-    MAV_COMP_ID_CAMERA,
-    Ping,
-    Shot,
-)
+from . import messages as rededge
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message
 
@@ -74,7 +65,7 @@ class CameraLost:
 class ImageTaken:
     """The camera reported an image, requested by whichever component."""
 
-    feedback: CameraFeedback
+    feedback: rededge.CameraFeedback
 
 
 CameraEvent = CameraConnected | CameraLost | ImageTaken
@@ -172,7 +163,7 @@ class Camera:
     @property
     def target(self) -> Address:
         """Return where messages to the camera go; its system id is 0 until it is heard."""
-        return self._address or Address(0, MAV_COMP_ID_CAMERA)
+        return self._address or Address(0, rededge.MAV_COMP_ID_CAMERA)
 
     def snapshot(self, now: float) -> CameraSnapshot:
         """Return the camera at this moment."""
@@ -238,9 +229,9 @@ class Camera:
         self._ping_due = now + PING_INTERVAL
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
         self._pings[self._sequence] = now
-        self._send(Ping(int(now * 1e6), self._sequence, 0, 0))
+        self._send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
 
-    def take_ping(self, message: Ping, now: float) -> None:
+    def take_ping(self, message: rededge.Ping, now: float) -> None:
         """Take a PING of the camera, which is a reply if it has our address."""
         if (message.target_system, message.target_component) != self._own:
             return
@@ -271,7 +262,7 @@ class Camera:
 
     # Captures
 
-    def capture(self, shot: Shot, now: float, done: Done) -> None:
+    def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
         """Take an image; a success only after its CAMERA_FEEDBACK."""
         if not self._connected:
             done(False, f'no camera connected: {self._lost_reason or "none heard yet"}')
@@ -280,21 +271,21 @@ class Camera:
         else:
             self._capture = _Capture(now, done)
             # The manufacturer recommends 1 for session and zoom_pos.
-            self._send(DigicamControl(*self.target, 1, 1, 0, 0, shot, 0, 0, 0.0))
+            self._send(rededge.DigicamControl(*self.target, 1, 1, 0, 0, shot, 0, 0, 0.0))
 
-    def take_status(self, message: CameraStatus, now: float) -> None:
+    def take_status(self, message: rededge.CameraStatus, now: float) -> None:
         """Take CAMERA_STATUS, which says that an image was triggered."""
-        if message.event_id == CameraStatusType.TRIGGER:
+        if message.event_id == rededge.CameraStatusType.TRIGGER:
             self._take_index(message.img_idx, now)
 
-    def take_feedback(self, message: CameraFeedback, now: float) -> None:
+    def take_feedback(self, message: rededge.CameraFeedback, now: float) -> None:
         """Take CAMERA_FEEDBACK, which says that an image was taken."""
         self._images += 1
         self._take_index(message.img_idx, now)
         self._emit(ImageTaken(message))
         capture = self._capture
         if (capture is not None and capture.index == message.img_idx
-                and message.flags == CameraFeedbackFlags.CLOSEDLOOP):
+                and message.flags == rededge.CameraFeedbackFlags.CLOSEDLOOP):
             note = ("; several components have the camera's id, so another may have taken it"
                     if self._is_conflict(now) else '')
             self._end_capture(

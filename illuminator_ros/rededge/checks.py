@@ -27,18 +27,7 @@ from itertools import pairwise
 import math
 from typing import NamedTuple
 
-from .messages import (
-    CameraFeedback,
-    CameraFeedbackFlags,
-    CameraStatus,
-    CameraStatusType,
-    DigicamControl,
-    GpsRawInt,
-    MAV_COMP_ID_CAMERA,
-    MountStatus,
-    Ping,
-    Shot,
-)
+from . import messages as rededge
 from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload.checks import component_requirements as component
 from ..payload.checks.requirement import (
@@ -84,8 +73,8 @@ with_consent = partial(requires, needs_consent=True)
 class Capture(NamedTuple):
     """The messages that reported an image; None for one that did not come."""
 
-    status: CameraStatus | None
-    feedback: CameraFeedback | None
+    status: rededge.CameraStatus | None
+    feedback: rededge.CameraFeedback | None
 
     @property
     def taken(self) -> bool:
@@ -114,7 +103,9 @@ class CameraTester:
         """See :class:`Tester`."""
         return []
 
-    async def ping(self, sequence: int | None = None, sender: Address | None = None) -> Ping:
+    async def ping(
+        self, sequence: int | None = None, sender: Address | None = None,
+    ) -> rededge.Ping:
         """
         Return the answer to a PING request.
 
@@ -125,19 +116,18 @@ class CameraTester:
         for _ in range(PING_ATTEMPTS):
             begun = self.session.now
             self._sequence += 1
-            self.session.send(
-                Ping(self._utc_us(), self._sequence if sequence is None else sequence, 0, 0),
-                sender)
-            if answers := await self.session.receive_more(Ping, PING_TIMEOUT):
+            number = self._sequence if sequence is None else sequence
+            self.session.send(rededge.Ping(self._utc_us(), number, 0, 0), sender)
+            if answers := await self.session.receive_more(rededge.Ping, PING_TIMEOUT):
                 return answers[-1][1]
             # A late answer must not be assigned to the next request.
-            if await self.session.receive_more(Ping, LATE_TIMEOUT):
+            if await self.session.receive_more(rededge.Ping, LATE_TIMEOUT):
                 raise Failed(f'answered after {self.session.now - begun:.1f} s')
         self.session.check_presence()
         raise Failed(f'no answer to {PING_ATTEMPTS} requests within {PING_TIMEOUT:g} s each')
 
     async def capture(
-        self, shot: int = Shot.SURVEY, *, component: int = MAV_COMP_ID_CAMERA,
+        self, shot: int = rededge.Shot.SURVEY, *, component: int = rededge.MAV_COMP_ID_CAMERA,
         system: int | None = None, timeout: float = FEEDBACK_TIMEOUT,
         state: Callable[[], Sequence[Message]] = tuple,
     ) -> Capture:
@@ -149,7 +139,8 @@ class CameraTester:
         :param state: returns messages that are sent meanwhile.
         """
         session = self.session
-        statuses, feedbacks = session.received(CameraStatus), session.received(CameraFeedback)
+        statuses = session.received(rededge.CameraStatus)
+        feedbacks = session.received(rededge.CameraFeedback)
         earlier = {one.img_idx for _, one in statuses}
         before = statuses.total, feedbacks.total
 
@@ -159,7 +150,7 @@ class CameraTester:
             return Capture(status, next((one for _, one in feedbacks.since(before[1]) if (
                 one.img_idx == status.img_idx if status else one.img_idx not in earlier)), None))
 
-        session.send(DigicamControl(
+        session.send(rededge.DigicamControl(
             session.device.system if system is None else system, component, 1, 1, 0, 0, shot, 0,
             0, 0.0))
         until = session.now + timeout
@@ -174,9 +165,9 @@ class CameraTester:
         return reported()
 
     async def image(
-        self, shot: int = Shot.SURVEY, *, component: int = MAV_COMP_ID_CAMERA,
+        self, shot: int = rededge.Shot.SURVEY, *, component: int = rededge.MAV_COMP_ID_CAMERA,
         system: int | None = None, state: Callable[[], Sequence[Message]] = tuple,
-    ) -> CameraFeedback:
+    ) -> rededge.CameraFeedback:
         """
         Command an image, and return its CAMERA_FEEDBACK; see :meth:`capture`.
 
@@ -198,8 +189,9 @@ class CameraTester:
 
     def raw_position(self) -> Sequence[Message]:
         """Return a position with its time, as GPS_RAW_INT."""
-        return (GpsRawInt(self._utc_us(), 3, round(LATITUDE * 1e7), round(LONGITUDE * 1e7),
-                          round(ALTITUDE * 1e3), 100, 200, 0, 0, 12),)
+        return (rededge.GpsRawInt(
+            self._utc_us(), 3, round(LATITUDE * 1e7), round(LONGITUDE * 1e7),
+            round(ALTITUDE * 1e3), 100, 200, 0, 0, 12),)
 
     def fused_position(self) -> Sequence[Message]:
         """Return the same position as SYSTEM_TIME and GLOBAL_POSITION_INT."""
@@ -210,10 +202,10 @@ class CameraTester:
     def attitude(self, yaw: float, mount_roll: float) -> Sequence[Message]:
         """Return a level attitude with a yaw, and a mount with a roll, degrees."""
         return (Attitude(0, 0.0, 0.0, math.radians(yaw), 0.0, 0.0, 0.0),
-                MountStatus(self.session.device.system, MAV_COMP_ID_CAMERA, 0,
-                            round(mount_roll * 100), 0))
+                rededge.MountStatus(self.session.device.system, rededge.MAV_COMP_ID_CAMERA, 0,
+                                    round(mount_roll * 100), 0))
 
-    def clock_error(self, feedback: CameraFeedback) -> float:
+    def clock_error(self, feedback: rededge.CameraFeedback) -> float:
         """Return how far the time of an image, taken now, is from the time of day, s."""
         return feedback.time_usec / 1e6 - self.conditions.utc()
 
@@ -221,14 +213,14 @@ class CameraTester:
         return int(self.conditions.utc() * 1e6)
 
 
-def is_at_injected_place(feedback: CameraFeedback) -> bool:
+def is_at_injected_place(feedback: rededge.CameraFeedback) -> bool:
     """Return whether an image was taken where :meth:`CameraTester.raw_position` says."""
     return (abs(feedback.lat / 1e7 - LATITUDE) <= MAX_PLACE_ERROR
             and abs(feedback.lng / 1e7 - LONGITUDE) <= MAX_PLACE_ERROR
             and abs(feedback.alt_msl - ALTITUDE) <= MAX_ALTITUDE_ERROR)
 
 
-def _place(feedback: CameraFeedback) -> str:
+def _place(feedback: rededge.CameraFeedback) -> str:
     return f'{feedback.lat / 1e7:.7f}, {feedback.lng / 1e7:.7f}, {feedback.alt_msl:.2f} m'
 
 
@@ -261,7 +253,7 @@ async def ping_sequence(tester: CameraTester) -> None:
 @requires('ping-once', 'answers PING once', section='PING')
 async def ping_once(tester: CameraTester) -> None:
     """Count the answers."""
-    answers = tester.session.received(Ping)
+    answers = tester.session.received(rededge.Ping)
     before = answers.total
     await tester.ping()
     await tester.session.runner.sleep(PING_TIMEOUT)
@@ -298,8 +290,8 @@ async def capture_status(tester: CameraTester) -> None:
     status = (await tester.capture()).status
     if status is None:
         raise Failed('no CAMERA_STATUS')
-    if status.event_id != CameraStatusType.TRIGGER:
-        raise Failed(f'event_id {status.event_id} instead of {CameraStatusType.TRIGGER:d}')
+    if status.event_id != rededge.CameraStatusType.TRIGGER:
+        raise Failed(f'event_id {status.event_id} instead of {rededge.CameraStatusType.TRIGGER:d}')
 
 
 @with_consent('capture-feedback', 'confirms an image with CAMERA_FEEDBACK',
@@ -308,15 +300,16 @@ async def capture_feedback(tester: CameraTester) -> str:
     """Command an image, and measure the time."""
     begun = tester.session.now
     feedback = await tester.image()
-    if feedback.flags != CameraFeedbackFlags.CLOSEDLOOP:
-        raise Failed(f'flags {feedback.flags} instead of {CameraFeedbackFlags.CLOSEDLOOP:d}')
+    expected = rededge.CameraFeedbackFlags.CLOSEDLOOP
+    if feedback.flags != expected:
+        raise Failed(f'flags {feedback.flags} instead of {expected:d}')
     return f'after {tester.session.now - begun:.1f} s'
 
 
 @with_consent('capture-panel', 'takes an image of the panel', section='DIGICAM_CONTROL')
 async def capture_panel(tester: CameraTester) -> None:
     """Command an image with shot 2."""
-    await tester.image(Shot.PANEL)
+    await tester.image(rededge.Shot.PANEL)
 
 
 @with_consent('shot-values', 'takes no image for other values of shot', section='DIGICAM_CONTROL')
@@ -396,7 +389,7 @@ async def validity(tester: CameraTester) -> None:
           whole_run=True)
 async def capture_index(tester: CameraTester) -> str:
     """Compare the numbers of consecutive images."""
-    indexes = [one.img_idx for _, one in tester.session.received(CameraFeedback)]
+    indexes = [one.img_idx for _, one in tester.session.received(rededge.CameraFeedback)]
     if len(indexes) < 2:
         raise Skipped('fewer than two images were confirmed')
     for first, second in pairwise(indexes):
@@ -430,7 +423,8 @@ def _documented(one: Requirement[Tester], title: str = '') -> Requirement[Tester
 
 REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
     _documented(component.heartbeat,
-                f'sends HEARTBEAT from component {MAV_COMP_ID_CAMERA} (MAV_COMP_ID_CAMERA)'),
+                f'sends HEARTBEAT from component {rededge.MAV_COMP_ID_CAMERA} '
+                '(MAV_COMP_ID_CAMERA)'),
     heartbeat_contents, ping, ping_sequence, ping_once, ping_target, system_id,
     capture_status, capture_feedback, capture_panel, shot_values,
     other_component, all_components, any_system,
@@ -443,24 +437,25 @@ REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
 
 def describe(message: Message) -> str:
     """Return a message of the camera in one line, '' for another message."""
-    if isinstance(message, Ping):
+    if isinstance(message, rededge.Ping):
         target = Address(message.target_system, message.target_component)
         return f'PING {message.seq} to {target}' if any(target) else f'PING {message.seq}'
-    if isinstance(message, DigicamControl):
+    if isinstance(message, rededge.DigicamControl):
         target = Address(message.target_system, message.target_component)
         return f'DIGICAM_CONTROL to {target}: shot {message.shot}'
-    if isinstance(message, CameraStatus):
+    if isinstance(message, rededge.CameraStatus):
         return f'CAMERA_STATUS image {message.img_idx}, event {message.event_id}'
-    if isinstance(message, CameraFeedback):
+    if isinstance(message, rededge.CameraFeedback):
         return (f'CAMERA_FEEDBACK image {message.img_idx} at {_place(message)}, '
                 f'yaw {message.yaw:.2f}')
     return ''
 
 
 CHECKS: PayloadChecks[CameraTester] = PayloadChecks(
-    payload='rededge', device='camera', messages=(Ping, CameraStatus, CameraFeedback),
-    is_device=lambda message: isinstance(message, Heartbeat), component=MAV_COMP_ID_CAMERA,
-    evidence=f'HEARTBEAT from component {MAV_COMP_ID_CAMERA}', describe=describe,
+    payload='rededge', device='camera',
+    messages=(rededge.Ping, rededge.CameraStatus, rededge.CameraFeedback),
+    is_device=lambda message: isinstance(message, Heartbeat), component=rededge.MAV_COMP_ID_CAMERA,
+    evidence=f'HEARTBEAT from component {rededge.MAV_COMP_ID_CAMERA}', describe=describe,
     tester=CameraTester, requirements=REQUIREMENTS, mavlink_version=1,
     risk='take images with a false position',
     question='Some checks make camera {device} take about 15 images, most with a false position '

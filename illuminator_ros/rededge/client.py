@@ -20,18 +20,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 import random
 
+from . import messages as rededge
 from .camera import Camera, CameraEvent, CameraSnapshot
 from .feeder import Feeder, FeederSettings, FeederSnapshot, InputChanged
-from .messages import (
-    CameraFeedback,
-    CameraStatus,
-    DigicamControl,
-    GpsRawInt,
-    GpsStatus,
-    MAV_COMP_ID_CAMERA,
-    MountStatus,
-    Ping,
-)
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, Heartbeat, Message
@@ -69,11 +60,12 @@ class RedEdgeClient(Payload):
     :ivar feeder: takes the inputs.
     """
 
-    messages = (Heartbeat, Ping, CameraStatus, CameraFeedback)
-    sends = (DigicamControl, GpsRawInt, SystemTime, GlobalPositionInt, Attitude, MountStatus,
-             GpsStatus)
+    messages = (Heartbeat, rededge.Ping, rededge.CameraStatus, rededge.CameraFeedback)
+    sends = (rededge.DigicamControl, rededge.GpsRawInt, SystemTime, GlobalPositionInt, Attitude,
+             rededge.MountStatus, rededge.GpsStatus)
     # A position must not wait behind attitudes.
-    streams = ((GpsRawInt, SystemTime, GlobalPositionInt), (Attitude, MountStatus), (GpsStatus,))
+    streams = ((rededge.GpsRawInt, SystemTime, GlobalPositionInt),
+               (Attitude, rededge.MountStatus), (rededge.GpsStatus,))
 
     def __init__(
         self, commands: CommandSender, settings: Settings, *, sequence: int | None = None,
@@ -106,15 +98,15 @@ class RedEdgeClient(Payload):
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
-        if source.component != MAV_COMP_ID_CAMERA:
+        if source.component != rededge.MAV_COMP_ID_CAMERA:
             return
         if isinstance(message, Heartbeat):
             self.camera.take_heartbeat(source, now)
-        elif isinstance(message, Ping):
+        elif isinstance(message, rededge.Ping):
             self.camera.take_ping(message, now)
-        elif isinstance(message, CameraStatus):
+        elif isinstance(message, rededge.CameraStatus):
             self.camera.take_status(message, now)
-        elif isinstance(message, CameraFeedback):
+        elif isinstance(message, rededge.CameraFeedback):
             self.camera.take_feedback(message, now)
 
     def poll(self, now: float) -> None:

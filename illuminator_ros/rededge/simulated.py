@@ -28,19 +28,7 @@ from functools import partial
 import math
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from .messages import (
-    CameraFeedback,
-    CameraFeedbackFlags,
-    CameraStatus,
-    CameraStatusType,
-    DigicamControl,
-    GpsRawInt,
-    GpsStatus,
-    MAV_COMP_ID_CAMERA,
-    MountStatus,
-    Ping,
-    Shot,
-)
+from . import messages as rededge
 from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
@@ -112,7 +100,7 @@ class RedEdgeBehaviour(Behaviour):
     feedback_delay: float = FEEDBACK_DELAY
     triggers: bool = True
     counts: bool = True
-    shots: tuple[int, ...] = tuple(Shot)
+    shots: tuple[int, ...] = tuple(rededge.Shot)
     ping_component: int = 0
     ping_sequence: int = 0
     ping_target: bool = True
@@ -134,7 +122,7 @@ FAULTS = FaultTable({
     'late': Fault('feedback_delay', 'sends CAMERA_FEEDBACK S seconds after the image', 'S',
                   number(0.001, 3600), 15.0),
     'same-index': Fault('counts', 'does not count its images', default=False),
-    'no-panel': Fault('shots', 'takes no image of the panel', default=(Shot.SURVEY,)),
+    'no-panel': Fault('shots', 'takes no image of the panel', default=(rededge.Shot.SURVEY,)),
     'any-shot': Fault('shots', 'takes an image for each value of shot',
                       default=tuple(range(256))),
     'no-injection': Fault('injectable', 'ignores injected position, time and attitude',
@@ -145,10 +133,10 @@ FAULTS = FaultTable({
 })
 
 
-class ExtendedCameraFeedback(CameraFeedback):
+class ExtendedCameraFeedback(rededge.CameraFeedback):
     """CAMERA_FEEDBACK as some libraries send it with MAVLink 1: 47 bytes instead of 45."""
 
-    base_size = CameraFeedback.codec.size
+    base_size = rededge.CameraFeedback.codec.size
 
 
 class Injected(NamedTuple, Generic[M]):
@@ -221,7 +209,7 @@ def _known(value: int, scale: float) -> float | None:
     return None if value == UNKNOWN else value / scale
 
 
-def _position(message: GpsRawInt | GlobalPositionInt) -> Values:
+def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> Values:
     """Return the columns of an injected position."""
     place = {'latitude_deg': message.lat / 1e7, 'longitude_deg': message.lon / 1e7,
              'altitude_m': message.alt / 1e3}
@@ -243,7 +231,7 @@ def _own_position(place: Place | None) -> Values:
         'altitude_m': place.altitude}
 
 
-def _orientation(attitude: Attitude | None, mount: MountStatus | None) -> Values:
+def _orientation(attitude: Attitude | None, mount: rededge.MountStatus | None) -> Values:
     """Return the columns of the angles of vehicle, mount and camera."""
     pitch, roll, yaw = (angle / 100 for angle in (
         mount.pointing_a, mount.pointing_b, mount.pointing_c)) if mount else (0.0, 0.0, 0.0)
@@ -276,7 +264,7 @@ def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulate
         raise ValueError(f'{words[0]!r} is not panel')
 
     def capture() -> None:
-        camera.capture(Shot.PANEL if words else Shot.SURVEY, 'console', now)
+        camera.capture(rededge.Shot.PANEL if words else rededge.Shot.SURVEY, 'console', now)
     return capture
 
 
@@ -307,9 +295,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     :ivar images: the latest images.
     """
 
-    messages = (Heartbeat, Ping, GpsRawInt, GpsStatus, SystemTime, GlobalPositionInt, Attitude,
-                MountStatus, DigicamControl)
-    sends = (Heartbeat, Ping, CameraStatus, CameraFeedback)
+    messages = (Heartbeat, rededge.Ping, rededge.GpsRawInt, rededge.GpsStatus, SystemTime,
+                GlobalPositionInt, Attitude, rededge.MountStatus, rededge.DigicamControl)
+    sends = (Heartbeat, rededge.Ping, rededge.CameraStatus, rededge.CameraFeedback)
     faults = FAULTS
     commands = COMMANDS
     behaviour: RedEdgeBehaviour
@@ -330,13 +318,13 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; its own GPS has a fix at once."""
         self._count = self._index = 0
-        self._position: Injected[GpsRawInt | GlobalPositionInt] | None = None
+        self._position: Injected[rededge.GpsRawInt | GlobalPositionInt] | None = None
         self._time: Injected[float] | None = None
         self._attitude: Injected[Attitude] | None = None
-        self._mount: Injected[MountStatus] | None = None
+        self._mount: Injected[rededge.MountStatus] | None = None
         self._ground: float | None = None
         # The feedback of images, with its time.
-        self._pending: deque[tuple[float, CameraFeedback]] = deque()
+        self._pending: deque[tuple[float, rededge.CameraFeedback]] = deque()
         self.set_interval(self._first_interval, now)
 
     def set_clock(self, unix_time: float, now: float) -> None:
@@ -368,7 +356,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def sender(self, message: Message, own: Address) -> Address:
         """See :meth:`SimulatedDevice.sender`."""
-        if isinstance(message, Ping):
+        if isinstance(message, rededge.Ping):
             return Address(own.system, (own.component + self.behaviour.ping_component) & 0xFF)
         return own
 
@@ -378,15 +366,15 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         """See :meth:`SimulatedDevice.receive`."""
         # Those that are due were taken before the message came.
         self._take_due_images(now)
-        if isinstance(message, Ping):
+        if isinstance(message, rededge.Ping):
             return self._answer(source, message)
-        if isinstance(message, DigicamControl):
+        if isinstance(message, rededge.DigicamControl):
             return self._control(source, message, now)
         if self.behaviour.injectable:
             self._inject(message, now)
         return ()
 
-    def _answer(self, source: Address, ping: Ping) -> Iterable[Message]:
+    def _answer(self, source: Address, ping: rededge.Ping) -> Iterable[Message]:
         if ping.target_system or ping.target_component:
             return
         target = source if self.behaviour.ping_target else Address(0, 0)
@@ -394,37 +382,38 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
                       target_system=target.system, target_component=target.component)
 
     def _inject(self, message: Message, now: float) -> None:
-        if isinstance(message, GpsRawInt | GlobalPositionInt):
+        if isinstance(message, rededge.GpsRawInt | GlobalPositionInt):
             self._position = Injected(message, now)
-        if isinstance(message, GpsRawInt):
+        if isinstance(message, rededge.GpsRawInt):
             self._time = Injected(message.time_usec / 1e6, now)
         elif isinstance(message, SystemTime):
             self._time = Injected(message.time_unix_usec / 1e6, now)
         elif isinstance(message, Attitude):
             self._attitude = Injected(message, now)
-        elif isinstance(message, MountStatus):
+        elif isinstance(message, rededge.MountStatus):
             self._mount = Injected(message, now)
 
     def _control(
-        self, source: Address, control: DigicamControl, now: float,
+        self, source: Address, control: rededge.DigicamControl, now: float,
     ) -> Iterable[Message]:
         behaviour = self.behaviour
         if control.shot not in behaviour.shots:
             return
         self._index = (self._index + behaviour.counts) & 0xFFFF
+        is_panel = control.shot == rededge.Shot.PANEL
         image = self.capture(
-            Shot.PANEL if control.shot == Shot.PANEL else Shot.SURVEY, 'mavlink', now)
+            rededge.Shot.PANEL if is_panel else rededge.Shot.SURVEY, 'mavlink', now)
         if behaviour.feedback:
             self._pending.append((
                 now + behaviour.feedback_delay, self._feedback(image, source.system)))
         if behaviour.triggers:
-            yield CameraStatus(
+            yield rededge.CameraStatus(
                 _microseconds(image.time_utc_s), source.system, 0, self._index,
-                CameraStatusType.TRIGGER, 0.0, 0.0, 0.0, 0.0)
+                rededge.CameraStatusType.TRIGGER, 0.0, 0.0, 0.0, 0.0)
 
     # Images
 
-    def capture(self, shot: Shot, trigger: str, now: float) -> Image:
+    def capture(self, shot: rededge.Shot, trigger: str, now: float) -> Image:
         """
         Take an image now, and record its metadata.
 
@@ -470,15 +459,15 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         # A clock that was set goes on.
         return (self._time.message + now - self._time.at if self._time else now), Source.NONE
 
-    def _feedback(self, image: Image, system: int) -> CameraFeedback:
-        kind = ExtendedCameraFeedback if self.behaviour.extension else CameraFeedback
+    def _feedback(self, image: Image, system: int) -> rededge.CameraFeedback:
+        kind = ExtendedCameraFeedback if self.behaviour.extension else rededge.CameraFeedback
         altitude = image.altitude_m or 0.0
         return kind(
             _microseconds(image.time_utc_s), system, 0, self._index,
             round((image.latitude_deg or 0.0) * 1e7), round((image.longitude_deg or 0.0) * 1e7),
             altitude, altitude - (self._ground or 0.0), image.camera_roll_deg or 0.0,
             image.camera_pitch_deg or 0.0, image.camera_yaw_deg or 0.0, FOCAL_LENGTH,
-            CameraFeedbackFlags.CLOSEDLOOP)
+            rededge.CameraFeedbackFlags.CLOSEDLOOP)
 
     # Time
 
@@ -490,7 +479,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def _take_due_images(self, now: float) -> None:
         while now >= self._image_due:
-            self.capture(Shot.SURVEY, 'interval', self._image_due)
+            self.capture(rededge.Shot.SURVEY, 'interval', self._image_due)
             self._image_due += self._interval
 
     def next_deadline(self) -> float:
@@ -543,7 +532,7 @@ def _make(
 
 SIMULATED = simulated.SimulatedType(
     'camera', 'cameras', SimulatedRedEdge, make=_make,
-    address=lambda settings: Address(DEFAULT_SYSTEM_ID, MAV_COMP_ID_CAMERA),
+    address=lambda settings: Address(DEFAULT_SYSTEM_ID, rededge.MAV_COMP_ID_CAMERA),
     settings=SETTINGS,
     examples=(
         'simulator --payload rededge --interval 1 --images flight.csv',

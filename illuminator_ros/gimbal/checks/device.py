@@ -23,20 +23,8 @@ from __future__ import annotations
 
 import math
 
-from .attitude import (
-    command_int,
-    CONTENT,
-    continuous,
-    earth_yaw,
-    failures_at_rest,
-    information_static,
-    limits,
-    MOTION,
-    moves,
-    pitch_axis,
-    STATUS,
-    uptime,
-)
+from . import attitude
+from .attitude import earth_yaw, moves
 from .tester import (
     describe,
     free_address,
@@ -296,16 +284,17 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     component.heartbeat_type(gimbal.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
     component.heartbeat_autopilot, component.address,
     component.status_stream(AttitudeStatus, GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
-    component.sent_on_request('status-request', AttitudeStatus, MESSAGES, STATUS),
-    failures_at_rest, north_needs_heading,
+    component.sent_on_request('status-request', AttitudeStatus, MESSAGES, attitude.STATUS),
+    attitude.failures_at_rest, north_needs_heading,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Device'),
-    information_static(INFORMATION), limits(INFORMATION), pitch_axis(INFORMATION), device_id,
+    attitude.information_static(INFORMATION), attitude.limits(INFORMATION),
+    attitude.pitch_axis(INFORMATION), device_id,
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
-    command_int(INFORMATION),
-    setpoint, *MOTION, earth_frame, yaw_lock, only_manager, one_manager, manager_set,
+    attitude.command_int(INFORMATION),
+    setpoint, *attitude.MOTION, earth_frame, yaw_lock, only_manager, one_manager, manager_set,
     other_target, *component.interval_requirements(AttitudeStatus, optional=True),
-    component.heartbeat_rate, *CONTENT, status_to_all, continuous, uptime,
-    *component.ACKNOWLEDGEMENTS, component.checksums,
+    component.heartbeat_rate, *attitude.CONTENT, status_to_all, attitude.continuous,
+    attitude.uptime, *component.ACKNOWLEDGEMENTS, component.checksums,
 )
 
 

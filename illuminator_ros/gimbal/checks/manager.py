@@ -26,19 +26,8 @@ from functools import partial
 import math
 from typing import Any
 
-from .attitude import (
-    command_int,
-    CONTENT,
-    continuous,
-    earth_yaw,
-    failures_at_rest,
-    information_static,
-    limits,
-    MOTION,
-    moves,
-    pitch_axis,
-    uptime,
-)
+from . import attitude
+from .attitude import earth_yaw, moves
 from .tester import (
     Control,
     control_of,
@@ -572,18 +561,18 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     component.heartbeat, component.address,
     component.status_stream(MANAGER_STATUS, GIMBAL, 'Gimbal Manager Status'),
     component.sent_on_request('status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.name),
-    failures_at_rest,
+    attitude.failures_at_rest,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Manager'),
-    information_static(INFORMATION), limits(INFORMATION), pitch_axis(INFORMATION), same_device,
-    attitude_stream,
+    attitude.information_static(INFORMATION), attitude.limits(INFORMATION),
+    attitude.pitch_axis(INFORMATION), same_device, attitude_stream,
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
-    command_int(INFORMATION),
+    attitude.command_int(INFORMATION),
     take, release, unchanged, release_others, secondary, configure_values, one_player,
-    set_attitude, *MOTION, angles_with_rates, set_pitchyaw, pitchyaw, pitchyaw_rate, one_axis,
-    manual, earth_frame, flags_shown, roi,
+    set_attitude, *attitude.MOTION, angles_with_rates, set_pitchyaw, pitchyaw, pitchyaw_rate,
+    one_axis, manual, earth_frame, flags_shown, roi,
     no_control_command, no_control_messages, no_control_roi, other_device, all_devices,
     other_target, *component.interval_requirements(MANAGER_STATUS, optional=True),
-    component.heartbeat_rate, *CONTENT, continuous, uptime,
+    component.heartbeat_rate, *attitude.CONTENT, attitude.continuous, attitude.uptime,
     *component.ACKNOWLEDGEMENTS, component.checksums,
 )
 
