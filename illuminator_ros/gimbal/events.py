@@ -22,6 +22,7 @@ from typing import NamedTuple
 from .commands import Control
 from .messages import Capabilities, ErrorFlags, GimbalDeviceInformation, GimbalManagerInformation
 from ..mavlink.messages import Address
+from ..payload.arbitration import HolderChanged
 from ..payload.identity import text
 from ..payload.mount_attitude import MountAttitude, MountFlags
 
@@ -146,6 +147,13 @@ class ControlChanged(GimbalEvent):
 
 
 @dataclass(frozen=True)
+class GimbalHeld(GimbalEvent):
+    """Another source of commands holds the gimbal."""
+
+    change: HolderChanged[str]
+
+
+@dataclass(frozen=True)
 class SecondManager(GimbalEvent):
     """Another manager announces the gimbal, although only one may be active."""
 
@@ -180,6 +188,8 @@ class GimbalSnapshot:
     :param attitude_problem: why that has no attitude, '' if it has one.
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
     :param enforces_control: False if the manager is known to obey everyone.
+    :param holder: the source of commands that holds it, '' if none does; None without sources.
+    :param held_since: when that began, s.
     """
 
     key: GimbalKey
@@ -198,3 +208,5 @@ class GimbalSnapshot:
     status_at: float
     enforces_control: bool
     setpoints_sent: int
+    holder: str | None = None
+    held_since: float = 0.0

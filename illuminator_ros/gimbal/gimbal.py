@@ -29,6 +29,7 @@ from .events import (
     DeviceIdentity,
     GimbalConnected,
     GimbalEvent,
+    GimbalHeld,
     GimbalKey,
     GimbalLost,
     GimbalSnapshot,
@@ -49,11 +50,14 @@ from ..mavlink.command_sender import (
     Command,
     CommandResult,
     CommandSender,
+    CommandStatus,
     format_seconds,
     Position,
 )
 from ..mavlink.messages import Address, MAV_AUTOPILOT_ARDUPILOTMEGA, MavCmd
 from ..payload import request
+from ..payload.arbitration import HolderChanged
+from ..payload.command_sources import Sources, SourceSettings
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
     MountAttitude,
@@ -75,6 +79,9 @@ MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
 _STILL = (0.0, 0.0, 0.0)
+# Commands that move a gimbal.
+_MOVES = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, GimbalCommand.DO_SET_ROI_LOCATION,
+          GimbalCommand.DO_SET_ROI_NONE)
 
 
 @dataclass
@@ -130,12 +137,14 @@ class GimbalSettings:
     :param auto_take_control: whether control is taken once a gimbal is connected that no
         component controls.
     :param device_id: gimbal device id of the gimbal that is found whatever others there are.
+    :param sources: of commands, None where all are alike.
     """
 
     setpoint_timeout: float = 0.5
     attitude_interval: float = 0.0
     auto_take_control: bool = False
     device_id: int = 0
+    sources: SourceSettings | None = None
 
 
 @dataclass
@@ -191,6 +200,7 @@ class Gimbal:
         self._setpoint: _Setpoint | None = None
         self._setpoints_sent = 0
         self._link_problem = ''
+        self._sources = Sources(settings.sources) if settings.sources else None
 
     # Liveness
 
@@ -411,6 +421,47 @@ class Gimbal:
             manager.requests.submit(_request(manager.target, Configure(
                 self._commands.address, self.key.device_id, take), now, ended), now)
 
+    # Sources
+
+    def claim(self, source: str, now: float) -> str:
+        """Take a request of a source; return why it may not command the gimbal, '' if it may."""
+        if self._sources is not None:
+            self._change_holder(self._sources.poll(now), now)
+            self._change_holder(self._sources.claim(source, now), now)
+        return self.refusal(source)
+
+    def refusal(self, source: str) -> str:
+        """Return why a source may not command the gimbal, for people; '' if it may."""
+        return self._sources.refusal(source) if self._sources is not None else ''
+
+    def refusal_of_claim(self, source: str) -> str:
+        """Return why a claim of a source would be refused, '' if it would not."""
+        may = self._sources is None or self._sources.may_hold(source)
+        return '' if may else self.refusal(source)
+
+    def release(self, source: str, now: float) -> str:
+        """
+        Note that a source needs the gimbal no more: the next lower one gets it.
+
+        :return: the source that holds it now, '' if none does.
+        """
+        if self._sources is None:
+            return ''
+        self._change_holder(self._sources.poll(now), now)
+        self._change_holder(self._sources.release(source, now), now)
+        return self._sources.holder or ''
+
+    def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
+        """End the rate and the commands of the source before."""
+        if change is None:
+            return
+        if self._setpoint is not None and self._setpoint.zero_at < math.inf:
+            self._setpoint.zero_at = now
+        if self._active is not None and change.before is not None:
+            self._active.flag_requests.cancel(self.refusal(change.before), now)
+            self._commands.end_all(now, CommandStatus.CANCELLED, self._manager, _MOVES)
+        self._emit(GimbalHeld(self.key, change))
+
     # Requests
 
     def set_neutral(self, now: float, done: request.Done) -> None:
@@ -576,6 +627,8 @@ class Gimbal:
     def poll(self, now: float) -> None:
         """Do everything that is due."""
         self._check(now)
+        if self._sources is not None:
+            self._change_holder(self._sources.poll(now), now)
         manager = self._active
         if manager is None:
             return
@@ -620,9 +673,10 @@ class Gimbal:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         manager = self._active
+        deadlines = [self._sources.next_deadline() if self._sources is not None else math.inf]
         if manager is None:
-            return math.inf
-        deadlines = [queue.next_deadline() for queue in manager.queues]
+            return deadlines[0]
+        deadlines += (queue.next_deadline() for queue in manager.queues)
         if self._manager_heard:
             deadlines.append(manager.heard_at + SILENCE_LIMIT)
         if self._connected:
@@ -645,7 +699,9 @@ class Gimbal:
             self._identity, self._attitude, self._attitude_at, self._problem, self._flags,
             self._errors, self._control, self.in_control,
             manager.status_at if manager else -math.inf, self.enforces_control,
-            self._setpoints_sent)
+            self._setpoints_sent,
+            self._sources.holder or '' if self._sources else None,
+            self._sources.since if self._sources else 0.0)
 
 
 def _request(

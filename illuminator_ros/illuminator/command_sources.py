@@ -17,27 +17,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import math
 
-from ..payload.arbitration import Arbiter, HolderChanged, Policy
-
-# The source of a request that names none.
-DEFAULT = 'default'
-
-
-@dataclass(frozen=True)
-class SourceSettings:
-    """
-    The sources of commands.
-
-    :param names: the highest first; :data:`DEFAULT` is one of them.
-    :param timeout: s of silence after which a source no longer holds a light; infinity for never.
-    :param off_on_release: whether a light is switched off when no source holds it any more.
-    """
-
-    names: tuple[str, ...]
-    timeout: float = math.inf
-    off_on_release: bool = False
+from ..payload.arbitration import HolderChanged
+from ..payload.command_sources import Sources, SourceSettings
 
 
 @dataclass(frozen=True)
@@ -52,13 +34,11 @@ class Wish:
     brightness: float | None = None
 
 
-class Sources(Arbiter[str]):
+class LightSources(Sources):
     """Decides which source holds a light, and remembers what each has asked for. No I/O."""
 
     def __init__(self, settings: SourceSettings) -> None:
-        super().__init__(
-            Policy.PRIORITY, settings.names.index, lease=settings.timeout, remembers=True)
-        self.settings = settings
+        super().__init__(settings)
         self._wishes: dict[str, Wish] = {}
 
     @property
@@ -80,7 +60,3 @@ class Sources(Arbiter[str]):
             self._wishes[source] = replace(
                 old, enabled=old.enabled if enabled is None else enabled,
                 brightness=old.brightness if brightness is None else brightness)
-
-    def refusal(self, source: str) -> str:
-        """Return why a source may not command the light, '' if it may."""
-        return '' if source == self.holder else f'held by {self.holder or ""}'

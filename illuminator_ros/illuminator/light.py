@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import math
 
 from . import configuration_manager, events
-from .command_sources import DEFAULT, Sources, SourceSettings
+from .command_sources import LightSources
 from .commands import Switch
 from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
@@ -30,6 +30,7 @@ from .status_tracker import RESTART_PROOF_TIME, StatusTracker
 from ..mavlink.command_sender import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
+from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.identity import Identity, IdentityQuery
 from ..payload.rate_limit import RateLimit, RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
@@ -56,6 +57,7 @@ class Settings:
         0 for never.
     :param reassert: whether changes by other senders are undone.
     :param sources: of commands, None where all are alike.
+    :param off_on_release: whether a light is switched off when no source holds it any more.
     """
 
     heartbeat_timeout: float = 3.0
@@ -65,6 +67,7 @@ class Settings:
     off_after_silence: float = 0.0
     reassert: bool = False
     sources: SourceSettings | None = None
+    off_on_release: bool = False
 
 
 @dataclass
@@ -141,7 +144,7 @@ class Light:
         self._automatic: _AutomaticSwitch | None = None
         self._undoing = RepeatLimit(
             configuration_manager.REPEATS, configuration_manager.REPEAT_INTERVAL)
-        self._sources = Sources(settings.sources) if settings.sources else None
+        self._sources = LightSources(settings.sources) if settings.sources else None
         self._refreshes: list[_Refresh] = []
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
@@ -389,7 +392,7 @@ class Light:
             self._end_requests(f'held by {change.after}', now)
         self._emit(events.LightHeld(self.address, change))
         if change.after is None:
-            if self._sources.settings.off_on_release:
+            if self.settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
         elif change.cause is not Cause.CLAIM:
@@ -405,7 +408,7 @@ class Light:
             now, CommandStatus.CANCELLED, self.address,
             (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
 
-    def _send_wish(self, sources: Sources, now: float) -> None:
+    def _send_wish(self, sources: LightSources, now: float) -> None:
         """Send what the source that holds the light now has asked for before."""
         holder, wish = sources.holder, sources.wish
 

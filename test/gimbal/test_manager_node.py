@@ -34,7 +34,13 @@ pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
-from geometry_msgs.msg import QuaternionStamped, Twist, TwistWithCovariance, Vector3  # noqa: E402
+from geometry_msgs.msg import (  # noqa: E402
+    QuaternionStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+    Vector3Stamped,
+)
 from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
     MANAGER_PARAMETERS,
     manager_settings,
@@ -42,7 +48,7 @@ from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
 from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from illuminator_ros.ros.parameters import ParameterError  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from sensor_msgs.msg import Imu  # noqa: E402
+from sensor_msgs.msg import Imu, NavSatFix  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbal_manager import DEVICE, OURS  # noqa: E402
@@ -82,7 +88,8 @@ def manager(ros: Ros, port: int, **parameters: Any) -> Iterator[Program]:
 
 
 def trigger(ros: Ros, name: str) -> Trigger.Response:
-    answer: Trigger.Response = ros.call(Trigger, f'{NODE}/{name}', Trigger.Request())
+    answer: Trigger.Response = ros.call(
+        Trigger, f'{NODE}/{name}', Trigger.Request(), node=NODE)
     return answer
 
 
@@ -162,6 +169,58 @@ def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:
         driver = own_ros.publisher(QuaternionStamped, f'{NODE}/device/attitude', NODE)
         eventually(lambda: driver.publish(reported) or any(
             abs(one.quaternion.y - reported.quaternion.y) < 1e-6 for one in attitude.messages))
+
+
+@pytest.mark.timeout(180)
+def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
+        own_ros: Ros) -> None:  # noqa: F811
+    def point(source: str, yaw: float) -> None:
+        own_ros.publisher(Vector3Stamped, f'{NODE}/{source}cmd/angles', NODE).publish(
+            Vector3Stamped(header=VEHICLE, vector=Vector3(z=math.radians(yaw))))
+
+    port = free_port()
+    names = "['safety', 'operator', 'autonomy']"
+    with manager(own_ros, port, sources=names, diagnostics_period=0.1) as program, \
+            device(port) as gimbal:
+        def turned_to(yaw: float) -> bool:
+            return round(math.degrees(gimbal.mount.motion.angles[2])) == -yaw
+
+        source = own_ros.subscribe(String, f'{NODE}/source')
+        source.wait_value('')
+        own_ros.subscribe(Bool, f'{NODE}/connected').wait_value(True)
+        program.wait_for('gimbal 1/154 is managed')
+        assert trigger(own_ros, 'take_control').success
+        point('safety/', 20.0)
+        source.wait_value('safety')
+        eventually(lambda: turned_to(20.0))
+
+        point('autonomy/', 10.0)
+        program.wait_for('~/autonomy/cmd/angles: ignored: held by safety')
+        point('', 5.0)
+        program.wait_for('~/cmd/angles: ignored: held by safety')
+        own_ros.publisher(NavSatFix, f'{NODE}/operator/cmd/roi', NODE).publish(NavSatFix())
+        program.wait_for('~/operator/cmd/roi: ignored: held by safety')
+        for name in ('neutral', 'retract', 'clear_roi', 'release_control'):
+            answer = trigger(own_ros, name)
+            assert (answer.success, answer.message) == (False, 'held by safety'), name
+        assert own_ros.call(SetBool, f'{NODE}/set_yaw_lock', SetBool.Request(
+            data=True)).message == 'held by safety'
+        assert trigger(own_ros, 'take_control').success
+        own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM).wait(lambda array: any(
+            (value.key, value.value) == ('holder', 'safety')
+            for status in array.status for value in status.values))
+        assert turned_to(20.0)
+
+        assert [trigger(own_ros, f'{name}/release').message
+                for name in ('safety', 'operator')] == ['held by operator', 'held by autonomy']
+        program.wait_for('gimbal 1/154 is held by autonomy: operator has released it')
+        point('autonomy/', 10.0)
+        eventually(lambda: turned_to(10.0))
+        assert trigger(own_ros, 'autonomy/release').message == 'held by default'
+        assert trigger(own_ros, 'neutral').success
+        assert trigger(own_ros, 'default/release').message == 'held by no source'
+        source.wait_value('')
+        assert trigger(own_ros, 'release_control').success
 
 
 class Other(Endpoint):

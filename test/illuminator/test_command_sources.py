@@ -19,12 +19,12 @@ from __future__ import annotations
 from collections.abc import Callable
 import random
 
-from illuminator_ros.illuminator.command_sources import SourceSettings
 from illuminator_ros.illuminator.events import LightHeld, WishFailed
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 from illuminator_ros.payload.arbitration import Cause
+from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -43,7 +43,7 @@ class Shared:
                  off_on_release: bool = False, seed: int = 0, **faults: float) -> None:
         self.light = light or FakeLight(brightness=50.0)
         self.pair = Pair(self.light, seed=seed, there=Faults(**faults), settings=Settings(
-            sources=SourceSettings(NAMES, timeout, off_on_release),
+            sources=SourceSettings(NAMES, timeout), off_on_release=off_on_release,
             limits=SafetyLimits(max_brightness=80.0), off_after_silence=SILENCE))
         self.pair.run_until(lambda: self.pair.controller.lights)
 

@@ -24,6 +24,7 @@ from ..events import GimbalKey, GimbalSnapshot
 from ..messages import ErrorFlags, flag_names
 from ...mavlink.command_sender import format_seconds
 from ...payload.mount_attitude import MountFlags
+from ...ros.command_sources import holder_values
 from ...ros.diagnostics import (
     ERROR,
     Finding,
@@ -134,6 +135,7 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, Value]:
         'flags': ', '.join(flag_names(gimbal.flags)),
         'accepts_yaw_in_earth_frame': bool(gimbal.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME),
     }
+    values |= holder_values(gimbal.holder, gimbal.held_since, now)
     if math.isfinite(gimbal.attitude_at):
         values['attitude_s_ago'] = now - gimbal.attitude_at
     if math.isfinite(gimbal.status_at):

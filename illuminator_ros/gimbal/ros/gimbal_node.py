@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import functools
+from typing import Any, TypeVar
 
 from geometry_msgs.msg import QuaternionStamped, Vector3Stamped
 from rclpy.node import Node
@@ -41,6 +42,7 @@ from ..events import (
     ControlChanged,
     GimbalConnected,
     GimbalEvent,
+    GimbalHeld,
     GimbalKey,
     GimbalLost,
     ManagerChanged,
@@ -49,12 +51,15 @@ from ..events import (
 from ..gimbal import Gimbal, GimbalSettings
 from ..messages import ErrorFlags, flag_names
 from ...payload import request
-from ...payload.mount_attitude import MountFlags, YawFrame
-from ...payload.rotation import Quaternion, Vector
+from ...payload.command_sources import DEFAULT, describe
+from ...payload.mount_attitude import MountFlags
+from ...payload.rotation import Vector
+from ...ros.command_sources import prefixes, release_services
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.node import (
     Answer,
+    AnyCommand,
     CommandTopic,
     NodeInterface,
     Publication,
@@ -64,6 +69,8 @@ from ...ros.node import (
 from ...ros.parameter_services import ParameterServices
 from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
+
+T = TypeVar('T')
 
 PUBLICATIONS = (
     Publication('connected', Bool),
@@ -106,23 +113,21 @@ class GimbalNode:
         self._started = host.link.clock()
         self._yaw_lock: bool | None = None
         self._errors = ErrorFlags(0)
-        self._pointing = LatestOnly[Vector](self._point)
-        separation: float = host.values['geoid_separation']
+        self._separation: float = host.values['geoid_separation']
+        sources = settings.sources
+        source_topic = [Publication('source', String)] if sources else []
         self._interface = NodeInterface(
-            node, host.link, log, publications=PUBLICATIONS,
+            node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
             services=(
-                *(RequestService(name, Trigger, functools.partial(self._request, ask))
-                  for name, ask in REQUESTS.items()),
-                RequestService('set_yaw_lock', SetBool, self._set_yaw_lock)),
-            commands=(
-                CommandTopic('cmd/attitude', QuaternionStamped, self._set_attitude,
-                             self._frames.read_attitude),
-                CommandTopic('cmd/angles', Vector3Stamped, self._set_angles,
-                             self._frames.read_angles),
-                CommandTopic('cmd/rate', Vector3Stamped, self._set_rates, read_rates),
-                CommandTopic('cmd/roi', NavSatFix, self._pointing.offer,
-                             lambda message: read_place(message, separation))))
+                *(RequestService(name, Trigger, functools.partial(self._request, name))
+                  for name in REQUESTS),
+                RequestService('set_yaw_lock', SetBool, self._set_yaw_lock),
+                *release_services(sources, self._release)),
+            commands=(topic for way in prefixes(sources).items()
+                      for topic in self._command_topics(*way)))
         ParameterServices(node, host.link, log)
+        if sources:
+            self._interface.publish('source', '')
         self._interface.publish('connected', False)
         self._publish_control(None, False)
         self.source = DiagnosticsSource(node.get_name(), self.full_name, self._look)
@@ -135,6 +140,8 @@ class GimbalNode:
             snapshot = gimbal.snapshot(now)
             self._interface.publish('connected', not snapshot.unreachable)
             self._publish_control(snapshot.control, snapshot.in_control)
+            if snapshot.holder is not None:
+                self._interface.publish('source', snapshot.holder)
             for other in snapshot.managers[1:]:
                 self.take(SecondManager(key, snapshot.managers[0], other))
 
@@ -168,6 +175,9 @@ class GimbalNode:
             self._interface.publish('connected', False)
         elif isinstance(event, ControlChanged):
             self._control_changed(name, event)
+        elif isinstance(event, GimbalHeld):
+            self._log.info(f'{name} {describe(event.change)}', 'holder')
+            self._interface.publish('source', event.change.after or '')
         elif isinstance(event, SecondManager):
             self._log.warning(
                 f'manager {event.other} announces {name} too: only {event.manager} is used, but '
@@ -212,48 +222,75 @@ class GimbalNode:
 
     # Requests
 
-    def _request(
-        self, ask: Callable[[Gimbal, float, request.Done], None], message: Trigger.Request,
-        now: float, answer: Answer,
-    ) -> None:
+    def _release(self, source: str, now: float, answer: Answer) -> None:
         if gimbal := self._gimbal():
-            ask(gimbal, now, lambda result, now: answer(result.success, result.message))
+            answer(True, f'held by {gimbal.release(source, now) or "no source"}')
         else:
             answer(False, self.absence(now))
+
+    def _claimed(self, name: str, now: float, answer: Answer) -> Gimbal | None:
+        """Return the gimbal for a request of the plain interface; answer a refused one."""
+        gimbal = self._gimbal()
+        refusal = self.absence(now) if gimbal is None else _refusal(gimbal, name, now)
+        if refusal:
+            answer(False, refusal)
+        return None if refusal else gimbal
+
+    def _request(self, name: str, message: Trigger.Request, now: float, answer: Answer) -> None:
+        if gimbal := self._claimed(name, now, answer):
+            REQUESTS[name](gimbal, now, lambda result, now: answer(
+                result.success, result.message))
 
     def _set_yaw_lock(self, message: SetBool.Request, now: float, answer: Answer) -> None:
-        if gimbal := self._gimbal():
+        if gimbal := self._claimed('set_yaw_lock', now, answer):
             gimbal.set_yaw_lock(message.data, now, lambda result, now: answer(
                 result.success, result.message))
-        else:
-            answer(False, self.absence(now))
-
-    def _point(self, place: Vector, now: float, ended: Callable[[float], None]) -> None:
-        def done(result: request.Result, now: float) -> None:
-            if not result.success:
-                self._refused('cmd/roi', result.message)
-            ended(now)
-
-        if gimbal := self._gimbal():
-            gimbal.set_roi(*place, now, done)
-        else:
-            done(request.Result(False, self.absence(now)), now)
 
     # Setpoints
 
-    def _set_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
-        gimbal = self._gimbal()
-        self._refused('cmd/attitude', gimbal.set_attitude(*value, now) if gimbal else
-                      self.absence(now))
+    def _command_topics(self, source: str, prefix: str) -> tuple[AnyCommand, ...]:
+        def topic(
+            name: str, type_: type[object], send: Callable[[Gimbal, T, float], str],
+            read: Callable[[Any], T],
+        ) -> CommandTopic[T]:
+            def take(value: T, now: float) -> None:
+                gimbal = self._gimbal()
+                self._refused(f'{prefix}{name}', self.absence(now) if gimbal is None else
+                              gimbal.claim(source, now) or send(gimbal, value, now))
 
-    def _set_angles(self, value: tuple[Vector, YawFrame], now: float) -> None:
-        gimbal = self._gimbal()
-        self._refused('cmd/angles', gimbal.set_angles(*value, now) if gimbal else
-                      self.absence(now))
+            return CommandTopic(f'{prefix}{name}', type_, take, read)
 
-    def _set_rates(self, rates: Vector, now: float) -> None:
+        def point(gimbal: Gimbal, place: Vector, now: float) -> str:
+            pointing.offer(place, now)
+            return ''
+
+        pointing = LatestOnly[Vector](functools.partial(self._point, source, f'{prefix}cmd/roi'))
+        return (
+            topic('cmd/attitude', QuaternionStamped,
+                  lambda gimbal, value, now: gimbal.set_attitude(*value, now),
+                  self._frames.read_attitude),
+            topic('cmd/angles', Vector3Stamped,
+                  lambda gimbal, value, now: gimbal.set_angles(*value, now),
+                  self._frames.read_angles),
+            topic('cmd/rate', Vector3Stamped, Gimbal.set_rates, read_rates),
+            topic('cmd/roi', NavSatFix, point,
+                  lambda message: read_place(message, self._separation)))
+
+    def _point(
+        self, source: str, topic: str, place: Vector, now: float, ended: Callable[[float], None],
+    ) -> None:
+        def done(result: request.Result, now: float) -> None:
+            if not result.success:
+                self._refused(topic, result.message)
+            ended(now)
+
         gimbal = self._gimbal()
-        self._refused('cmd/rate', gimbal.set_rates(rates, now) if gimbal else self.absence(now))
+        # The source may have lost the gimbal while the place before was sent.
+        refusal = gimbal.refusal(source) if gimbal else self.absence(now)
+        if refusal or gimbal is None:
+            done(request.Result(False, refusal), now)
+        else:
+            gimbal.set_roi(*place, now, done)
 
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
@@ -267,3 +304,13 @@ class GimbalNode:
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
             heard=tuple(self._client.gimbals), limit_reached=self._client.limit_reached,
             interval=self._settings.attitude_interval, started=self._started)
+
+
+def _refusal(gimbal: Gimbal, name: str, now: float) -> str:
+    """Claim the gimbal for a request of the plain interface; return why not, '' if claimed."""
+    if name == 'take_control':
+        # A higher source needs the control that only this service takes.
+        return ''
+    if name == 'release_control':
+        return gimbal.refusal_of_claim(DEFAULT)
+    return gimbal.claim(DEFAULT, now)

@@ -29,6 +29,7 @@ from ..client import GimbalClient
 from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
 from ..gimbal import GimbalSettings
 from ...payload.request import Result
+from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.parameters import misspelt, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.throttled_log import NodeLog
@@ -47,13 +48,19 @@ GIMBAL_PARAMETERS = (
     GEOID_SEPARATION,
     ParameterSpec('attitude_interval', 0.0, "period of the attitude; 0 = the device's own", 's',
                   0.0, 3600.0),
+    *SOURCE_PARAMETERS,
 )
 
 
 def settings(values: Values) -> GimbalSettings:
-    """Return how gimbals are treated."""
+    """
+    Return how gimbals are treated.
+
+    :raises ParameterError: if the sources are wrong.
+    """
     return GimbalSettings(values['setpoint_timeout'], values['attitude_interval'],
-                          values['auto_take_control'], values['gimbal_device_id'])
+                          values['auto_take_control'], values['gimbal_device_id'],
+                          source_settings(values))
 
 
 class Gimbals(ServedPayload):

@@ -24,6 +24,7 @@ from ..model import ErrorFlag, flag_names, KNOWN_FLAGS
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.messages import Address
 from ...ros import diagnostics
+from ...ros.command_sources import holder_values
 
 # s without a status from a light that has sent some; one is requested every 2.5 s.
 STATUS_SILENCE = 10.0
@@ -181,9 +182,7 @@ def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Valu
             'uptime_s': status.uptime_ms / 1000.0,
             'status_s_ago': now - light.status_at,
         }
-    if light.holder is not None:
-        values['holder'] = light.holder or 'none'
-        values['held_s'] = now - light.held_since if light.holder else None
+    values |= holder_values(light.holder, light.held_since, now)
     if light.configuration:
         values['agreed'] = light.configuration.describe()
     if identity is not None:

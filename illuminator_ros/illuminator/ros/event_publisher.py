@@ -25,8 +25,7 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 from .diagnostics import FlagLog
 from .. import events, model
-from ..command_sources import DEFAULT
-from ...payload.arbitration import Cause as HolderCause
+from ...payload.command_sources import DEFAULT, describe
 from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import NodeInterface, Publication, STREAM_QOS
@@ -48,12 +47,6 @@ PUBLICATIONS = (
     Publication('temperature', Temperature, STREAM_QOS),
     Publication('connected', Bool),
 )
-# Why a source no longer holds a light.
-_REASONS = {
-    HolderCause.CLAIM: ', which has taken it from {}',
-    HolderCause.RELEASE: ': {} has released it',
-    HolderCause.SILENCE: ': {} was silent for source_timeout',
-}
 # Events that may change a level.
 _DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
               events.ConfigurationChanged, events.ConfigurationRestored, events.LimitExceeded)
@@ -115,8 +108,7 @@ class EventPublisher:
                 log.info(f'{light} was switched {_state(on)} by {way or "a request"}'
                          f'{_left_out(left_out)}', 'switched')
             case events.LightHeld(change=change):
-                reason = _REASONS[change.cause].format(change.before) if change.before else ''
-                log.info(f'{light} is held by {change.after or "no source"}{reason}', 'holder')
+                log.info(f'{light} {describe(change)}', 'holder')
                 self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
                 self._interface.publish('source', change.after or '')
             case events.WishFailed(source=source, message=message):

@@ -29,7 +29,6 @@ from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
 from .event_publisher import EventPublisher, PUBLICATIONS
 from .parameters import BeamGeometry, device_parameters
 from ..client import IlluminatorClient
-from ..command_sources import DEFAULT
 from ..events import AnyLightEvent
 from ..light import Light
 from ..model import checked, InvalidValue, SafetyLimits
@@ -37,6 +36,7 @@ from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...payload.rotation import Quaternion
 from ...ros import node as ros_node
+from ...ros.command_sources import prefixes, release_services
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.parameter_services import ParameterServices
@@ -82,12 +82,13 @@ class LightNode:
         interface = ros_node.NodeInterface(
             node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
             services=(
-                *(self._enable_service(source) for source in self._ways()),
-                *(self._release_service(source) for source in (sources.names if sources else ())),
+                *(self._enable_service(*way) for way in prefixes(sources).items()),
+                *release_services(sources, self._release),
                 ros_node.RequestService('refresh', Trigger, self._refresh, limit=MAX_REFRESHES),
                 *services),
             commands=(
-                *(topic for source in self._ways() for topic in self._command_topics(source)),
+                *(topic for way in prefixes(sources).items()
+                  for topic in self._command_topics(*way)),
                 *commands))
         if sources:
             interface.publish('source', '')
@@ -152,29 +153,20 @@ class LightNode:
 
     # Sources
 
-    def _ways(self) -> dict[str, str]:
-        """Return the prefix of the names of each source's topics and services."""
-        sources = self._client.settings.sources
-        return {DEFAULT: ''} | {
-            name: f'{name}/' for name in (sources.names if sources else ()) if name != DEFAULT}
-
-    def _enable_service(self, source: str) -> ros_node.AnyService:
+    def _enable_service(self, source: str, prefix: str) -> ros_node.AnyService:
         def enable(request: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
             self._request_enable(source, request.data, now, f'{prefix}service', answer)
 
-        prefix = self._ways()[source]
         return ros_node.RequestService(f'{prefix}enable', SetBool, enable)
 
-    def _release_service(self, source: str) -> ros_node.AnyService:
-        def release(request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
-            if light := self._light_or_refusal(now, answer):
-                light.release(source, now)
-                answer(True, f'held by {light.snapshot(now).holder or "no source"}')
+    def _release(self, source: str, now: float, answer: ros_node.Answer) -> None:
+        if light := self._light_or_refusal(now, answer):
+            light.release(source, now)
+            answer(True, f'held by {light.snapshot(now).holder or "no source"}')
 
-        return ros_node.RequestService(f'{source}/release', Trigger, release)
-
-    def _command_topics(self, source: str) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
-        prefix = self._ways()[source]
+    def _command_topics(
+        self, source: str, prefix: str,
+    ) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
         switching = LatestOnly(functools.partial(self._switch, source, prefix))
 
         def enable(on: bool, now: float) -> None:

@@ -18,16 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-import math
 import re
 import reprlib
 
 from rclpy.node import Node
 
-from ..command_sources import DEFAULT, SourceSettings
 from ..light import Settings
 from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ...mavlink.messages import Address
+from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.parameters import (
     declare_read_only,
     given_parameters,
@@ -57,10 +56,7 @@ LIGHT_PARAMETERS = (
     ParameterSpec('off_on_shutdown', False, 'switch the lights off when the node ends'),
     ParameterSpec('restore_configuration', True,
                   'configure a light that has restarted as it was before'),
-    ParameterSpec('sources', [], 'sources of commands, the highest first; empty = all are alike'),
-    ParameterSpec('source_timeout', 0.0,
-                  'silence after which a source loses the light; 0 = never',
-                  's', 0.0, 3600.0),
+    *SOURCE_PARAMETERS,
     ParameterSpec('on_release', 'keep', 'state of a light that no source holds any more',
                   choices=('keep', 'off')),
     ParameterSpec('max_brightness', 100.0, 'limit of the brightness that is sent', '%', 0.0,
@@ -132,29 +128,14 @@ def settings(values: Values) -> Settings:
 
     :raises ParameterError: if the sources are wrong.
     """
+    sources, off = source_settings(values), values['on_release'] == 'off'
+    if off and sources is None:
+        raise ParameterError('on_release: is given, but sources is empty')
     return Settings(values['heartbeat_timeout'], values['status_interval'],
                     values['restore_configuration'],
                     SafetyLimits(values['max_brightness'], values['min_strobe_period']),
                     values['off_after_silence'], values['external_changes'] == 'reassert',
-                    _source_settings(values))
-
-
-def _source_settings(values: Values) -> SourceSettings | None:
-    names = values['sources']
-    timeout, off = values['source_timeout'], values['on_release'] == 'off'
-    if not names:
-        if timeout or off:
-            raise ParameterError(f'{"source_timeout" if timeout else "on_release"}: is given, but '
-                                 'sources is empty')
-        return None
-    for name in names:
-        # Names that a topic may have; the plain commands already use one of them.
-        if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', name) or name == 'cmd':
-            raise ParameterError(f'sources: {reprlib.repr(name)} is not a valid name of a source')
-        if names.count(name) > 1:
-            raise ParameterError(f'sources: {name!r} is given twice')
-    ranked = names if DEFAULT in names else [*names, DEFAULT]
-    return SourceSettings(tuple(ranked), timeout or math.inf, off)
+                    sources, off)
 
 
 def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:

@@ -1,0 +1,62 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sources of the commands to one device, by rank: which of them holds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+from .arbitration import Arbiter, Cause, HolderChanged, Policy
+
+# The source of a request that names none.
+DEFAULT = 'default'
+# Why a source no longer holds a device.
+_REASONS = {
+    Cause.CLAIM: ', which has taken it from {}',
+    Cause.RELEASE: ': {} has released it',
+    Cause.SILENCE: ': {} was silent for source_timeout',
+}
+
+
+@dataclass(frozen=True)
+class SourceSettings:
+    """
+    The sources of commands.
+
+    :param names: the highest first; :data:`DEFAULT` is one of them.
+    :param timeout: s of silence after which a source no longer holds a device; infinity for never.
+    """
+
+    names: tuple[str, ...]
+    timeout: float = math.inf
+
+
+class Sources(Arbiter[str]):
+    """Decides which source holds a device. No I/O."""
+
+    def __init__(self, settings: SourceSettings) -> None:
+        super().__init__(
+            Policy.PRIORITY, settings.names.index, lease=settings.timeout, remembers=True)
+
+    def refusal(self, source: str) -> str:
+        """Return why a source may not command the device, '' if it may."""
+        return '' if source == self.holder else f'held by {self.holder or "no source"}'
+
+
+def describe(change: HolderChanged[str]) -> str:
+    """Return that a device has another holder, and why, for people."""
+    reason = _REASONS[change.cause].format(change.before) if change.before else ''
+    return f'is held by {change.after or "no source"}{reason}'

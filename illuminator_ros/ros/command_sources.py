@@ -1,0 +1,92 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sources of commands in ROS: parameters, names, services and values of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import functools
+import math
+import re
+import reprlib
+
+from std_srvs.srv import Trigger
+
+from .diagnostics import Value
+from .node import Answer, AnyService, RequestService
+from .parameters import ParameterError, ParameterSpec, Values
+from ..payload.command_sources import DEFAULT, SourceSettings
+
+SOURCE_PARAMETERS = (
+    ParameterSpec('sources', [], 'sources of commands, the highest first; empty = all are alike'),
+    ParameterSpec('source_timeout', 0.0,
+                  'silence after which a source loses the device; 0 = never',
+                  's', 0.0, 3600.0),
+)
+
+
+def source_settings(values: Values) -> SourceSettings | None:
+    """
+    Return the sources that :data:`SOURCE_PARAMETERS` give, None if they give none.
+
+    :raises ParameterError: if they are wrong.
+    """
+    names, timeout = values['sources'], values['source_timeout']
+    if not names:
+        if timeout:
+            raise ParameterError('source_timeout: is given, but sources is empty')
+        return None
+    for name in names:
+        # Names that a topic may have; the plain commands already use one of them.
+        if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', name) or name == 'cmd':
+            raise ParameterError(f'sources: {reprlib.repr(name)} is not a valid name of a source')
+        if names.count(name) > 1:
+            raise ParameterError(f'sources: {name!r} is given twice')
+    ranked = names if DEFAULT in names else [*names, DEFAULT]
+    return SourceSettings(tuple(ranked), timeout or math.inf)
+
+
+def prefixes(sources: SourceSettings | None) -> dict[str, str]:
+    """Return by source with what the names of its topics and services begin."""
+    return {DEFAULT: ''} | {
+        name: f'{name}/' for name in (sources.names if sources else ()) if name != DEFAULT}
+
+
+def release_services(
+    sources: SourceSettings | None, release: Callable[[str, float, Answer], None],
+) -> tuple[AnyService, ...]:
+    """
+    Return the service of each source that gives a device back.
+
+    :param release: takes the source and the time, s.
+    """
+    def start(source: str, request: Trigger.Request, now: float, answer: Answer) -> None:
+        release(source, now, answer)
+
+    return tuple(
+        RequestService(f'{source}/release', Trigger, functools.partial(start, source))
+        for source in (sources.names if sources else ()))
+
+
+def holder_values(holder: str | None, since: float, now: float) -> dict[str, Value]:
+    """
+    Return the source that holds a device for /diagnostics.
+
+    :param holder: '' if none does; None without sources.
+    :param since: when that began, s.
+    """
+    if holder is None:
+        return {}
+    return {'holder': holder or 'none', 'held_s': now - since if holder else None}

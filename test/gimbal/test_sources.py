@@ -1,0 +1,183 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Sources of ROS share a gimbal: only the setpoints of the one that holds it are sent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import random
+from typing import Any
+
+from illuminator_ros.gimbal.events import GimbalHeld
+from illuminator_ros.gimbal.messages import GimbalCommand, GimbalManagerSetAttitude
+from illuminator_ros.mavlink.messages import CommandInt, CommandLong
+from illuminator_ros.payload.arbitration import Cause, HolderChanged
+from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
+import pytest
+from support.gimbals import in_control, Rig
+
+NAMES = ('safety', 'operator', 'default', 'autonomy')
+TIMEOUT = 2.0
+VEHICLE = YawFrame.VEHICLE
+# The yaw that each source asks for, rad.
+YAW = {name: 0.1 * (index + 1) for index, name in enumerate(NAMES)}
+
+
+def shared(**fields: Any) -> Rig:
+    return in_control(sources=SourceSettings(NAMES, TIMEOUT), **fields)
+
+
+def point(rig: Rig, source: str) -> str:
+    """Let a source ask for its yaw; return the refusal."""
+    return rig.gimbal.claim(source, rig.now) or rig.gimbal.set_angles(
+        (0.0, 0.0, YAW[source]), VEHICLE, rig.now)
+
+
+def holder(rig: Rig) -> str | None:
+    return rig.gimbal.snapshot(rig.now).holder
+
+
+def asked(rig: Rig, since: float = 0.0) -> set[str]:
+    """Return the sources whose yaw was sent."""
+    return {name for at, one in rig.sent if isinstance(one, GimbalManagerSetAttitude)
+            and at >= since for name, yaw in YAW.items()
+            if abs(from_mavlink(one.q, VEHICLE).euler()[2] - yaw) < 0.01}
+
+
+def test_a_setpoint_of_a_lower_source_is_refused_and_not_sent() -> None:
+    rig = shared()
+
+    refusals = [point(rig, source) for source in ('operator', 'autonomy', 'default')]
+    rig.run(1.0)
+
+    assert refusals == ['', 'held by operator', 'held by operator']
+    assert asked(rig) == {'operator'}
+
+
+def test_a_higher_source_takes_the_gimbal_at_once() -> None:
+    rig = shared()
+    point(rig, 'autonomy')
+    rig.run(0.1)
+
+    assert point(rig, 'safety') == ''
+    taken_at = rig.now
+    rig.run(1.0)
+
+    assert asked(rig, taken_at) == {'safety'}
+    assert [one.change for one in rig.all_of(GimbalHeld)] == [
+        HolderChanged(None, 'autonomy', Cause.CLAIM),
+        HolderChanged('autonomy', 'safety', Cause.CLAIM)]
+
+
+# How safety's hold ends.
+ENDS: dict[Cause, Callable[[Rig], object]] = {
+    Cause.RELEASE: lambda rig: rig.gimbal.release('safety', rig.now),
+    Cause.SILENCE: lambda rig: rig.run(TIMEOUT - 0.9),
+}
+
+
+@pytest.mark.parametrize(('cause', 'end'), ENDS.items())
+def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
+        cause: Cause, end: Callable[[Rig], object]) -> None:
+    rig = shared()
+    point(rig, 'safety')
+    rig.run(1.0)
+    point(rig, 'autonomy')
+    end(rig)
+    rig.run(0.5)
+
+    assert holder(rig) == 'autonomy'
+    assert rig.all_of(GimbalHeld)[-1].change == HolderChanged('safety', 'autonomy', cause)
+    assert asked(rig) == {'safety'}
+    assert point(rig, 'autonomy') == ''
+    assert asked(rig.run(0.1)) == {'safety', 'autonomy'}
+
+
+@pytest.mark.parametrize('end', ENDS.values())
+def test_a_rate_ends_with_the_hold_of_its_source(end: Callable[[Rig], object]) -> None:
+    rig = shared(setpoint_timeout=30.0)
+    rig.gimbal.claim('safety', rig.now)
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.run(1.0)
+    end(rig)
+    rig.run(1.0)
+
+    assert holder(rig) == ''
+    assert [one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)] == [
+        pytest.approx(-0.2), 0.0]
+
+
+def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:
+    rig = shared()
+    rig.managers[0].answers = False
+    rig.gimbal.claim('autonomy', rig.now)
+    rig.gimbal.set_neutral(rig.now, rig.done)
+    rig.gimbal.claim('autonomy', rig.now)
+    rig.gimbal.set_roi(47.0, 8.0, 500.0, rig.now, rig.done)
+    rig.run(0.1)
+    point(rig, 'safety')
+    taken_at = rig.now
+    rig.run(3.0)
+
+    assert [one.success for one in rig.results] == [False, False]
+    assert rig.results[0].message == 'held by safety'
+    assert not [one for at, one in rig.sent if at > taken_at
+                and isinstance(one, CommandLong | CommandInt)
+                and one.command in set(GimbalCommand)]
+
+
+@pytest.mark.parametrize(('source', 'refusal'), [
+    ('safety', ''), ('operator', ''), ('default', 'held by operator')])
+def test_a_check_of_a_claim_gives_no_source_the_gimbal(source: str, refusal: str) -> None:
+    rig = shared()
+    point(rig, 'operator')
+
+    assert rig.gimbal.refusal_of_claim(source) == refusal
+    assert holder(rig) == 'operator'
+
+
+def test_without_sources_all_are_alike() -> None:
+    rig = in_control()
+
+    assert [point(rig, source) for source in NAMES] == [''] * 4
+    assert rig.gimbal.refusal_of_claim('autonomy') == ''
+    assert rig.gimbal.release('autonomy', rig.now) == ''
+    assert holder(rig) is None
+    assert rig.all_of(GimbalHeld) == []
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_only_setpoints_of_the_highest_source_that_claims_the_gimbal_are_sent(seed: int) -> None:
+    draw = random.Random(seed)
+    rig = shared()
+    heard: dict[str, float] = {}
+    for _ in range(60):
+        source = draw.choice(NAMES)
+        heard = {name: at for name, at in heard.items() if rig.now < at + TIMEOUT}
+        if draw.random() < 0.3:
+            rig.gimbal.release(source, rig.now)
+            heard.pop(source, None)
+        else:
+            heard[source] = rig.now
+            highest = min(heard, key=NAMES.index)
+            assert point(rig, source) == ('' if source == highest else f'held by {highest}')
+        highest = min(heard, key=NAMES.index, default='')
+        assert holder(rig) == highest
+        before = rig.now
+        rig.run(draw.choice((0.02, 0.1, 1.0, 2.5)))
+        if source == highest and source in heard and heard[source] == before:
+            assert asked(rig, before) == {source}
