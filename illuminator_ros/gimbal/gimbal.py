@@ -74,6 +74,9 @@ SILENCE_LIMIT = 3.0
 REQUEST_LIMIT = 5.0
 # s after which an attitude is sent again, since the message is not acknowledged.
 REPEATS = (0.2, 0.4, 0.8)
+# s after GIMBAL_MANAGER_STATUS until it is requested, since ArduPilot does not stream it and PX4
+# does each 2 s, and until it shows control no more.
+STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 # Managers of one gimbal; more are ignored.
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
@@ -82,29 +85,6 @@ _STILL = (0.0, 0.0, 0.0)
 # Commands that move a gimbal.
 _MOVES = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, GimbalCommand.DO_SET_ROI_LOCATION,
           GimbalCommand.DO_SET_ROI_NONE)
-
-
-@dataclass
-class _Manager:
-    """One manager of the gimbal; times are s."""
-
-    target: request.Target
-    requests: request.RequestQueue[GimbalManagerStatus]
-    # For changes that the device shows.
-    flag_target: request.Target
-    flag_requests: request.RequestQueue[GimbalDeviceAttitudeStatus]
-    heard_at: float = -math.inf
-    autopilot: int | None = None
-    information: GimbalManagerInformation | None = None
-    control: Control | None = None
-    status_at: float = -math.inf
-
-    @property
-    def queues(self) -> tuple[request.RequestQueue[Any], ...]:
-        return self.requests, self.flag_requests
-
-    def is_heard(self, now: float) -> bool:
-        return now < self.heard_at + SILENCE_LIMIT
 
 
 @dataclass
@@ -125,6 +105,30 @@ class Repetition:
     def finish(self) -> None:
         """Request nothing more: the message has come."""
         self.due = math.inf
+
+
+@dataclass
+class _Manager:
+    """One manager of the gimbal; times are s."""
+
+    target: request.Target
+    requests: request.RequestQueue[GimbalManagerStatus]
+    # For changes that the device shows.
+    flag_target: request.Target
+    flag_requests: request.RequestQueue[GimbalDeviceAttitudeStatus]
+    heard_at: float = -math.inf
+    autopilot: int | None = None
+    information: GimbalManagerInformation | None = None
+    control: Control | None = None
+    status_at: float = -math.inf
+    status_query: Repetition = field(default_factory=Repetition)
+
+    @property
+    def queues(self) -> tuple[request.RequestQueue[Any], ...]:
+        return self.requests, self.flag_requests
+
+    def is_heard(self, now: float) -> bool:
+        return now < self.heard_at + SILENCE_LIMIT
 
 
 @dataclass(frozen=True)
@@ -258,7 +262,8 @@ class Gimbal:
                 if self._settings.attitude_interval:
                     self._interval_query = Repetition()
                 self._emit(GimbalConnected(self.key, self._manager))
-        control = manager.control if manager and self._manager_heard else None
+        control = (manager.control if manager and self._manager_heard
+                   and now < manager.status_at + STATUS_LIMIT else None)
         if control != self._control:
             before, self._control = self._control, control
             self._control_changed(before, control)
@@ -329,6 +334,7 @@ class Gimbal:
         if manager is None:
             return
         manager.status_at, manager.control = now, Control.of(status)
+        manager.status_query = Repetition(now + STATUS_REQUEST_DELAY)
         self._check(now)
         manager.requests.take(request.Report(status, now, has_clock=False), now)
 
@@ -362,7 +368,7 @@ class Gimbal:
         if not self._manager_heard:
             return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
         if self._control is None:
-            return f'manager {self._manager} has sent no GIMBAL_MANAGER_STATUS'
+            return _no_status(self._manager, self._managers[self._manager].status_at, now)
         return '' if self.in_control else f'no control of gimbal {self.key}: {self._control}'
 
     @property
@@ -641,6 +647,10 @@ class Gimbal:
             self._may_take = False
             if self._control.primary is None:
                 self._take_control(now, self._taken_automatically)
+        if manager.status_query.take(now):
+            self._commands.start(Command(
+                self._manager, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerStatus.id),)), now,
+                lambda result, now: None)
         device = self.key.address
         if self._identity_query.take(now):
             self._commands.start(Command(
@@ -679,9 +689,11 @@ class Gimbal:
         deadlines += (queue.next_deadline() for queue in manager.queues)
         if self._manager_heard:
             deadlines.append(manager.heard_at + SILENCE_LIMIT)
+        if self._control is not None:
+            deadlines.append(manager.status_at + STATUS_LIMIT)
         if self._connected:
             deadlines += (self._device_heard_at + SILENCE_LIMIT, self._identity_query.due,
-                          self._interval_query.due)
+                          self._interval_query.due, manager.status_query.due)
             if self._may_take and self._control is not None:
                 return -math.inf
         if self._setpoint is not None and self.in_control:
@@ -710,6 +722,11 @@ def _request(
     return request.Request(
         target, lambda now: change, lambda result, change, status, now: done(result, now),
         now=now, limit=now + REQUEST_LIMIT)
+
+
+def _no_status(manager: Address, status_at: float, now: float) -> str:
+    text = f'manager {manager} has sent no GIMBAL_MANAGER_STATUS'
+    return text if status_at == -math.inf else f'{text} for {format_seconds(now - status_at)}'
 
 
 def _silence(what: str, heard_at: float, now: float) -> str:

@@ -22,12 +22,13 @@ import math
 from illuminator_ros.gimbal.commands import Control
 from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal
-from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand
+from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand, GimbalManagerStatus
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandInt,
     CommandLong,
     MAV_AUTOPILOT_ARDUPILOTMEGA,
+    MavCmd,
     MavResult,
 )
 from illuminator_ros.payload.mount_attitude import MountFlags
@@ -125,6 +126,37 @@ def test_gm_17_lost_control_is_told_and_not_taken_back() -> None:
     rig.managers[0].primary = NONE
     rig.run(10.0)
     assert commands(rig, CONFIGURE) == []
+
+
+def status_requests(rig: Rig) -> int:
+    return sum(one[0] == GimbalManagerStatus.id for one in commands(rig, MavCmd.REQUEST_MESSAGE))
+
+
+def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard() -> None:
+    rig = in_control()
+    assert status_requests(rig) <= 1
+
+    rig.managers[0].reports = False
+    rig.run(5.5)
+    assert rig.gimbal.in_control
+    assert status_requests(rig) >= 2
+    rig.run(0.6)
+
+    assert rig.all_of(ControlChanged)[-1].after is None
+    assert rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now).startswith(
+        'manager 1/1 has sent no GIMBAL_MANAGER_STATUS for 6.')
+    rig.managers[0].reports = True
+    assert rig.run(0.5).gimbal.in_control
+
+
+def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only() -> None:
+    rig = Rig(FakeManager(primary=OURS, streams=False)).run(60.0)
+
+    assert [event.ours for event in rig.all_of(ControlChanged)] == [True]
+    assert status_requests(rig) <= 21
+    rig.managers[0].primary = OTHER
+    rig.run(3.2)
+    assert rig.all_of(ControlChanged)[-1].was_lost
 
 
 def test_control_is_not_known_while_the_manager_is_silent() -> None:

@@ -63,6 +63,7 @@ class FakeManager:
     :ivar results: the results of commands that are not accepted, by MAV_CMD.
     :ivar announces: whether it answers requests for GIMBAL_MANAGER_INFORMATION.
     :ivar reports: whether it sends GIMBAL_MANAGER_STATUS.
+    :ivar streams: whether it does so without a request.
     :ivar applies: whether it does what it accepts.
     :ivar answers: whether it acknowledges commands.
     :ivar received: the setpoints that came.
@@ -75,6 +76,7 @@ class FakeManager:
     results: dict[int, int] = field(default_factory=dict)
     announces: bool = True
     reports: bool = True
+    streams: bool = True
     applies: bool = True
     answers: bool = True
     alive: bool = True
@@ -114,7 +116,7 @@ class FakeManager:
         sent: list[tuple[Address, Message]] = []
         if self.alive and tenth % 10 == 0:
             sent.append((self.address, Heartbeat(2, self.autopilot, 0, 0, 4, 3)))
-        if self.alive and self.reports and tenth % 2 == 0:
+        if self.alive and self.reports and self.streams and tenth % 2 == 0:
             sent.append((self.address, self.status()))
         if self.device_alive:
             if tenth % 10 == 5 and self.device != self.address:
