@@ -275,9 +275,9 @@ def test_rate_is_sent_and_zero_follows_once_after_the_time_out(
     ('cmd/angles', Vector3Stamped(header=Header(frame_id='base_link')),
      "frame_id 'base_link' is neither 'map' nor 'base_link_stabilized'"),
     ('cmd/angles', Vector3Stamped(header=EARTH, vector=Vector3(x=math.inf)),
-     '(inf, 0.0, 0.0) is not finite'),
+     'roll inf rad is beyond 3.1416 rad'),
     ('cmd/rate', Vector3Stamped(vector=Vector3(z=NAN)),
-     '(0.0, 0.0, nan) is not finite')])
+     'yaw rate nan rad/s is not within 6.2832 rad/s')])
 def test_wrong_setpoint_is_refused_with_the_reason(
         topic: str, message: Any, text: str, ros: Ros, gimbal: FakeManager,
         program: Program) -> None:

@@ -36,6 +36,12 @@ FRAME_PARAMETERS = (
 GEOID_SEPARATION = ParameterSpec(
     'geoid_separation', 0.0, 'height of the geoid above the ellipsoid, where the vehicle is', 'm',
     -150.0, 150.0)
+# Of roll, pitch and yaw, rad; a quaternion has no angles beyond. Rounded ones are accepted.
+ANGLE_LIMITS = (math.pi, math.pi / 2, math.pi)
+ANGLE_TOLERANCE = 0.001
+# rad/s, one turn a second: greater ones are likely to be degrees.
+RATE_LIMIT = 2 * math.pi
+_AXES = ('roll', 'pitch', 'yaw')
 
 
 @dataclass(frozen=True)
@@ -86,11 +92,13 @@ class Frames:
         """
         Return roll, pitch and yaw, rad or NaN, and their frame.
 
-        :raises ValueError: if the message has no known frame, or an angle is infinite.
+        :raises ValueError: if the message has no known frame, or an angle is beyond
+            :data:`ANGLE_LIMITS`.
         """
         angles = _vector(message)
-        if any(map(math.isinf, angles)):
-            raise ValueError(f'{angles} is not finite')
+        for axis, angle, limit in zip(_AXES, angles, ANGLE_LIMITS, strict=True):
+            if abs(angle) > limit + ANGLE_TOLERANCE:
+                raise ValueError(f'{axis} {angle:g} rad is beyond {limit:.4f} rad')
         return angles, self.frame(message.header)
 
 
@@ -102,11 +110,12 @@ def read_rates(message: Vector3Stamped) -> Vector:
     """
     Return rates of roll, pitch and yaw, rad/s; the frame is not read.
 
-    :raises ValueError: if one is not finite.
+    :raises ValueError: if one is NaN or beyond :data:`RATE_LIMIT`.
     """
     rates = _vector(message)
-    if not all(map(math.isfinite, rates)):
-        raise ValueError(f'{rates} is not finite')
+    for axis, rate in zip(_AXES, rates, strict=True):
+        if not abs(rate) <= RATE_LIMIT:
+            raise ValueError(f'{axis} rate {rate:g} rad/s is not within {RATE_LIMIT:.4f} rad/s')
     return rates
 
 
