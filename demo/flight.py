@@ -133,7 +133,7 @@ def publish(flight: Flight) -> None:
         else:
             attitude_due += 1 / ATTITUDE_RATE
             imu.publish(Imu(header=header, orientation=rotation(enu_flu(truth.vehicle))))
-            # The gimbal tells where the camera is in base_link.
+            # The orientation of the camera in base_link, as a gimbal publishes it.
             mount.publish(QuaternionStamped(header=header, quaternion=rotation(
                 flip(truth.vehicle.inverse() * truth.camera * LENS))))
     rclpy.try_shutdown()

@@ -206,7 +206,7 @@ def _serve(
         if isinstance(error, OSError) or type(error) is RuntimeError:
             failed = 'cannot start'
         return executable.refuse(f'{failed}: {error}')
-    # All that exists now stays: to look for garbage among it would only hold up an answer.
+    # Existing objects stay: a collector that visits them would only delay answers.
     gc.collect()
     gc.freeze()
     termination.calls(bridge.end)

@@ -49,7 +49,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def option(read: Callable[[str], T]) -> Callable[[str], T]:
-    """Return a reader of settings as argparse takes it, which otherwise hides the reason."""
+    """Return a reader whose ValueError argparse shows; it hides the text of others."""
     def read_option(text: str) -> T:
         try:
             return read(text)

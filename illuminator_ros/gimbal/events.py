@@ -187,7 +187,7 @@ class GimbalSnapshot:
     :param attitude_at: when the last attitude status came, s; -inf if none has.
     :param attitude_problem: why that has no attitude, '' if it has one.
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
-    :param enforces_control: False if the manager is known to obey everyone.
+    :param enforces_control: False if the manager is known to obey components without control.
     :param holder: the source of commands that holds it, '' if none does; None without sources.
     :param held_since: when that began, s.
     """

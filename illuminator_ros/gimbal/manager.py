@@ -158,13 +158,6 @@ class AttitudeReceived:
 
 
 @dataclass(frozen=True)
-class InformationReceived:
-    """The device has said what it is."""
-
-    information: GimbalDeviceInformation
-
-
-@dataclass(frozen=True)
 class AddressShared:
     """A player's address is used by two senders, whose heartbeats differ."""
 
@@ -184,7 +177,7 @@ class ReferenceLost:
 
 ManagerEvent: TypeAlias = (
     StateChanged | ControlChanged | DemandRefused | SetpointClipped | SetpointSent
-    | AttitudeReceived | InformationReceived | AddressShared | ReferenceLost)
+    | AttitudeReceived | AddressShared | ReferenceLost)
 
 
 class GimbalManager(Payload):
@@ -193,7 +186,7 @@ class GimbalManager(Payload):
 
     :param commands: sends everything, from the manager's address.
     :param draw: returns a random number, 0..1.
-    :ivar events: see above.
+    :ivar events: each a :data:`ManagerEvent`.
     :ivar control: who has which kind of control.
     :ivar vehicle: takes the vehicle's state from ROS.
     :ivar model: the abilities of the device.
@@ -268,11 +261,6 @@ class GimbalManager(Payload):
         """Return the other manager of the device that is heard, None if there is none."""
         return self._presence.other
 
-    @property
-    def information(self) -> GimbalDeviceInformation | None:
-        """Return the last GIMBAL_DEVICE_INFORMATION of the device."""
-        return self._information
-
     def status(self, now: float) -> GimbalManagerStatus:
         """Return the message that tells who is in control."""
         setpoint, device = self._setpoint, self._device_status(now)
@@ -311,7 +299,6 @@ class GimbalManager(Payload):
                 self._information = message
                 self._information_due = math.inf
                 self.model = GimbalModel.from_information(message)
-                self.events.emit(InformationReceived(message))
         elif isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
             self._presence.hear_manager(source, message.gimbal_device_id, now)
         elif source == Address(self.address.system, mav.MAV_COMP_ID_AUTOPILOT1):

@@ -50,9 +50,9 @@ from ..payload.simulated import (
 )
 from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 
-# s without an announcement after which a manager no longer is one.
+# s without an announcement after which a component is no longer the manager.
 MANAGER_TIMEOUT = 5.0
-# rad of movement that deserve a line of the view.
+# rad of movement after which the view has another line.
 TRAVEL_STEP = math.radians(15.0)
 
 _degrees = number(-180.0, 180.0)

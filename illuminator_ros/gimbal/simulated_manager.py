@@ -141,7 +141,7 @@ PROFILES = {
     'px4': Profile(
         'PX4 with a gimbal on its outputs: enforces primary control, knows no secondary control '
         'and no device ids, -2 is PX4 itself, -3 compares system and component id separately, '
-        'PITCHYAW takes rates in rad/s, no SET_PITCHYAW, regions of interest from anyone',
+        'PITCHYAW takes rates in rad/s, no SET_PITCHYAW, regions of interest from any component',
         ManagerBehaviour(
             heartbeat_type=MAV_TYPE_QUADROTOR, heartbeat_autopilot=MAV_AUTOPILOT_PX4,
             enforces_roi=False, has_secondary=False, own_is_manager=True, releases_pairs=False,
@@ -150,9 +150,9 @@ PROFILES = {
         Address(1, MAV_COMP_ID_AUTOPILOT1), Capabilities.HAS_RETRACT),
     # AP_Mount.cpp and AP_Mount_Backend.cpp.
     'ardupilot': Profile(
-        'ArduPilot with a gimbal on its outputs: records control and obeys anyone, no secondary '
-        'control, no SET_MANUAL_CONTROL, ignores angles with rates and the angle of one axis, '
-        'reports constant flags and no failures',
+        'ArduPilot with a gimbal on its outputs: records control and obeys any component, no '
+        'secondary control, no SET_MANUAL_CONTROL, ignores angles with rates and the angle of one '
+        'axis, reports constant flags and no failures',
         ManagerBehaviour(
             heartbeat_type=MAV_TYPE_QUADROTOR, heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA,
             enforces_control=False, enforces_roi=False, has_secondary=False,

@@ -22,7 +22,7 @@ import math
 from .messages import Address
 from .transport import Peer
 
-# Components whose way is remembered, and ways for each. Beyond that a message goes to everybody.
+# Components whose way is remembered, and ways for each. Beyond that all peers get a message.
 MAX_ROUTES = 256
 MAX_WAYS = 4
 # s without a frame, after which a way is forgotten.

@@ -239,7 +239,7 @@ class _Reference:
 
 class Feeder:
     """
-    Makes the camera's messages of what ROS knows.
+    Makes messages for the camera from the inputs.
 
     :param send: sends a message.
     :param target: returns the address of the camera.
@@ -265,7 +265,7 @@ class Feeder:
         self._attitudes = {name: _History(settings.attitude_timeout)
                            for name in (Input.IMU, Input.ATTITUDE)}
         self._mounts = _History(settings.attitude_timeout)
-        # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount tells them.
+        # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a publisher.
         self._fixed_mount: Vector | None = (0.0, 0.0, 0.0)
         self._mount_due = math.inf
         self._pair_due = -math.inf
@@ -418,7 +418,7 @@ class Feeder:
 
     @property
     def mount_is_fixed(self) -> bool:
-        """Return whether parameters tell the mount, and not ``~/mount``."""
+        """Return whether the mount is given by parameters, and not by ``~/mount``."""
         return self._fixed_mount is not None
 
     def expect_mount(self) -> None:

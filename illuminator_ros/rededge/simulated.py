@@ -456,7 +456,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             return time.message + now - time.at, Source.INJECTED
         if self.own_gps:
             return self._epoch + now, Source.OWN
-        # A clock that was set goes on.
+        # A clock that was set once keeps running.
         return (self._time.message + now - self._time.at if self._time else now), Source.NONE
 
     def _feedback(self, image: Image, system: int) -> rededge.CameraFeedback:

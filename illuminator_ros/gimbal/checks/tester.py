@@ -43,7 +43,7 @@ MOVE_TIMEOUT = 8.0
 # In which a gimbal that must not move would begin to.
 WATCH_TIME = 1.0
 POLL = 0.1
-# After which a gimbal that passes a pose is away from it.
+# After which a gimbal that only passes a pose has left it.
 SETTLE_TIME = 0.4
 # Degrees.
 TOLERANCE = 3.0
@@ -202,7 +202,7 @@ class GimbalTester(ABC):
 
     @abstractmethod
     async def prepare(self) -> None:
-        """Get into the position to move it."""
+        """Do what must precede setpoints, such as taking control."""
 
     @abstractmethod
     def point(
