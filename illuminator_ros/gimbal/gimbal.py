@@ -266,15 +266,21 @@ class Gimbal:
                    and now < manager.status_at + STATUS_LIMIT else None)
         if control != self._control:
             before, self._control = self._control, control
-            self._control_changed(before, control)
+            self._control_changed(before, control, now)
 
-    def _control_changed(self, before: Control | None, after: Control | None) -> None:
+    def _control_changed(
+        self, before: Control | None, after: Control | None, now: float,
+    ) -> None:
         had, us = self.in_control, self._commands.address
         self.in_control = after is not None and after.primary == us
         if after is None:
-            # The zero that ends a rate is still sent when the manager is heard again.
-            if self._setpoint is not None:
-                self._setpoint.repeats.clear()
+            if (setpoint := self._setpoint) is not None:
+                setpoint.repeats.clear()
+                # The zero that ends a rate is sent now, or when the manager is heard again.
+                target = setpoint.message.target_system, setpoint.message.target_component
+                if (setpoint.zero_at < math.inf and self._manager_heard
+                        and target == self._manager):
+                    self._send_rates(_STILL, now)
         elif not self.in_control:
             self._stop()
         self._emit(ControlChanged(

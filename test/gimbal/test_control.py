@@ -22,7 +22,12 @@ import math
 from illuminator_ros.gimbal.commands import Control
 from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal
-from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand, GimbalManagerStatus
+from illuminator_ros.gimbal.messages import (
+    Capabilities,
+    GimbalCommand,
+    GimbalManagerSetAttitude,
+    GimbalManagerStatus,
+)
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandInt,
@@ -133,16 +138,18 @@ def status_requests(rig: Rig) -> int:
 
 
 def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard() -> None:
-    rig = in_control()
+    rig = in_control(setpoint_timeout=5.0)
     assert status_requests(rig) <= 1
 
     rig.managers[0].reports = False
     rig.run(5.5)
     assert rig.gimbal.in_control
     assert status_requests(rig) >= 2
+    assert rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now) == ''
     rig.run(0.6)
 
     assert rig.all_of(ControlChanged)[-1].after is None
+    assert [one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)] == [-0.1, 0]
     assert rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now).startswith(
         'manager 1/1 has sent no GIMBAL_MANAGER_STATUS for 6.')
     rig.managers[0].reports = True
