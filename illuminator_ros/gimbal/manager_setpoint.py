@@ -90,14 +90,19 @@ class GimbalModel:
 
     @classmethod
     def from_information(cls, message: GimbalDeviceInformation) -> GimbalModel:
-        """Read the message of a device; an axis that it lacks stays at 0."""
+        """
+        Read the message of a device; an axis that it lacks stays at 0.
+
+        An end that is not finite is unknown, and so are both of a range whose ends are swapped.
+        """
         capabilities = Capabilities(message.cap_flags | message.cap_flags2)
 
         def axis(low: float, high: float, flag: Capabilities) -> Range:
             if capabilities and not capabilities & flag:
                 return Range(0.0, 0.0)
-            return Range(-math.inf if math.isnan(low) else low,
-                         math.inf if math.isnan(high) else high)
+            range_ = Range(low if math.isfinite(low) else -math.inf,
+                           high if math.isfinite(high) else math.inf)
+            return range_ if range_.low <= range_.high else Range()
 
         return cls(capabilities, (
             axis(message.roll_min, message.roll_max, Capabilities.HAS_ROLL_AXIS),

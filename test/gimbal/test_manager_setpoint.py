@@ -26,6 +26,7 @@ from illuminator_ros.gimbal.manager_setpoint import (
     Demand,
     direction,
     GeoPoint,
+    GimbalModel,
     mix,
     nudge,
     Range,
@@ -37,6 +38,7 @@ from illuminator_ros.gimbal.manager_setpoint import (
 from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
+from support.gimbal_manager import information
 
 Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
 ANGLES = st.floats(-math.pi, math.pi)
@@ -123,6 +125,16 @@ def test_a_yaw_is_clipped_to_the_nearer_end_of_its_range(
     inside, _ = clip(Quaternion.from_euler(0.0, 0.1, yaw), (Range(), Range(), range_), 0.0)
 
     assert inside.euler() == pytest.approx((0.0, 0.1, limit))
+
+
+@pytest.mark.parametrize(('low', 'high', 'expected'), [
+    (-0.5, 0.4, Range(-0.5, 0.4)), (math.inf, -math.inf, Range()), (0.5, -0.5, Range()),
+    (math.nan, 0.4, Range(high=0.4)), (-0.5, math.inf, Range(low=-0.5))])
+def test_gm_12_the_range_that_a_device_reports_is_unknown_where_it_has_no_meaning(
+        low: float, high: float, expected: Range) -> None:
+    model = GimbalModel.from_information(information(yaw_min=low, yaw_max=high))
+
+    assert model.ranges[2] == expected
 
 
 PLACES = st.tuples(st.floats(-80, 80), st.floats(-180, 180), st.floats(-100, 3000))
