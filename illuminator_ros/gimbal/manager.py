@@ -62,6 +62,7 @@ from .messages import (
     GimbalManagerSetPitchyaw,
     GimbalManagerStatus,
     MAV_TYPE_GIMBAL,
+    NON_MAVLINK_IDS,
 )
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
@@ -291,6 +292,10 @@ class GimbalManager(Payload):
             self._compare_identity(source, message, now)
             if message.type == MAV_TYPE_GIMBAL:
                 self._presence.hear_device(source, now)
+        elif isinstance(message, GimbalDeviceAttitudeStatus | GimbalDeviceInformation) and (
+                message.gimbal_device_id in NON_MAVLINK_IDS):
+            # An autopilot reports a gimbal on its outputs, but is not a gimbal device.
+            return
         elif isinstance(message, GimbalDeviceAttitudeStatus):
             if self._presence.hear_device(source, now):
                 self.take_attitude(message, now)

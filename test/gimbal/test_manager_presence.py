@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 import re
 
@@ -31,12 +32,14 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerInformation,
     GimbalManagerStatus,
 )
-from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult, Message
 import pytest
 from support.gimbal_manager import (
     attitude_status,
+    AUTOPILOT,
     configure,
     DEVICE,
+    information,
     ManagerRig,
     of,
     PILOT,
@@ -195,3 +198,14 @@ def test_a_gimbal_of_another_system_is_not_managed() -> None:
     rig.give(Address(2, 154), attitude_status())
 
     assert rig.manager.state is ManagerState.NO_DEVICE
+
+
+@pytest.mark.parametrize('message', [
+    replace(attitude_status(), gimbal_device_id=1), information(gimbal_device_id=1)])
+def test_an_autopilot_that_reports_a_gimbal_on_its_outputs_is_not_taken_for_a_device(
+        message: Message) -> None:
+    rig = reached(ManagerState.NO_DEVICE)
+
+    rig.give(AUTOPILOT, message)
+
+    assert rig.manager.device is None
