@@ -63,8 +63,11 @@ class VehicleState:
         self._home_altitude: float | None = None
 
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
-        """Take a message of the autopilot."""
+        """Take a message of the autopilot, unless it has values that are not finite."""
         if isinstance(message, Attitude):
+            if not all(map(math.isfinite, (
+                    message.roll, message.pitch, message.yaw, message.yawspeed))):
+                return
             self._attitude.set(Quaternion.from_euler(
                 message.roll, message.pitch, message.yaw), now, link=True)
             self._yaw_rate.set(message.yawspeed, now, link=True)

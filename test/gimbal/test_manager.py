@@ -578,6 +578,17 @@ def test_the_device_learns_the_vehicle_from_an_autopilot_that_knows_no_gimbal() 
     assert Quaternion(*message.q).euler() == pytest.approx((0.0, 0.0, 0.5))
 
 
+@pytest.mark.parametrize('value', [NAN, math.inf])
+@pytest.mark.parametrize('name', ['roll', 'pitch', 'yaw', 'yawspeed'])
+def test_an_attitude_of_the_vehicle_that_is_not_finite_is_ignored(
+        name: str, value: float) -> None:
+    rig = ManagerRig()
+
+    assert rig.give(AUTOPILOT, replace(vehicle_yaw(0.5), **{name: value})) == []
+
+    assert rig.manager.vehicle.heading(rig.now) is None
+
+
 @pytest.mark.parametrize('autopilot_sends', [False, True])
 def test_the_device_learns_the_vehicle_from_ros_where_no_autopilot_tells_it(
         autopilot_sends: bool) -> None:
