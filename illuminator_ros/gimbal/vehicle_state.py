@@ -63,7 +63,7 @@ class VehicleState:
         self._home_altitude: float | None = None
 
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
-        """Take a message of the autopilot, unless it has values that are not finite."""
+        """Take a message of the autopilot, unless its values are not finite, or no position."""
         if isinstance(message, Attitude):
             if not all(map(math.isfinite, (
                     message.roll, message.pitch, message.yaw, message.yawspeed))):
@@ -71,7 +71,8 @@ class VehicleState:
             self._attitude.set(Quaternion.from_euler(
                 message.roll, message.pitch, message.yaw), now, link=True)
             self._yaw_rate.set(message.yawspeed, now, link=True)
-        else:
+        elif message.lat or message.lon:
+            # Autopilots send 0, 0 while they have no fix.
             self._position.set(GeoPoint(
                 message.lat / 1e7, message.lon / 1e7, message.alt / 1e3), now, link=True)
             self._velocity.set(

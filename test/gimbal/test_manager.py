@@ -509,6 +509,7 @@ def test_gm_8_an_altitude_above_home_is_converted() -> None:
 
 def test_gm_8_without_a_position_a_region_of_interest_is_rejected_for_now() -> None:
     rig = in_control()
+    rig.give(AUTOPILOT, position(0.0, 0.0, 0.0))
 
     assert rig.result(PILOT, region(47.1, 8.0, 0.0)) is MavResult.TEMPORARILY_REJECTED
 

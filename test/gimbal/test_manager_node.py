@@ -42,13 +42,14 @@ from geometry_msgs.msg import (  # noqa: E402
     Vector3Stamped,
 )
 from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
+    _read_fix,
     MANAGER_PARAMETERS,
     manager_settings,
 )
 from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from illuminator_ros.ros.parameters import ParameterError  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
-from sensor_msgs.msg import Imu, NavSatFix  # noqa: E402
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbal_manager import DEVICE, OURS  # noqa: E402
@@ -279,3 +280,13 @@ def test_parameters_give_the_settings_of_the_manager() -> None:
 def test_wrong_parameters_are_named(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=name):
         manager_settings({**DEFAULTS, name: value}, OURS)
+
+
+def test_gm_8_a_position_of_the_vehicle_needs_a_fix() -> None:
+    fix = NavSatFix(latitude=47.0, longitude=8.0, altitude=500.0)
+    fix.status.status = NavSatStatus.STATUS_FIX
+    assert _read_fix(fix, 50.0) == (47.0, 8.0, 450.0)
+
+    fix.status.status = NavSatStatus.STATUS_NO_FIX
+    with pytest.raises(ValueError, match='no fix'):
+        _read_fix(fix, 50.0)

@@ -22,7 +22,7 @@ import math
 
 from geometry_msgs.msg import QuaternionStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, NavSatFix
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
 from .conversions import Frames, quaternion_message, read_place
@@ -146,7 +146,7 @@ class ManagerNode(ServedPayload):
             CommandTopic('imu', Imu, self._take_imu, _read_imu),
             CommandTopic('odometry', Odometry, self._take_odometry, _read_odometry),
             CommandTopic('fix', NavSatFix, self._take_place,
-                         lambda message: read_place(message, separation))]
+                         lambda message: _read_fix(message, separation))]
         if not self._manager.has_mavlink:
             topics.append(CommandTopic(
                 'device/attitude', QuaternionStamped, self._take_attitude,
@@ -300,6 +300,13 @@ def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
     rotation = Quaternion(q.w, q.x, q.y, q.z).normalized()
     velocity = enu_ned(rotation.rotate((linear.x, linear.y, linear.z)))
     return ned_frd(rotation), -float(message.twist.twist.angular.z), velocity
+
+
+def _read_fix(message: NavSatFix, geoid_separation: float) -> Vector:
+    """Return the place of a message; ValueError if it has no fix."""
+    if message.status.status < NavSatStatus.STATUS_FIX:
+        raise ValueError(f'no fix (status {message.status.status})')
+    return read_place(message, geoid_separation)
 
 
 def _make(commands: CommandSender, values: Values) -> ManagerWithClient:
