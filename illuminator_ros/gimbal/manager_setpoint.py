@@ -323,7 +323,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
 
 def stopped(setpoint: Setpoint, now: float) -> Setpoint:
     """Return the setpoint that ends the motion of another one."""
-    if setpoint.is_pose or not setpoint.moves:
+    if setpoint.is_pose:
         return setpoint
     attitude = setpoint.at(now)
     return replace(setpoint, attitude=attitude, turning=STILL, since=now,

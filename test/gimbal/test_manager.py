@@ -251,6 +251,21 @@ def test_gm_16_the_gimbal_stays_where_it_points_when_its_player_falls_silent() -
         Role.PRIMARY, PILOT, None, Cause.SILENCE)
 
 
+@pytest.mark.parametrize('message', [
+    GimbalManagerSetAttitude(*OURS, 0, 0, (1.0, 0.0, 0.0, 0.0), NAN, NAN, 1.0),
+    pitch_yaw(0.1, 0.2, yaw_rate=1.0)])
+def test_gm_16_the_rates_beside_an_attitude_end_with_the_control_of_their_player(
+        message: Any) -> None:
+    rig = in_control()
+    rig.give(PILOT, message)
+    pointed = euler(last(rig))
+
+    rig.give(PILOT, configure(-3, -3))
+
+    assert last(rig).angular_velocity_z == pytest.approx(NAN, nan_ok=True)
+    assert euler(last(rig)) == pointed
+
+
 # Setpoints
 
 def test_a_setpoint_is_repeated_at_least_once_a_second() -> None:
