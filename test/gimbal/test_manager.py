@@ -597,7 +597,7 @@ def test_the_device_learns_the_vehicle_from_an_autopilot_that_knows_no_gimbal() 
 @pytest.mark.parametrize('value', [NAN, math.inf])
 @pytest.mark.parametrize('name', ['roll', 'pitch', 'yaw', 'yawspeed'])
 def test_an_attitude_of_the_vehicle_that_is_not_finite_is_ignored(
-        name: str, value: float) -> None:
+        name: str, value: Any) -> None:
     rig = ManagerRig()
 
     assert rig.give(AUTOPILOT, replace(vehicle_yaw(0.5), **{name: value})) == []
