@@ -19,14 +19,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import math
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
+from illuminator_ros.gimbal.manager import DemandRefused, GimbalManager, ManagerSettings
+from illuminator_ros.gimbal.manager_control import ControlChanged, Role
+from illuminator_ros.gimbal.manager_presence import ManagerState, StateChanged
 from illuminator_ros.gimbal.messages import GimbalManagerStatus
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url
+from illuminator_ros.payload.arbitration import Cause
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 import pytest
 
@@ -45,10 +52,13 @@ from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
     _read_fix,
     MANAGER_PARAMETERS,
     manager_settings,
+    ManagerNode,
 )
 from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from illuminator_ros.ros.parameters import ParameterError  # noqa: E402
+from illuminator_ros.ros.throttled_log import BURST, MAX_KINDS, NodeLog  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
+from rclpy.logging import get_logger  # noqa: E402
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
@@ -290,3 +300,21 @@ def test_gm_8_a_position_of_the_vehicle_needs_a_fix() -> None:
     fix.status.status = NavSatStatus.STATUS_NO_FIX
     with pytest.raises(ValueError, match='no fix'):
         _read_fix(fix, 50.0)
+
+
+def test_no_player_floods_the_log_or_holds_back_the_error_about_another_manager(
+        capfd: pytest.CaptureFixture[str]) -> None:
+    node: Any = SimpleNamespace(
+        _log=NodeLog(get_logger('node'), lambda: 0.0), _host=Mock(),
+        _manager=GimbalManager(CommandSender(OURS), ManagerSettings()))
+    for number in range(2 * MAX_KINDS):
+        player = Address(1 + number // 100, 1 + number % 100)
+        ManagerNode._take(node, DemandRefused(player, 'reason', 0))
+        ManagerNode._take(node, ControlChanged(Role.PRIMARY, None, player, Cause.CLAIM, player))
+
+    ManagerNode._state_changed(node, StateChanged(
+        ManagerState.ACTIVE, ManagerState.INACTIVE, 154, DEVICE, Address(1, 191)))
+
+    lines = ''.join(capfd.readouterr()).splitlines()
+    assert len(lines) == 2 * BURST + 1
+    assert any('1/191 manages gimbal 1/154 too' in line for line in lines)

@@ -183,11 +183,11 @@ class ManagerNode(ServedPayload):
         elif isinstance(event, StateChanged):
             self._state_changed(event)
         elif isinstance(event, ControlChanged):
-            self._log.info(_control_text(event, self._manager.settings.control.lease))
+            self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
         elif isinstance(event, DemandRefused):
             more = f' ({event.unreported} more)' if event.unreported else ''
             self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}{more}',
-                              f'refused {event.player}')
+                              'refused')
         elif isinstance(event, SetpointClipped):
             for one in event.clipped:
                 self._log.warning(
