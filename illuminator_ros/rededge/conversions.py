@@ -55,6 +55,29 @@ class MountFrame(Enum):
     OPTICAL = 'optical'
 
 
+class MountParent(Enum):
+    """The frame in which ``~/mount`` has the camera, by its usual ``frame_id``."""
+
+    VEHICLE = 'base_link'
+    # Level, with the vehicle's heading.
+    LEVEL = 'base_link_stabilized'
+    EARTH = 'map'
+
+    @classmethod
+    def of(cls, frame_id: str) -> MountParent:
+        """
+        Return the frame that a ``frame_id`` names, with or without a prefix and a slash.
+
+        :raises ValueError: if it is another one; '' is the vehicle's.
+        """
+        name = frame_id.rpartition('/')[2]
+        for parent in cls:
+            if name in (parent.value, '' if parent is cls.VEHICLE else parent.value):
+                return parent
+        known = ', '.join(one.value for one in cls)
+        raise ValueError(f'frame_id {frame_id!r} is not one of {known}')
+
+
 @dataclass(frozen=True)
 class Field:
     """
@@ -280,6 +303,20 @@ def interpolate(one: Quaternion, other: Quaternion, share: float) -> Quaternion:
 _ZERO_POSE = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
 # Coordinates in the frame with x out of the lens, from those in the optical frame.
 _FROM_OPTICAL = Quaternion(0.5, -0.5, 0.5, -0.5)
+
+
+def in_vehicle(mount: Quaternion, parent: MountParent, vehicle: Quaternion) -> Quaternion:
+    """
+    Return the orientation of the camera's frame in ``base_link``.
+
+    :param mount: its orientation in another frame, of norm 1.
+    :param vehicle: orientation of ``base_link`` in ENU, of norm 1.
+    """
+    if parent is MountParent.VEHICLE:
+        return mount
+    if parent is MountParent.LEVEL:
+        mount = Quaternion.from_euler(0.0, 0.0, vehicle.euler()[2]) * mount
+    return vehicle.inverse() * mount
 
 
 def mount_angles(mount: Quaternion, frame: MountFrame) -> Vector:

@@ -30,7 +30,7 @@ import math
 from typing import NamedTuple
 
 from . import conversions
-from .conversions import FIRST_UTC, LAST_UTC, MountFrame, Position
+from .conversions import FIRST_UTC, LAST_UTC, MountFrame, MountParent, Position
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message
 from ..payload.rotation import Quaternion, Vector
@@ -163,6 +163,12 @@ class FeederSnapshot:
     positions: int
     attitudes: int
 
+    @property
+    def lacking(self) -> list[Sequence[Input]]:
+        """Return the groups of which no input can be used."""
+        return [group for group in self.needed
+                if all(self.inputs[name].state is not InputState.OK for name in group)]
+
 
 @dataclass
 class _Tracker:
@@ -265,6 +271,7 @@ class Feeder:
         self._attitudes = {name: _History(settings.attitude_timeout)
                            for name in (Input.IMU, Input.ATTITUDE)}
         self._mounts = _History(settings.attitude_timeout)
+        self._mount_parent = MountParent.VEHICLE
         # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a publisher.
         self._fixed_mount: Vector | None = (0.0, 0.0, 0.0)
         self._mount_due = math.inf
@@ -406,9 +413,19 @@ class Feeder:
         if self._take(name, now, take):
             self._send_pair(now)
 
-    def take_mount(self, orientation: Quaternion, stamp: Stamp, now: float) -> None:
-        """Take the orientation of the camera in ``base_link``; the mount is then not fixed."""
+    def take_mount(
+        self, orientation: Quaternion, frame_id: str, stamp: Stamp, now: float,
+    ) -> None:
+        """
+        Take the orientation of the camera; the mount is then not fixed.
+
+        :param frame_id: the frame in which it is, see :class:`~.conversions.MountParent`.
+        """
         def take() -> None:
+            parent = MountParent.of(frame_id)
+            if parent is not self._mount_parent:
+                self._mount_parent = parent
+                self._mounts.samples.clear()
             _check_age(stamp, self._settings.attitude_timeout)
             self._mounts.add(_Sample(stamp.time, orientation.normalized(), UNKNOWN))
 
@@ -445,12 +462,15 @@ class Feeder:
             if not (self._is_fresh(Input.MOUNT, now) and self._mounts.samples):
                 return
             time = min(time, self._mounts.samples[-1].time)
-            if (mount := self._mounts.at(time)) is None:
-                return
-            angles = conversions.mount_angles(mount.rotation, self._settings.mount_frame)
-        sample = history.at(time)
+        mount, sample = self._mounts.at(time), history.at(time)
         if sample is None or time <= self._pair_time:
             return
+        if angles is None:
+            if mount is None:
+                return
+            angles = conversions.mount_angles(
+                conversions.in_vehicle(mount.rotation, self._mount_parent, sample.rotation),
+                self._settings.mount_frame)
         self._pair_time = time
         interval = 1 / self._settings.attitude_rate
         self._pair_due = max(self._pair_due + interval, now + interval / 2)

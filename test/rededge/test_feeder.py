@@ -25,7 +25,7 @@ from typing import Any
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Quaternion, Vector
-from illuminator_ros.rededge.conversions import MountFrame, Position
+from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
 from illuminator_ros.rededge.feeder import (
     Feeder,
     FeederSettings,
@@ -76,8 +76,9 @@ class Rig:
         self.feeder.take_attitude(name, orientation, RATES, self.stamp(age), self.now)
         return self.take()
 
-    def mount(self, orientation: Quaternion = NADIR, age: float = 0.0) -> list[Message]:
-        self.feeder.take_mount(orientation, self.stamp(age), self.now)
+    def mount(self, orientation: Quaternion = NADIR, age: float = 0.0,
+              frame_id: str = 'base_link') -> list[Message]:
+        self.feeder.take_mount(orientation, frame_id, self.stamp(age), self.now)
         return self.take()
 
     def reference(self, utc: float) -> None:
@@ -328,6 +329,34 @@ def test_a_mount_that_moves_is_sent_with_the_attitude_of_the_same_instant_re_26(
         # Pan of a camera that looks down is its roll; yaw from north is 90 degrees less.
         assert math.degrees(one.yaw) - 90 + other.pointing_b / 100 == pytest.approx(0, abs=0.02)
         assert (other.pointing_a, other.pointing_c) == (0, 0)
+
+
+@pytest.mark.parametrize('frame_id', ['', 'boat/base_link', 'base_link_stabilized', 'map'])
+def test_a_mount_in_any_frame_of_a_gimbal_is_sent_relative_to_the_vehicle_re_24(
+        frame_id: str) -> None:
+    rig = Rig(mount_frame=MountFrame.CAMERA)
+    vehicle = Quaternion.from_euler(0.2, -0.3, 2.0)
+    mount = Quaternion.from_euler(0.1, 1.2, 0.5)
+    seen = {'map': vehicle * mount, 'base_link_stabilized':
+            Quaternion.from_euler(0, 0, -2.0) * vehicle * mount}.get(frame_id, mount)
+    rig.mount(seen, frame_id=frame_id)
+    _, sent = rig.imu(vehicle)
+    assert isinstance(sent, MountStatus)
+    assert (sent.pointing_b, sent.pointing_a, sent.pointing_c) == tuple(
+        round(100 * angle) for angle in mount_angles(mount, MountFrame.CAMERA))
+
+
+def test_a_mount_in_an_unknown_frame_is_refused_and_frames_are_not_mixed() -> None:
+    rig = Rig(mount_frame=MountFrame.CAMERA)
+    rig.mount(frame_id='camera_link')
+    assert rig.state(Input.MOUNT) == (
+        InputState.REFUSED, "frame_id 'camera_link' is not one of base_link, "
+        'base_link_stabilized, map')
+    rig.mount(age=0.1)
+    rig.run(0.1)
+    # Between two mounts in different frames, none is known.
+    rig.mount(frame_id='map')
+    assert rig.imu(age=0.05) == []
 
 
 @pytest.mark.parametrize('expected', [Rig.mount, lambda rig: rig.feeder.expect_mount()])

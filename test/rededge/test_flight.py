@@ -99,7 +99,7 @@ class Rig:
         feeder.take_attitude(
             Input.IMU, enu_flu(truth.vehicle), UNKNOWN, self.stamp(time), now)
         feeder.take_mount(
-            flip(truth.vehicle.inverse() * truth.camera * LENS),
+            flip(truth.vehicle.inverse() * truth.camera * LENS), 'base_link',
             self.stamp(time), now)
 
     def events(self) -> Iterator[tuple[float, int]]:

@@ -28,7 +28,7 @@ from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 
-from .diagnostics import reports
+from .diagnostics import reports, topics
 from .inputs import subscriptions
 from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
 from ..client import RedEdgeClient, Settings
@@ -123,7 +123,16 @@ class CameraNode(ServedPayload):
         self._client.camera.ping(now, answer)
 
     def _capture(self, shot: Shot) -> Callable[[Trigger.Request, float, Answer], None]:
-        return lambda request, now, answer: self._client.camera.capture(shot, now, answer)
+        def capture(request: Trigger.Request, now: float, answer: Answer) -> None:
+            def done(success: bool, message: str) -> None:
+                lacking = self._client.feeder.snapshot(self._host.link.clock()).lacking
+                if success and lacking:
+                    message += f', without {", ".join(map(topics, lacking))}'
+                answer(success, message)
+
+            self._client.camera.capture(shot, now, done)
+
+        return capture
 
     def _check(self, name: str, value: object) -> None:
         self._parameters.specs[name].check(value)
@@ -133,7 +142,8 @@ class CameraNode(ServedPayload):
     ) -> None:
         feeder = self._client.feeder
         if not feeder.mount_is_fixed:
-            answer('the mount is not fixed: ~/mount has a publisher')
+            answer('the mount is not fixed: ~/mount has or had a publisher; restart the node for '
+                   'a fixed one')
             return
         node, specs = self._host.node, self._parameters.specs
         angles = {name: specs[name].check(changes.get(name, node.get_parameter(name).value))

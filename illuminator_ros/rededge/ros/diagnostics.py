@@ -88,11 +88,12 @@ def input_findings(feeder: FeederSnapshot) -> list[Finding]:
                 break
         else:
             if group in feeder.needed:
-                findings.append((WARN, f'nothing received on {_topics(group)}'))
+                findings.append((WARN, f'nothing received on {topics(group)}'))
     return findings
 
 
-def _topics(names: Sequence[Input]) -> str:
+def topics(names: Sequence[Input]) -> str:
+    """Return the topics of inputs of which one is needed, for people."""
     return ' or '.join(f'~/{name.value}' for name in names)
 
 
