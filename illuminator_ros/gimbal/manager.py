@@ -262,6 +262,11 @@ class GimbalManager(Payload):
         """Return the other manager of the device that is heard, None if there is none."""
         return self._presence.other
 
+    @property
+    def obstacle(self) -> str:
+        """Return why the device is not managed, for people; '' if it is."""
+        return self._presence.obstacle
+
     def status(self, now: float) -> GimbalManagerStatus:
         """Return the message that tells who is in control."""
         setpoint, device = self._setpoint, self._device_status(now)

@@ -30,6 +30,8 @@ MANAGER_TIMEOUT = 3.0
 # s for which a manager listens for others: at least, and at random more, so that of two that begin
 # together one announces the device first. Their addresses may be equal.
 LISTENING_TIME, RANDOM_TIME = 2.0, 2.0
+# Other gimbal devices that are named where the manager's own is not heard.
+MAX_OTHER_DEVICES = 8
 
 
 class ManagerState(Enum):
@@ -106,6 +108,7 @@ class Presence:
         self.other: Address | None = None
         self._address = address
         self._wanted = device_id
+        self._other_devices: set[Address] = set()
         self._changed = changed
         self._draw = draw
         self._device_heard = self._other_heard = -math.inf
@@ -120,6 +123,19 @@ class Presence:
     def device_id(self) -> int:
         """Return the id of the device, 0 while none is known."""
         return self.device.component if self.device else self._wanted
+
+    @property
+    def obstacle(self) -> str:
+        """Return why the device is not managed, for people; '' if it is."""
+        if self.state is ManagerState.INACTIVE:
+            return f'{self.other} manages gimbal {self.device or self.device_id} too'
+        if self.state is ManagerState.LISTENING:
+            return 'the manager listens for other managers'
+        if self.state is ManagerState.ACTIVE:
+            return ''
+        device = f'gimbal device {self._wanted}' if self._wanted else 'a gimbal device'
+        others = ', '.join(map(str, sorted(self._other_devices)))
+        return f'{device} has not been heard' + (f'; heard: {others}' if others else '')
 
     def link_opened(self, now: float) -> None:
         """Note that messages can be sent."""
@@ -136,6 +152,8 @@ class Presence:
         if (not self.has_mavlink or source.system != self._address.system
                 or self._wanted not in (0, source.component)
                 or self.device not in (None, source)):
+            if len(self._other_devices) < MAX_OTHER_DEVICES:
+                self._other_devices.add(source)
             return False
         self.device, self._device_heard = source, now
         self._take(ManagerInput.DEVICE_HEARD, now)

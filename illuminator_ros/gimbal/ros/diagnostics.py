@@ -45,14 +45,17 @@ _CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags
                | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER)
 
 
-def why_no_gimbal(link: LinkSnapshot, heard: Sequence[GimbalKey]) -> str:
+def why_no_gimbal(link: LinkSnapshot, heard: Sequence[GimbalKey], known: str) -> str:
     """
     Return why a node has no gimbal, for people.
 
     :param heard: the gimbals that other nodes serve, or that are not connected.
+    :param known: the reason that a manager in this process gives, else ''.
     """
     if link.state.failure:
         return link.state.failure
+    if known and link.state.traffic.frames_received:
+        return known
     if heard:
         return f'gimbals {", ".join(map(str, heard))} are announced, none is connected or selected'
     return ('no component announces a gimbal: '
@@ -61,18 +64,20 @@ def why_no_gimbal(link: LinkSnapshot, heard: Sequence[GimbalKey]) -> str:
 
 def reports(
     link: LinkSnapshot, *, gimbal: GimbalSnapshot | None, heard: Sequence[GimbalKey],
-    limit_reached: bool, interval: float, started: float,
+    known: str, limit_reached: bool, interval: float, started: float,
 ) -> list[Report]:
     """
     Return the reports of a node.
 
     :param gimbal: the node's gimbal, None if there is none yet.
+    :param known: see :func:`why_no_gimbal`.
     :param interval: s between attitudes as it was requested, 0 for the device's own.
     :param started: when the node was started, s on the link's clock.
     """
     manager = gimbal.managers[0] if gimbal else None
     findings = link_findings(
-        link, manager, what='gimbal', absence=why_no_gimbal(link, heard), started=started)
+        link, manager, what='gimbal', absence=why_no_gimbal(link, heard, known),
+        started=started)
     if limit_reached:
         findings.append((WARN, f'more than {len(heard)} gimbals, some ignored'))
     made = [link_report(link, manager, findings, {'gimbals': len(heard)})]

@@ -100,7 +100,7 @@ class GimbalNode:
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
-        settings: GimbalSettings,
+        settings: GimbalSettings, why_none: Callable[[], str],
     ) -> None:
         self.full_name = node.get_fully_qualified_name()
         self.key: GimbalKey | None = None
@@ -108,6 +108,7 @@ class GimbalNode:
         self._log = log
         self._client = client
         self._settings = settings
+        self._why_none = why_none
         self._frames = Frames.of(host.values)
         self._clock = node.get_clock()
         self._started = host.link.clock()
@@ -154,7 +155,8 @@ class GimbalNode:
     def absence(self, now: float) -> str:
         """Return why there is no gimbal, for people."""
         link = self._host.diagnostics.look(now)
-        return f'no gimbal connected: {why_no_gimbal(link, tuple(self._client.gimbals))}'
+        reason = why_no_gimbal(link, tuple(self._client.gimbals), self._why_none())
+        return f'no gimbal connected: {reason}'
 
     def _gimbal(self) -> Gimbal | None:
         return self._client.gimbals.get(self.key) if self.key else None
@@ -302,7 +304,8 @@ class GimbalNode:
         gimbal = self._gimbal()
         return functools.partial(
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
-            heard=tuple(self._client.gimbals), limit_reached=self._client.limit_reached,
+            heard=tuple(self._client.gimbals), known=self._why_none(),
+            limit_reached=self._client.limit_reached,
             interval=self._settings.attitude_interval, started=self._started)
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 import functools
 import logging
 import math
@@ -67,15 +67,20 @@ class Gimbals(ServedPayload):
     """
     Gives each gimbal on the link a node; for the link's thread.
 
+    :param why_none: returns why there is no gimbal, as far as this process knows; '' if not.
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, client: GimbalClient, host: Host) -> None:
+    def __init__(
+        self, client: GimbalClient, host: Host, why_none: Callable[[], str] = lambda: '',
+    ) -> None:
         self._client = client
         self._host = host
         self._settings = settings(host.values)
         self._name = host.node.get_name()
-        self._first = GimbalNode(host.node, host, host.log, client, self._settings)
+        self._why_none = why_none
+        self._first = GimbalNode(
+            host.node, host, host.log, client, self._settings, why_none)
         self._nodes: dict[GimbalKey, GimbalNode] = {}
         # The names of the nodes of further gimbals.
         self._names: dict[GimbalKey, str] = {}
@@ -110,7 +115,8 @@ class Gimbals(ServedPayload):
     def _serve_further(self, key: GimbalKey, node: Node) -> None:
         """Give the node of a further gimbal its interface; in the thread that makes nodes."""
         log = NodeLog(node.get_logger())
-        gimbal_node = GimbalNode(node, self._host, log, self._client, self._settings)
+        gimbal_node = GimbalNode(node, self._host, log, self._client, self._settings,
+                                 self._why_none)
         for warning in misspelt(node):
             log.warning(warning)
         self._host.log.info(f'gimbal {key} is served by {gimbal_node.full_name}', 'served')

@@ -129,7 +129,7 @@ class ManagerNode(ServedPayload):
         self._log = host.log
         self._frames = Frames.of(host.values)
         self._clock = host.node.get_clock()
-        self._gimbals = Gimbals(both.client, host)
+        self._gimbals = Gimbals(both.client, host, lambda: manager.obstacle)
         self._interface = NodeInterface(
             host.node, host.link, host.log,
             publications=() if manager.has_mavlink else (
