@@ -48,8 +48,11 @@ from geometry_msgs.msg import (  # noqa: E402
     Vector3,
     Vector3Stamped,
 )
+from illuminator_ros.gimbal.ros.conversions import read_place  # noqa: E402
 from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
     _read_fix,
+    _read_imu,
+    _read_odometry,
     MANAGER_PARAMETERS,
     manager_settings,
     ManagerNode,
@@ -318,3 +321,18 @@ def test_no_player_floods_the_log_or_holds_back_the_error_about_another_manager(
     lines = ''.join(capfd.readouterr()).splitlines()
     assert len(lines) == 2 * BURST + 1
     assert any('1/191 manages gimbal 1/154 too' in line for line in lines)
+
+
+@pytest.mark.parametrize('value', [1e39, -math.inf])
+def test_values_of_the_vehicle_beyond_all_limits_are_refused(value: float) -> None:
+    upright = QuaternionMessage(w=1.0)
+    odometries = [Odometry(twist=TwistWithCovariance(twist=twist)) for twist in (
+        Twist(linear=Vector3(y=value)), Twist(angular=Vector3(z=value)))]
+    for odometry in odometries:
+        odometry.pose.pose.orientation = upright
+        with pytest.raises(ValueError, match='is beyond'):
+            _read_odometry(odometry)
+    with pytest.raises(ValueError, match='is beyond'):
+        _read_imu(Imu(orientation=upright, angular_velocity=Vector3(z=value)))
+    with pytest.raises(ValueError, match='is not a place'):
+        read_place(NavSatFix(latitude=47.0, longitude=8.0, altitude=value), 0.0)

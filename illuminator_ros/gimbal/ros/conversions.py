@@ -41,6 +41,8 @@ ANGLE_LIMITS = (math.pi, math.pi / 2, math.pi)
 ANGLE_TOLERANCE = 0.001
 # rad/s, one turn a second: greater ones are likely to be degrees.
 RATE_LIMIT = 2 * math.pi
+# m; float32, the type of MAVLink, does not have all greater ones.
+ALTITUDE_LIMIT = 100e3
 _AXES = ('roll', 'pitch', 'yaw')
 
 
@@ -127,7 +129,8 @@ def read_place(message: NavSatFix, geoid_separation: float) -> Vector:
     :raises ValueError: if the message does not have a place.
     """
     place = message.latitude, message.longitude, message.altitude
-    if not (abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0 and math.isfinite(place[2])):
+    if not (abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0
+            and abs(place[2]) <= ALTITUDE_LIMIT):
         raise ValueError('latitude {:g}, longitude {:g}, altitude {:g} is not a place'.format(
             *place))
     return place[0], place[1], place[2] - geoid_separation

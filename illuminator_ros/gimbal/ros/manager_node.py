@@ -20,6 +20,7 @@ from collections.abc import Hashable, Mapping
 import functools
 import math
 
+from geometry_msgs.msg import Quaternion as QuaternionMessage
 from geometry_msgs.msg import QuaternionStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
@@ -55,6 +56,8 @@ from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 # The name of ROS in the lists of players.
 ROS = 'ros'
+# Of a vehicle, rad/s and m/s.
+VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
 _AXES = ('roll', 'pitch', 'yaw')
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
 
@@ -289,17 +292,28 @@ def _read_imu(message: Imu) -> tuple[Quaternion, float]:
     """Return the attitude and the yaw rate, NED and FRD; ValueError if there is none."""
     if message.orientation_covariance[0] == -1:
         raise ValueError('the message has no orientation')
-    q = message.orientation
-    return (ned_frd(Quaternion(q.w, q.x, q.y, q.z).normalized()),
-            -float(message.angular_velocity.z))
+    return _read_rotation(message.orientation), -_within(
+        message.angular_velocity.z, VEHICLE_RATE_LIMIT)
 
 
 def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
     """Return attitude, yaw rate and velocity, NED and FRD; the twist has the child's frame."""
-    q, linear = message.pose.pose.orientation, message.twist.twist.linear
-    rotation = Quaternion(q.w, q.x, q.y, q.z).normalized()
-    velocity = enu_ned(rotation.rotate((linear.x, linear.y, linear.z)))
-    return ned_frd(rotation), -float(message.twist.twist.angular.z), velocity
+    q, twist = message.pose.pose.orientation, message.twist.twist
+    x, y, z = (_within(value, VEHICLE_SPEED_LIMIT)
+               for value in (twist.linear.x, twist.linear.y, twist.linear.z))
+    velocity = enu_ned(Quaternion(q.w, q.x, q.y, q.z).normalized().rotate((x, y, z)))
+    return _read_rotation(q), -_within(twist.angular.z, VEHICLE_RATE_LIMIT), velocity
+
+
+def _read_rotation(q: QuaternionMessage) -> Quaternion:
+    return ned_frd(Quaternion(q.w, q.x, q.y, q.z).normalized())
+
+
+def _within(value: float, limit: float) -> float:
+    """Return a value of the twist, which may be NaN; ValueError beyond the limit."""
+    if abs(value) > limit:
+        raise ValueError(f'a twist of {value:g} is beyond {limit:g}')
+    return value
 
 
 def _read_fix(message: NavSatFix, geoid_separation: float) -> Vector:
