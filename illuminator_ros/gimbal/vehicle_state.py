@@ -85,8 +85,9 @@ class VehicleState:
         self._yaw_rate.set(yaw_rate, now, link=False)
 
     def set_velocity(self, velocity: Vector, now: float) -> None:
-        """Take a velocity from ROS, m/s."""
-        self._velocity.set(velocity, now, link=False)
+        """Take a velocity from ROS, m/s, unless it is not finite."""
+        if all(map(math.isfinite, velocity)):
+            self._velocity.set(velocity, now, link=False)
 
     def set_position(self, position: GeoPoint, now: float) -> None:
         """Take a position from ROS."""

@@ -43,6 +43,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetManualControl,
     GimbalManagerStatus,
 )
+from illuminator_ros.gimbal.vehicle_state import ESTIMATES_ATTITUDE
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
@@ -625,6 +626,15 @@ def test_the_device_learns_the_vehicle_from_ros_where_no_autopilot_tells_it(
     for one in sent:
         assert one.q == (Q.w, Q.x, Q.y, Q.z)
         assert (one.vx, one.vy, one.vz, one.angular_velocity_z) == (1.0, 2.0, 3.0, 0.4)
+
+
+def test_the_device_is_told_no_velocity_that_is_not_finite() -> None:
+    rig = ManagerRig()
+    rig.manager.vehicle.set_velocity((NAN, 0.0, 0.0), rig.now)
+
+    [message] = of(AutopilotStateForGimbalDevice, rig.give(AUTOPILOT, vehicle_yaw(0.5)))
+
+    assert message.estimator_status == ESTIMATES_ATTITUDE
 
 
 # A forged address

@@ -29,7 +29,7 @@ from illuminator_ros.gimbal.manager_presence import ManagerState, StateChanged
 from illuminator_ros.gimbal.messages import GimbalManagerStatus
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.component import Endpoint, HEARTBEAT_INTERVAL
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url
@@ -336,3 +336,9 @@ def test_values_of_the_vehicle_beyond_all_limits_are_refused(value: float) -> No
         _read_imu(Imu(orientation=upright, angular_velocity=Vector3(z=value)))
     with pytest.raises(ValueError, match='is not a place'):
         read_place(NavSatFix(latitude=47.0, longitude=8.0, altitude=value), 0.0)
+
+
+def test_the_lease_outlasts_a_lost_heartbeat() -> None:
+    [lease] = [one for one in MANAGER_PARAMETERS if one.name == 'lease']
+
+    assert lease.low == 2 * HEARTBEAT_INTERVAL

@@ -66,7 +66,7 @@ MANAGER_PARAMETERS = (
                   choices=tuple(policy.value for policy in Policy)),
     ParameterSpec('priority', [], 'players, the highest first: sysid/compid, or ros'),
     ParameterSpec('overruling', [], 'players that take control under each policy'),
-    ParameterSpec('lease', 3.0, 'silence after which a player loses control', 's', 0.1, 3600.0),
+    ParameterSpec('lease', 3.0, 'silence after which a player loses control', 's', 2.0, 3600.0),
     ParameterSpec('nudge_limit', 0.175, 'largest angle that secondary control adds', 'rad', 0.0,
                   math.pi),
     *(ParameterSpec(f'{axis}_{end}', round(limits[index], 3),
