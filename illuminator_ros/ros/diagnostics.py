@@ -157,6 +157,9 @@ def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
     :param device: such as ``an illuminator``.
     """
     signing, traffic = link.state.signing, link.state.traffic
+    if link.address_conflict:
+        return (f'another sender uses our address {link.address}: set component_id to a free one '
+                'here or there')
     if signing.replayed and signing.replayed >= max(signing.bad, signing.unsigned):
         return (f'{signing.replayed} frames refused as replayed: their time stamps are not newer '
                 'than the last; compare the clocks')

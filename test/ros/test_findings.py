@@ -152,6 +152,14 @@ def test_another_sender_with_our_address_is_an_error() -> None:
         ERROR, 'another sender uses our address 1/194')
 
 
+def test_another_sender_with_our_address_is_the_reason_for_a_missing_light() -> None:
+    reported = Reported()
+    reported.receive(frame_of(heartbeat(MavType.ONBOARD_CONTROLLER), 100, BRIDGE))
+
+    assert reported.statuses()['link'].message.endswith(
+        'another sender uses our address 1/194: set component_id to a free one here or there')
+
+
 FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
 
 
