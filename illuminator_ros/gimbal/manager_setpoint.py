@@ -424,17 +424,23 @@ def direction(origin: GeoPoint, target: GeoPoint) -> tuple[float, float] | None:
     """
     Return pitch and yaw of the line from one place to another, rad.
 
-    The error is below 0.1 deg within 10 km.
-
     :return: None if the places are nearer than 0.1 m, so that there is no direction.
     """
-    latitude = math.radians((origin.latitude + target.latitude) / 2)
-    curvature = 1 - _ECCENTRICITY_2 * math.sin(latitude) ** 2
-    across = (target.longitude - origin.longitude + 180) % 360 - 180
-    north = (math.radians(target.latitude - origin.latitude)
-             * _RADIUS * (1 - _ECCENTRICITY_2) / curvature ** 1.5)
-    east = math.radians(across) * _RADIUS / curvature ** 0.5 * math.cos(latitude)
-    up = target.altitude - origin.altitude
+    x, y, z = (b - a for a, b in zip(_in_space(origin), _in_space(target), strict=True))
+    latitude, longitude = math.radians(origin.latitude), math.radians(origin.longitude)
+    outward = math.cos(longitude) * x + math.sin(longitude) * y
+    north = math.cos(latitude) * z - math.sin(latitude) * outward
+    east = math.cos(longitude) * y - math.sin(longitude) * x
+    up = math.cos(latitude) * outward + math.sin(latitude) * z
     if math.hypot(north, east, up) < 0.1:
         return None
     return math.atan2(up, math.hypot(north, east)), math.atan2(east, north)
+
+
+def _in_space(place: GeoPoint) -> Vector:
+    """Return a place in coordinates from the centre of the earth, m."""
+    latitude, longitude = math.radians(place.latitude), math.radians(place.longitude)
+    radius = _RADIUS / math.sqrt(1 - _ECCENTRICITY_2 * math.sin(latitude) ** 2)
+    across = (radius + place.altitude) * math.cos(latitude)
+    return (across * math.cos(longitude), across * math.sin(longitude),
+            (radius * (1 - _ECCENTRICITY_2) + place.altitude) * math.sin(latitude))

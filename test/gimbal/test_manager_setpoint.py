@@ -203,3 +203,9 @@ def test_gm_4_a_turn_in_steps_ends_where_a_turn_at_once_ends(
     assert end is not None
     assert apart(end, Rotation.from_euler(
         'ZYX', (angles[2] - 0.4, angles[1] + 0.2, angles[0]))) < 1e-6
+
+
+def test_gm_8_the_direction_over_a_pole_is_ahead() -> None:
+    angles = direction(GeoPoint(89.999, 0.0, 0.0), GeoPoint(89.999, 180.0, 0.0))
+
+    assert angles == pytest.approx((0.0, 0.0), abs=1e-3)
