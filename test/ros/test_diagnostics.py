@@ -98,7 +98,8 @@ def test_statuses_have_the_keys_of_the_protocol_page_and_a_change_of_level_comes
         own_ros.catch_up()
         CLOCK.forward(0.9)
         assert not call.result().results[0].successful
-        recorder.wait(lambda array: array.status[1].level == DiagnosticStatus.WARN
+        recorder.wait(lambda array: complete(array)
+                      and array.status[1].level == DiagnosticStatus.WARN
                       and 'brightness 30 % not confirmed' in array.status[1].message)
 
     for part, status in zip(('link', 'lamp'), array.status, strict=True):
