@@ -181,11 +181,14 @@ def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
     second.now = first.now
     seen = [0, 0]
     for _ in range(400):
-        for index, rig in enumerate((first, second)):
+        for rig in (first, second):
             rig.run(0.05)
-            for _, message in rig.sent[seen[index]:]:
+        # Both have run: neither hears the other before it has begun itself.
+        sent = len(first.sent), len(second.sent)
+        for index, rig in enumerate((first, second)):
+            for _, message in rig.sent[seen[index]:sent[index]]:
                 (second, first)[index].give(rig.component.address, message)
-            seen[index] = len(rig.sent)
+            seen[index] = sent[index]
 
     assert first.manager.state is ManagerState.ACTIVE
     assert second.manager.state is ManagerState.INACTIVE
