@@ -420,6 +420,9 @@ class Gimbal:
             if result.success and self._control is None:
                 result = request.Result(False, f'{result.message}; a manager without '
                                         'GIMBAL_MANAGER_STATUS does not show who has control')
+            elif not result.success and self._control and self._control.primary and (
+                    str(self._control) not in result.message):
+                result = replace(result, message=f'{result.message}; {self._control}')
             done(result, now)
 
         manager = self._active

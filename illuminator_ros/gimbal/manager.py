@@ -445,9 +445,12 @@ class GimbalManager(Payload):
         else:
             refusal = self._demand(source, demand, now)
         if refusal:
-            unreported = self._limit((source, refusal)).take(now)
-            if unreported is not None:
-                self.events.emit(DemandRefused(source, refusal, unreported))
+            self._report_refusal(source, refusal, now)
+
+    def _report_refusal(self, source: Address, reason: str, now: float) -> None:
+        unreported = self._limit((source, reason)).take(now)
+        if unreported is not None:
+            self.events.emit(DemandRefused(source, reason, unreported))
 
     def _pitch_yaw(
         self, source: Address, params: Sequence[float], frame: int, now: float,
@@ -458,7 +461,10 @@ class GimbalManager(Payload):
             demand = Demand.from_pitch_yaw(flags, pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
             return MavResult.DENIED
-        return MavResult.DENIED if self._demand(source, demand, now) else MavResult.ACCEPTED
+        refusal = self._demand(source, demand, now)
+        if refusal and self.control.holder(Role.PRIMARY) == source:
+            self._report_refusal(source, refusal, now)
+        return MavResult.DENIED if refusal else MavResult.ACCEPTED
 
     def _demand(self, player: Address, demand: Demand, now: float) -> str:
         """Follow a player's demand; return why it is refused, or ''."""
@@ -569,6 +575,8 @@ class GimbalManager(Payload):
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
                 and not self._accepts(YawFrame.EARTH, now)):
+            self._report_refusal(
+                source, 'the position or the heading of the vehicle is unknown', now)
             return MavResult.TEMPORARILY_REJECTED
         self._place = GeoPoint(latitude, longitude, altitude + above)
         self._follow(now)

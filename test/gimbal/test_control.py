@@ -80,7 +80,8 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: Addr
 
 
 @pytest.mark.parametrize(('fields', 'text'), [
-    ({'results': {CONFIGURE: MavResult.DENIED}}, 'refused: MAV_RESULT_DENIED'),
+    ({'results': {CONFIGURE: MavResult.DENIED}},
+     'refused: MAV_RESULT_DENIED (1 try, 0 ms); primary 1/195, secondary none'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
     ({'reports': False}, 'a manager without GIMBAL_MANAGER_STATUS does not show'),
     ({'answers': False}, 'no acknowledgement')])

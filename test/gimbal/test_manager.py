@@ -358,6 +358,7 @@ def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
     result = rig.result(PILOT, pitch_yaw_command(0, 0, flags=F.YAW_LOCK))
 
     assert result is MavResult.DENIED
+    assert 'YAW_LOCK' in of(DemandRefused, rig.events)[0].reason
     assert rig.give(PILOT, pitch_yaw(0.1, 0.0, flags=F.YAW_LOCK)) == []
     assert 'YAW_LOCK' in of(DemandRefused, rig.events)[0].reason
 
@@ -528,6 +529,7 @@ def test_gm_8_without_a_position_a_region_of_interest_is_rejected_for_now() -> N
     rig.give(AUTOPILOT, position(0.0, 0.0, 0.0))
 
     assert rig.result(PILOT, region(47.1, 8.0, 0.0)) is MavResult.TEMPORARILY_REJECTED
+    assert 'position' in of(DemandRefused, rig.events)[0].reason
 
 
 # GM-22: a device without MAVLink
