@@ -43,8 +43,7 @@ _TYPES: dict[type, tuple[Parameter.Type, str]] = {
     int: (Parameter.Type.INTEGER, 'an integer'),
     str: (Parameter.Type.STRING, 'a string'),
     bool: (Parameter.Type.BOOL, 'a boolean'),
-    list: (Parameter.Type.STRING_ARRAY,
-           "a list of strings, as in -p names:=\"['1/244=belly']\""),
+    list: (Parameter.Type.STRING_ARRAY, "a list of strings, as in \"['one', 'two']\""),
 }
 
 

@@ -342,3 +342,10 @@ def test_the_lease_outlasts_a_lost_heartbeat() -> None:
     [lease] = [one for one in MANAGER_PARAMETERS if one.name == 'lease']
 
     assert lease.low == 2 * HEARTBEAT_INTERVAL
+
+
+def test_list_of_a_wrong_type_is_refused_without_the_example_of_another_parameter() -> None:
+    [spec] = [one for one in MANAGER_PARAMETERS if one.name == 'overruling']
+    with pytest.raises(ParameterError, match='overruling: 255 is not a list') as refused:
+        spec.check(255)
+    assert 'names' not in str(refused.value)
