@@ -29,7 +29,7 @@ from enum import IntEnum
 from itertools import islice
 from operator import attrgetter, itemgetter
 import struct
-from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
+from typing import Annotated, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
 
 from fastcrc.crc16 import mcrf4xx
 
@@ -152,10 +152,10 @@ def _with_arrays(
     """Return pack and unpack of a layout in which arrays of numbers are tuples."""
     counts = [0 if code[-1] == 's' else int(code[:-1] or 0) for code in codes]
 
-    def pack(*values: Any) -> bytes:
+    def pack(*values: object) -> bytes:
         flat: list[object] = []
-        for count, value in zip(counts, values, strict=True):
-            flat += value if count else (value,)
+        for value in values:
+            flat += value if isinstance(value, tuple) else (value,)
         return layout.pack(*flat)
 
     def unpack(payload: bytes) -> tuple[object, ...]:

@@ -56,7 +56,7 @@ from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 # The name of ROS in the lists of players.
 ROS = 'ros'
-# Of a vehicle, rad/s and m/s.
+# The fastest vehicle, rad/s and m/s.
 VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
 _AXES = ('roll', 'pitch', 'yaw')
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
