@@ -62,8 +62,10 @@ from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
     MountAttitude,
     MountFlags,
+    STILL,
     to_mavlink,
     UNSET_QUATERNION,
+    UNSET_VECTOR,
     YawFrame,
 )
 from ..payload.rotation import flu_frd, Quaternion, Vector
@@ -81,7 +83,6 @@ STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
-_STILL = (0.0, 0.0, 0.0)
 # Commands that move a gimbal.
 _MOVES = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, GimbalCommand.DO_SET_ROI_LOCATION,
           GimbalCommand.DO_SET_ROI_NONE)
@@ -280,7 +281,7 @@ class Gimbal:
                 target = setpoint.message.target_system, setpoint.message.target_component
                 if (setpoint.zero_at < math.inf and self._manager_heard
                         and target == self._manager):
-                    self._send_rates(_STILL, now)
+                    self._send_rates(STILL, now)
         elif not self.in_control:
             self._stop()
         self._emit(ControlChanged(
@@ -410,7 +411,7 @@ class Gimbal:
 
         self.was_commanded = True
         if self._setpoint is not None and self._setpoint.zero_at < math.inf:
-            self._send_rates(_STILL, now)
+            self._send_rates(STILL, now)
         self._stop()
         self._releasing = True
         self._configure(False, now, ended)
@@ -574,7 +575,7 @@ class Gimbal:
             self._missing(*absolute) if frame is YawFrame.EARTH else '')
         if not reason:
             message = self._message(setpoint_flags(frame), to_mavlink(rotation, frame),
-                                    (math.nan,) * 3)
+                                    UNSET_VECTOR)
             self._setpoint = _Setpoint(
                 message, (rotation, frame), [now + delay for delay in REPEATS])
             self._send(message)
@@ -620,7 +621,7 @@ class Gimbal:
     def _send_rates(self, rates: Vector, now: float) -> None:
         frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
         message = self._message(setpoint_flags(frame), UNSET_QUATERNION, flu_frd(rates))
-        self._setpoint = _Setpoint(message, zero_at=math.inf if rates == _STILL else
+        self._setpoint = _Setpoint(message, zero_at=math.inf if rates == STILL else
                                    now + self._settings.setpoint_timeout)
         self._send(message)
 
@@ -684,7 +685,7 @@ class Gimbal:
         if setpoint is None or not self.in_control:
             return
         if now >= setpoint.zero_at:
-            self._send_rates(_STILL, now)
+            self._send_rates(STILL, now)
         elif setpoint.repeats and now >= setpoint.repeats[0]:
             del setpoint.repeats[0]
             self._send(setpoint.message)

@@ -45,7 +45,6 @@ from .manager_setpoint import (
     resolve,
     Setpoint,
     STABILISED,
-    STILL,
     stopped,
     turned_by,
 )
@@ -75,6 +74,7 @@ from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPosit
 from ..payload.mount_attitude import (
     MountAttitude,
     MountFlags,
+    STILL,
     to_mavlink,
     UNSET_QUATERNION,
     YawFrame,

@@ -35,17 +35,17 @@ from .messages import (
     GimbalManagerSetPitchyaw,
 )
 from ..payload.mount_attitude import (
+    AXES,
     Components,
     MountFlags,
     names_frame,
+    STILL,
     UNSET_VECTOR,
     yaw_frame,
     YawFrame,
 )
 from ..payload.rotation import Quaternion, Vector
 
-AXES = ('roll', 'pitch', 'yaw')
-STILL: Vector = (0.0,) * 3
 # The attitude is set by the flag alone.
 POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
 STABILISED = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK

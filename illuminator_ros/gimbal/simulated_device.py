@@ -31,13 +31,13 @@ from typing import Any
 
 from . import messages as gimbal
 from .messages import Capabilities, ErrorFlags
-from .simulated_motion import AXES, GimbalMechanics, GimbalMotion, limit_fields, Range
+from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields, Range
 from .. import __version__
 from ..mavlink.messages import Address, Message
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountFlags, yaw_frame, YawFrame
+from ..payload.mount_attitude import AXES, MountFlags, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 from ..payload.simulated import (
     AnyCommand,

@@ -22,7 +22,7 @@ import math
 from typing import NamedTuple
 
 from .messages import Capabilities, ErrorFlags
-from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
+from ..payload.mount_attitude import AXES, MountFlags, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # s without a heading from the vehicle after which its heading is unknown.
@@ -32,7 +32,6 @@ RESOLUTION = 1e-6
 # The flags that a setpoint may set.
 SETTABLE = (MountFlags.RETRACT | MountFlags.NEUTRAL | MountFlags.ROLL_LOCK
             | MountFlags.PITCH_LOCK | MountFlags.YAW_LOCK)
-AXES = ('roll', 'pitch', 'yaw')
 _HAS_AXIS = {'roll': Capabilities.HAS_ROLL_AXIS, 'pitch': Capabilities.HAS_PITCH_AXIS,
              'yaw': Capabilities.HAS_YAW_AXIS}
 _LOCKS = (MountFlags.ROLL_LOCK, MountFlags.PITCH_LOCK, MountFlags.YAW_LOCK)

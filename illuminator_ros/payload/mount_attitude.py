@@ -35,6 +35,9 @@ Components = tuple[float, float, float, float]
 # Fields of a setpoint that the receiver must ignore.
 UNSET_QUATERNION: Components = (math.nan,) * 4
 UNSET_VECTOR: Vector = (math.nan,) * 3
+# The order of angles and rates, and rates of a mount that does not turn.
+AXES = ('roll', 'pitch', 'yaw')
+STILL: Vector = (0.0,) * 3
 
 
 class MountFlags(IntFlag):

@@ -30,7 +30,13 @@ from ...payload.checks.requirement import Conditions
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.checks.specification import Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
+from ...payload.mount_attitude import (
+    AXES,
+    MountFlags,
+    UNSET_VECTOR,
+    yaw_frame,
+    YawFrame,
+)
 from ...payload.rotation import Quaternion
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
@@ -52,7 +58,7 @@ RATE = 6.0
 NAN = math.nan
 LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
 Control = tuple[Address, Address]
-_LIMIT_NAMES = [f'{axis}_{end}' for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')]
+_LIMIT_NAMES = [f'{axis}_{end}' for axis in AXES for end in ('min', 'max')]
 
 
 @dataclass(frozen=True)

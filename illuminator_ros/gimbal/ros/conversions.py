@@ -24,7 +24,7 @@ from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Header
 
-from ...payload.mount_attitude import YawFrame
+from ...payload.mount_attitude import AXES, YawFrame
 from ...payload.rotation import Quaternion, Vector
 from ...ros.parameters import ParameterError, ParameterSpec, Values
 
@@ -43,7 +43,6 @@ ANGLE_TOLERANCE = 0.001
 RATE_LIMIT = 2 * math.pi
 # m; float32, the type of MAVLink, does not have all greater ones.
 ALTITUDE_LIMIT = 100e3
-_AXES = ('roll', 'pitch', 'yaw')
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ class Frames:
             :data:`ANGLE_LIMITS`.
         """
         angles = _vector(message)
-        for axis, angle, limit in zip(_AXES, angles, ANGLE_LIMITS, strict=True):
+        for axis, angle, limit in zip(AXES, angles, ANGLE_LIMITS, strict=True):
             if abs(angle) > limit + ANGLE_TOLERANCE:
                 raise ValueError(f'{axis} {angle:g} rad is beyond {limit:.4f} rad')
         return angles, self.frame(message.header)
@@ -115,7 +114,7 @@ def read_rates(message: Vector3Stamped) -> Vector:
     :raises ValueError: if one is NaN or beyond :data:`RATE_LIMIT`.
     """
     rates = _vector(message)
-    for axis, rate in zip(_AXES, rates, strict=True):
+    for axis, rate in zip(AXES, rates, strict=True):
         if not abs(rate) <= RATE_LIMIT:
             raise ValueError(f'{axis} rate {rate:g} rad/s is not within {RATE_LIMIT:.4f} rad/s')
     return rates

@@ -23,7 +23,7 @@ from ..commands import Control
 from ..events import GimbalKey, GimbalSnapshot
 from ..messages import ErrorFlags, flag_names
 from ...mavlink.command_sender import format_seconds
-from ...payload.mount_attitude import MountFlags
+from ...payload.mount_attitude import AXES, MountFlags
 from ...ros.command_sources import holder_values
 from ...ros.diagnostics import (
     ERROR,
@@ -149,7 +149,7 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, Value]:
         values['yaw_frame'] = gimbal.attitude.frame.value
         # 0 is added to have no negative zero.
         values |= {f'{axis}_rad': angle + 0.0 for axis, angle in zip(
-            ('roll', 'pitch', 'yaw'), gimbal.attitude.rotation.euler(), strict=True)}
+            AXES, gimbal.attitude.rotation.euler(), strict=True)}
         values['vehicle_heading_rad'] = gimbal.attitude.heading
     if gimbal.capabilities is not None:
         values['capabilities'] = ', '.join(flag_names(gimbal.capabilities))

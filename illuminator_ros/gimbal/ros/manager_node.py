@@ -46,7 +46,7 @@ from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
 from ...payload.messages import GimbalDeviceAttitudeStatus
-from ...payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
+from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.diagnostics import ERROR, Finding, LinkSnapshot, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
@@ -58,7 +58,6 @@ from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 ROS = 'ros'
 # The fastest vehicle, rad/s and m/s.
 VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
-_AXES = ('roll', 'pitch', 'yaw')
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
 
 MANAGER_PARAMETERS = (
@@ -71,7 +70,7 @@ MANAGER_PARAMETERS = (
                   math.pi),
     *(ParameterSpec(f'{axis}_{end}', round(limits[index], 3),
                     f'{word} of a gimbal without MAVLink', 'rad', -2 * math.pi, 2 * math.pi)
-      for axis, limits in zip(_AXES, _RANGES, strict=True)
+      for axis, limits in zip(AXES, _RANGES, strict=True)
       for index, (end, word) in enumerate((
           ('min', f'smallest {axis}'), ('max', f'largest {axis}')))),
 )
@@ -104,7 +103,7 @@ def manager_settings(values: Values, ros: Address) -> ManagerSettings:
     :raises ParameterError: if a parameter is wrong.
     """
     ranges = []
-    for axis in _AXES:
+    for axis in AXES:
         # With the signs of ROS: pitch down and yaw left are positive.
         low, high = values[f'{axis}_min'], values[f'{axis}_max']
         if low > high:
