@@ -14,6 +14,7 @@
 
 """The topics that the node publishes from each ILLUMINATOR_STATUS."""
 
+import itertools
 import math
 from typing import Any
 
@@ -30,6 +31,8 @@ STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
     'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64}
 
+TEMPERATURES = itertools.count()
+
 
 @pytest.fixture(scope='module')
 def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
@@ -44,9 +47,11 @@ def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
 def topics(light: ServedLight, recorders: dict[str, Recorder]) -> dict[str, Recorder]:
     """Return empty recorders of a light that sends a status only when a test says so."""
     light.fake.stream = 0.0
-    last = light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0,
-                        strobe_duty_cycle=0.0, error_status=0, temp_c=25.0)
-    recorders['uptime'].wait(lambda message: message.data >= last)
+    # Of each status the bridge publishes the temperature last, and it is subscribed to last.
+    temperature = 20.0 + next(TEMPERATURES) / 8
+    light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0, strobe_duty_cycle=0.0,
+                 error_status=0, temp_c=temperature)
+    recorders['temperature'].wait(lambda message: message.temperature == temperature)
     for recorder in recorders.values():
         recorder.clear()
     return recorders
