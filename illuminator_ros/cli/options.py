@@ -20,12 +20,15 @@ import argparse
 from collections.abc import Callable, Mapping
 import sys
 import time
-from typing import NoReturn, TypeVar
+from typing import NoReturn, TYPE_CHECKING, TypeVar
 
 from .entry_point import discard_output
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, TimestampStore
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite  # A name of type checkers only.
 
 T = TypeVar('T')
 
@@ -37,15 +40,17 @@ class Parser(argparse.ArgumentParser):
         """See :meth:`argparse.ArgumentParser.error`."""
         self.exit(2, f'{self.prog}: {message}; see {self.prog} --help\n')
 
-    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:  # noqa: A003
-        """See :meth:`argparse.ArgumentParser.exit`; output that cannot be written is an error."""
+    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
+        """Write a text; argparse itself ignores that it cannot be written."""
+        if file is not sys.stdout or sys.stdout is None:
+            super()._print_message(message, file)
+            return
         try:
-            if sys.stdout is not None:
-                sys.stdout.flush()
+            print(message, end='', flush=True)
         except OSError as error:
             discard_output()
-            status, message = 1, f'{self.prog}: standard output: {error.strerror}\n'
-        super().exit(status, message)
+            if not isinstance(error, BrokenPipeError):
+                self.exit(1, f'{self.prog}: standard output: {error.strerror}\n')
 
 
 def option(read: Callable[[str], T]) -> Callable[[str], T]:

@@ -25,7 +25,6 @@ import pytest
 from support.live_link import Bridge
 from support.ports import free_port
 from support.processes import ended, environment, prepare_child, python, ROOT
-from support.waiting import PATIENCE
 
 SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
 
@@ -75,14 +74,6 @@ def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped() -> None:
     with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{free_port()}',
                       '--light', '1/243=Größe', env={'PYTHONIOENCODING': 'ascii'})) as program:
         program.wait_for(r'1/243 Gr\xf6\xdfe')
-
-
-def test_the_help_on_a_full_disk_ends_without_a_traceback() -> None:
-    with open('/dev/full', 'wb') as full:
-        done = subprocess.run([*SIMULATOR, '--help'], env=environment(), cwd=ROOT, stdout=full,
-                              stderr=subprocess.PIPE, preexec_fn=prepare_child,
-                              timeout=PATIENCE, check=False)
-    assert (done.returncode, done.stderr) == (0, b'')
 
 
 def test_the_first_message_of_a_peer_is_one_line() -> None:

@@ -114,16 +114,17 @@ def test_missing_package_is_one_line_with_its_remedy_and_status_1(
 
 @pytest.mark.parametrize('unbuffered', ['', '1'])
 @pytest.mark.parametrize('option', ['--help', '--version'])
+@pytest.mark.parametrize('program', ['bridge', 'simulator', 'conformance', 'monitor'])
 def test_help_that_cannot_be_written_is_one_line_with_status_1(
-    option: str, unbuffered: str,
+    program: str, option: str, unbuffered: str,
 ) -> None:
     outcome = subprocess.run(
-        f'exec {sys.executable} -m illuminator_ros.bridge {option} > /dev/full', shell=True,
+        f'exec {sys.executable} -m illuminator_ros.{program} {option} > /dev/full', shell=True,
         text=True, timeout=30, env=environment({'PYTHONUNBUFFERED': unbuffered}),
         stderr=subprocess.PIPE, cwd=ROOT)
 
     assert (outcome.returncode, outcome.stderr) == (
-        1, 'bridge: standard output: No space left on device\n')
+        1, f'{program}: standard output: No space left on device\n')
 
 
 def test_simulator_needs_no_ros(tmp_path: Path) -> None:
