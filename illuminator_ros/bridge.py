@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``python3 -m illuminator_ros.bridge``."""
+"""``python3 -m illuminator_ros.bridge``: the bridge between ROS and payloads."""
 
 import sys
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``python3 -m illuminator_ros.monitor``."""
+"""``python3 -m illuminator_ros.monitor``: a terminal view of lights."""
 
 import sys
 

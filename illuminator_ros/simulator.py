@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``python3 -m illuminator_ros.simulator``."""
+"""``python3 -m illuminator_ros.simulator``: simulated devices."""
 
 import sys
 

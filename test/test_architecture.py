@@ -159,7 +159,7 @@ def test_shared_protocol_modules_name_no_payload() -> None:
 @pytest.mark.parametrize(('part', 'foreign'), [
     ('model', ROS | IO | TIME | {'rich'}), ('key_bindings', ROS | IO | TIME | THREADS | {'rich'}),
     ('view', ROS | IO | TIME | THREADS), ('terminal', ROS | {'rich'}),
-    ('graph', {'rich'} | IO | TIME | THREADS)])
+    ('ros_graph', {'rich'} | IO | TIME | THREADS)])
 def test_part_of_the_monitor_imports_only_its_own_libraries(
     part: str, foreign: set[str],
 ) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``python3 -m illuminator_ros.gimbal``."""
+"""``python3 -m illuminator_ros.gimbal``: the bridge with the payload gimbal."""
 
 import sys
 

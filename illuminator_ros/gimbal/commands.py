@@ -19,13 +19,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+from .axes import LEVEL
 from .messages import flag_names, GimbalCommand, GimbalManagerStatus
 from ..mavlink.messages import Address
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountFlags, YawFrame
 
-# Roll and pitch are relative to the horizon in each setpoint.
-LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
 # MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE. -2, "set itself in control", is never sent: PX4 takes it
 # for the autopilot, ArduPilot for the sender.
 UNCHANGED, REMOVE_OWN = -1, -3

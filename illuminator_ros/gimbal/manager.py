@@ -27,8 +27,8 @@ import math
 import random
 from typing import TypeAlias
 
-from .manager_control import ControlArbiter, ControlChanged, ControlSettings, Role
-from .manager_presence import ManagerState, Presence, StateChanged
+from .axes import AT_LIMIT, LEVEL, Range
+from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
 from .manager_setpoint import (
     AnySetpoint,
     clip,
@@ -40,18 +40,16 @@ from .manager_setpoint import (
     in_vehicle_frame,
     mix,
     nudge,
-    Range,
     read_demand,
     resolve,
     Setpoint,
-    STABILISED,
     stopped,
     turned_by,
 )
+from .manager_state import ManagerState, StateChanged, StateTracker
 from .messages import (
     AutopilotStateForGimbalDevice,
     Capabilities,
-    ErrorFlags,
     GimbalCommand,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
@@ -72,6 +70,7 @@ from ..mavlink.messages import Address, MavResult
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import (
+    AXES,
     MountAttitude,
     MountFlags,
     STILL,
@@ -106,8 +105,6 @@ MAX_REPORTS = 256
 NO_FRAME = -1
 # MAV_FRAMEs of altitudes above mean sea level, and above the home position.
 GLOBAL_FRAMES, RELATIVE_FRAMES = (0, 5, NO_FRAME), (3, 6)
-_LIMIT_FLAGS = {'roll': ErrorFlags.AT_ROLL_LIMIT, 'pitch': ErrorFlags.AT_PITCH_LIMIT,
-                'yaw': ErrorFlags.AT_YAW_LIMIT}
 _ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
@@ -152,13 +149,6 @@ class SetpointSent:
 
 
 @dataclass(frozen=True)
-class AttitudeReceived:
-    """The device has reported its attitude."""
-
-    status: GimbalDeviceAttitudeStatus
-
-
-@dataclass(frozen=True)
 class AddressShared:
     """A player's address is used by two senders, whose heartbeats differ."""
 
@@ -177,8 +167,8 @@ class ReferenceLost:
 
 
 ManagerEvent: TypeAlias = (
-    StateChanged | ControlChanged | DemandRefused | SetpointClipped | SetpointSent
-    | AttitudeReceived | AddressShared | ReferenceLost)
+    StateChanged | RoleHolderChanged | DemandRefused | SetpointClipped | SetpointSent
+    | AddressShared | ReferenceLost)
 
 
 class GimbalManager(Payload):
@@ -211,9 +201,9 @@ class GimbalManager(Payload):
         self.control = ControlArbiter(settings.control)
         self.vehicle = VehicleState()
         self._commands = commands
-        self._presence = Presence(
+        self._tracker = StateTracker(
             commands.address, settings.device_id, self._state_changed, draw)
-        self.model = (GimbalModel() if self._presence.has_mavlink
+        self.model = (GimbalModel() if self._tracker.has_mavlink
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
         self._status: GimbalDeviceAttitudeStatus | None = None
@@ -240,32 +230,32 @@ class GimbalManager(Payload):
     @property
     def state(self) -> ManagerState:
         """Return the manager's state."""
-        return self._presence.state
+        return self._tracker.state
 
     @property
     def device(self) -> Address | None:
         """Return the address of the device, None if it is not known, or has none."""
-        return self._presence.device
+        return self._tracker.device
 
     @property
     def device_id(self) -> int:
         """Return the id of the device, 0 while none is known."""
-        return self._presence.device_id
+        return self._tracker.device_id
 
     @property
     def has_mavlink(self) -> bool:
         """Whether the device is a MAVLink component."""
-        return self._presence.has_mavlink
+        return self._tracker.has_mavlink
 
     @property
     def other(self) -> Address | None:
         """Return the other manager of the device that is heard, None if there is none."""
-        return self._presence.other
+        return self._tracker.other
 
     @property
     def obstacle(self) -> str:
         """Return why the device is not managed, for people; '' if it is."""
-        return self._presence.obstacle
+        return self._tracker.obstacle
 
     def status(self, now: float) -> GimbalManagerStatus:
         """Return the message that tells who is in control."""
@@ -281,11 +271,11 @@ class GimbalManager(Payload):
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        self._presence.link_opened(now)
+        self._tracker.link_opened(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        self._presence.link_closed(now)
+        self._tracker.link_closed(now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
@@ -296,21 +286,21 @@ class GimbalManager(Payload):
             self.control.heard(source, now)
             self._compare_identity(source, message, now)
             if message.type == MAV_TYPE_GIMBAL:
-                self._presence.hear_device(source, now)
+                self._tracker.hear_device(source, now)
         elif isinstance(message, GimbalDeviceAttitudeStatus | GimbalDeviceInformation) and (
                 message.gimbal_device_id in NON_MAVLINK_IDS):
             # An autopilot reports a gimbal on its outputs, but is not a gimbal device.
             return
         elif isinstance(message, GimbalDeviceAttitudeStatus):
-            if self._presence.hear_device(source, now):
+            if self._tracker.hear_device(source, now):
                 self.take_attitude(message, now)
         elif isinstance(message, GimbalDeviceInformation):
-            if self._presence.hear_device(source, now):
+            if self._tracker.hear_device(source, now):
                 self._information = message
                 self._information_due = math.inf
                 self.model = GimbalModel.from_information(message)
         elif isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
-            self._presence.hear_manager(source, message.gimbal_device_id, now)
+            self._tracker.hear_manager(source, message.gimbal_device_id, now)
         elif source == Address(self.address.system, mav.MAV_COMP_ID_AUTOPILOT1):
             if isinstance(message, AutopilotStateForGimbalDevice):
                 self._autopilot_at = now
@@ -321,7 +311,7 @@ class GimbalManager(Payload):
     def receive_conflicting(self, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive_conflicting`."""
         if isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
-            self._presence.hear_manager(self.address, message.gimbal_device_id, now)
+            self._tracker.hear_manager(self.address, message.gimbal_device_id, now)
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """See :meth:`Payload.execute`."""
@@ -344,7 +334,7 @@ class GimbalManager(Payload):
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        self._presence.poll(now)
+        self._tracker.poll(now)
         self._control_changed(self.control.poll(now), now)
         if now >= self._information_due:
             self._request_information(now)
@@ -358,7 +348,7 @@ class GimbalManager(Payload):
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min(self._presence.next_deadline(), self.control.next_deadline(),
+        return min(self._tracker.next_deadline(), self.control.next_deadline(),
                    self._information_due, self._status_due, self._send_due)
 
     # The device and the vehicle, as ROS knows them
@@ -374,7 +364,6 @@ class GimbalManager(Payload):
             self._commands.send(replace(
                 status, flags=int(status.flags | flags), gimbal_device_id=self.device_id,
                 failure_flags=status.failure_flags | self._limits_reached))
-        self.events.emit(AttitudeReceived(status))
 
     def _report_commanded(self, now: float) -> None:
         """Report the setpoint as attitude of a device that reports none."""
@@ -415,7 +404,7 @@ class GimbalManager(Payload):
         self._control_changed(changes, now)
         return MavResult.ACCEPTED
 
-    def _control_changed(self, changes: Sequence[ControlChanged], now: float) -> None:
+    def _control_changed(self, changes: Sequence[RoleHolderChanged], now: float) -> None:
         for change in changes:
             if change.role is Role.SECONDARY:
                 self._offsets = STILL
@@ -538,7 +527,8 @@ class GimbalManager(Payload):
             attitude, clipped = clip(
                 mix(attitude, self._offsets), self.model.ranges,
                 0.0 if setpoint.frame is YawFrame.VEHICLE else heading)
-            self._limits_reached = sum(_LIMIT_FLAGS[one.axis] for one in clipped)
+            self._limits_reached = sum(
+                AT_LIMIT[AXES.index(one.axis)] for one in clipped)
             if clipped and self._limit('clipped').take(now) is not None:
                 self.events.emit(SetpointClipped(tuple(clipped)))
         sent = setpoint
@@ -592,7 +582,7 @@ class GimbalManager(Payload):
         return MavResult.ACCEPTED
 
     def _place_flags(self) -> MountFlags:
-        return STABILISED | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
+        return LEVEL | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
                              else MountFlags.YAW_LOCK)
 
     def _follow(self, now: float) -> None:

@@ -51,7 +51,7 @@ class ControlSettings:
 
 
 @dataclass(frozen=True)
-class ControlChanged:
+class RoleHolderChanged:
     """
     A role has another player.
 
@@ -94,7 +94,7 @@ class ControlArbiter:
 
     def configure(
         self, source: Address, params: Sequence[float], now: float,
-    ) -> list[ControlChanged] | None:
+    ) -> list[RoleHolderChanged] | None:
         """
         Execute MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, both roles or neither.
 
@@ -120,9 +120,9 @@ class ControlArbiter:
         for arbiter in self._arbiters.values():
             arbiter.renew(player, now)
 
-    def poll(self, now: float) -> list[ControlChanged]:
+    def poll(self, now: float) -> list[RoleHolderChanged]:
         """Take the roles from players whose lease has ended."""
-        return [ControlChanged(role, change.before, change.after, change.cause)
+        return [RoleHolderChanged(role, change.before, change.after, change.cause)
                 for role, arbiter in self._arbiters.items() if (change := arbiter.poll(now))]
 
     def next_deadline(self) -> float:
@@ -149,7 +149,7 @@ class ControlArbiter:
 
     def _give(
         self, role: Role, source: Address, player: Address | None, now: float,
-    ) -> ControlChanged | None:
+    ) -> RoleHolderChanged | None:
         arbiter, before = self._arbiters[role], self.holder(role)
         if player == before:
             return None
@@ -160,4 +160,4 @@ class ControlArbiter:
             if player is not None:
                 arbiter.claim(player, now)
         cause = Cause.RELEASE if before == source else Cause.CLAIM
-        return ControlChanged(role, before, player, cause, source)
+        return RoleHolderChanged(role, before, player, cause, source)

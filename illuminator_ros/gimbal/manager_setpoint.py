@@ -27,6 +27,7 @@ from functools import cached_property
 import math
 from typing import NamedTuple
 
+from .axes import HAS_AXIS, LEVEL, Range
 from .messages import (
     Capabilities,
     GimbalDeviceInformation,
@@ -48,9 +49,8 @@ from ..payload.rotation import Quaternion, Vector
 
 # The attitude is set by the flag alone.
 POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
-STABILISED = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
 # Flags that GIMBAL_DEVICE_SET_ATTITUDE passes on; those of the yaw frame are set by its value.
-_PASSED_ON = (POSES | STABILISED | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
+_PASSED_ON = (POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
               | MountFlags.RC_MIXED)
 _PASSED_BITS = int(_PASSED_ON)
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
@@ -62,18 +62,6 @@ _NEEDED = {MountFlags.RETRACT: Capabilities.HAS_RETRACT,
 _NEEDING = int(sum(_NEEDED))
 # Equatorial radius, m, and squared eccentricity of WGS 84.
 _RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
-
-
-class Range(NamedTuple):
-    """The range of an axis, rad, infinite where it is not known."""
-
-    low: float = -math.inf
-    high: float = math.inf
-
-    @property
-    def is_fixed(self) -> bool:
-        """Whether the axis cannot turn."""
-        return self.low == self.high
 
 
 @dataclass(frozen=True)
@@ -105,9 +93,9 @@ class GimbalModel:
             return range_ if range_.low <= range_.high else Range()
 
         return cls(capabilities, (
-            axis(message.roll_min, message.roll_max, Capabilities.HAS_ROLL_AXIS),
-            axis(message.pitch_min, message.pitch_max, Capabilities.HAS_PITCH_AXIS),
-            axis(message.yaw_min, message.yaw_max, Capabilities.HAS_YAW_AXIS)))
+            axis(message.roll_min, message.roll_max, HAS_AXIS[0]),
+            axis(message.pitch_min, message.pitch_max, HAS_AXIS[1]),
+            axis(message.yaw_min, message.yaw_max, HAS_AXIS[2])))
 
     @classmethod
     def from_ranges(cls, ranges: tuple[Range, Range, Range]) -> GimbalModel:

@@ -30,8 +30,9 @@ import math
 from typing import Any
 
 from . import messages as gimbal
+from .axes import Range
 from .messages import Capabilities, ErrorFlags
-from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields, Range
+from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields
 from .. import __version__
 from ..mavlink.messages import Address, Message
 from ..payload.faults import Behaviour, Fault, FaultTable
@@ -438,7 +439,7 @@ def mechanics(settings: Values) -> GimbalMechanics:
     for name, field in (('axis_rate', 'rate'), ('drift', 'drift')):
         if name in settings:
             given[field] = math.radians(settings[name])
-    endless = given.get('yaw', default.yaw).turns
+    endless = given.get('yaw', default.yaw).is_endless
     return replace(default, **given, capabilities=(
         default.capabilities | (Capabilities.SUPPORTS_INFINITE_YAW if endless else 0))
         & ~settings.get('lacks', 0))

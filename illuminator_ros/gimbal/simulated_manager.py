@@ -30,6 +30,7 @@ import math
 from typing import Any, NamedTuple
 
 from . import messages as gimbal
+from .axes import LEVEL, Range
 from .manager_setpoint import GeoPoint
 from .messages import Capabilities, GimbalCommand
 from .simulated_device import (
@@ -41,7 +42,7 @@ from .simulated_device import (
     properties,
     SimulatedMount,
 )
-from .simulated_motion import Range, wrapped
+from .simulated_motion import wrapped
 from ..mavlink.messages import (
     Address,
     CommandInt,
@@ -77,8 +78,6 @@ MAV_TYPE_QUADROTOR = 2
 MAV_AUTOPILOT_PX4 = 12
 # MAV_FRAME_GLOBAL and its _INT, whose altitude is above mean sea level; those relative to home.
 ABSOLUTE_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
-# The flags that ArduPilot reports, whatever is set.
-CONSTANT_FLAGS = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
 
 
 @dataclass(frozen=True)
@@ -237,7 +236,7 @@ class SimulatedManager(SimulatedDevice):
         """See :meth:`SimulatedDevice.message`."""
         behaviour, mount, device_id = self.behaviour, self.mount, self.properties.device_id
         if message_id == gimbal.GimbalManagerStatus.id and behaviour.reports:
-            flags = mount.flags(behaviour) if behaviour.shows_flags else CONSTANT_FLAGS
+            flags = mount.flags(behaviour) if behaviour.shows_flags else LEVEL
             control = (NO_COMPONENT, NO_COMPONENT) if behaviour.frozen_control else (
                 self.primary, self.secondary)
             return gimbal.GimbalManagerStatus(
@@ -441,7 +440,7 @@ class SimulatedManager(SimulatedDevice):
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.set(MountFlags.NEUTRAL | CONSTANT_FLAGS, YawFrame.VEHICLE, UNSET_VECTOR,
+        self.mount.set(MountFlags.NEUTRAL | LEVEL, YawFrame.VEHICLE, UNSET_VECTOR,
                        UNSET_VECTOR, self.behaviour, now)
 
     def _point_at_roi(self, now: float) -> None:
@@ -452,7 +451,7 @@ class SimulatedManager(SimulatedDevice):
         east = (wrapped(math.radians(place.longitude - own.longitude))
                 * EARTH_RADIUS * math.cos(math.radians(own.latitude)))
         pitch = math.atan2(place.altitude - own.altitude, math.hypot(north, east))
-        self.mount.set(CONSTANT_FLAGS | MountFlags.YAW_LOCK, YawFrame.EARTH,
+        self.mount.set(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH,
                        (0.0, pitch, math.atan2(east, north)), UNSET_VECTOR, self.behaviour, now)
 
     def snapshot(self, now: float) -> Snapshot:

@@ -21,24 +21,15 @@ from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
+from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, RESOLUTION
 from .messages import Capabilities, ErrorFlags
 from ..payload.mount_attitude import AXES, MountFlags, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # s without a heading from the vehicle after which its heading is unknown.
 HEADING_TIMEOUT = 2.0
-# Angles that are equal, rad.
-RESOLUTION = 1e-6
 # The flags that a setpoint may set.
-SETTABLE = (MountFlags.RETRACT | MountFlags.NEUTRAL | MountFlags.ROLL_LOCK
-            | MountFlags.PITCH_LOCK | MountFlags.YAW_LOCK)
-_HAS_AXIS = {'roll': Capabilities.HAS_ROLL_AXIS, 'pitch': Capabilities.HAS_PITCH_AXIS,
-             'yaw': Capabilities.HAS_YAW_AXIS}
-_LOCKS = (MountFlags.ROLL_LOCK, MountFlags.PITCH_LOCK, MountFlags.YAW_LOCK)
-_FOLLOWS = (Capabilities.HAS_ROLL_FOLLOW, Capabilities.HAS_PITCH_FOLLOW,
-            Capabilities.HAS_YAW_FOLLOW)
-_HAS_LOCK = (Capabilities.HAS_ROLL_LOCK, Capabilities.HAS_PITCH_LOCK, Capabilities.HAS_YAW_LOCK)
-_AT_LIMIT = (ErrorFlags.AT_ROLL_LIMIT, ErrorFlags.AT_PITCH_LIMIT, ErrorFlags.AT_YAW_LIMIT)
+SETTABLE = MountFlags.RETRACT | MountFlags.NEUTRAL | LEVEL | MountFlags.YAW_LOCK
 CAPABILITIES = (
     Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL
     | Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_FOLLOW | Capabilities.HAS_ROLL_LOCK
@@ -50,22 +41,6 @@ CAPABILITIES = (
 def wrapped(angle: float) -> float:
     """Return an angle within -pi..pi, rad."""
     return math.remainder(angle, math.tau)
-
-
-class Range(NamedTuple):
-    """The range of an axis, rad."""
-
-    low: float
-    high: float
-
-    @property
-    def turns(self) -> bool:
-        """Return whether it is a full turn, which has no stop."""
-        return self.high - self.low >= math.tau - RESOLUTION
-
-    def clip(self, angle: float) -> float:
-        """Return the nearest angle within the range."""
-        return min(max(angle, self.low), self.high)
 
 
 NO_STOPS = Range(-math.pi, math.pi)
@@ -167,7 +142,7 @@ class GimbalMotion:
 
     mechanics: GimbalMechanics
     now: float
-    flags: MountFlags = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+    flags: MountFlags = LEVEL
     frame: YawFrame = YawFrame.VEHICLE
     vehicle: VehicleAttitude = VehicleAttitude(0.0, 0.0, 0.0, math.nan, -math.inf)
     travelled: float = 0.0
@@ -197,9 +172,9 @@ class GimbalMotion:
 
     def locked(self, axis: int) -> bool:
         """Return whether an axis is held against the horizon or against north."""
-        can_follow = self.mechanics.capabilities & _FOLLOWS[axis]
-        can_lock = self.mechanics.capabilities & _HAS_LOCK[axis]
-        return bool(can_lock and (self.flags & _LOCKS[axis] or not can_follow))
+        can_follow = self.mechanics.capabilities & HAS_FOLLOW[axis]
+        can_lock = self.mechanics.capabilities & HAS_LOCK[axis]
+        return bool(can_lock and (self.flags & LOCKS[axis] or not can_follow))
 
     def _references(self, now: float) -> Vector:
         """Return for each axis what is added to its target to have its angle."""
@@ -256,17 +231,17 @@ class GimbalMotion:
         if seconds <= 0:
             return
         references, capabilities = self._references(now), self.mechanics.capabilities
-        for name, axis, span, reference in zip(
-                AXES, self._axes, self.mechanics.ranges, references, strict=True):
+        for name, axis, span, reference, has_axis in zip(
+                AXES, self._axes, self.mechanics.ranges, references, HAS_AXIS, strict=True):
             axis.target += axis.rate * seconds
             goal = axis.target + reference
             if name == 'yaw':
                 # An angle is within a turn of the stops, a rate goes on from where it is.
                 goal = axis.angle + wrapped(goal - axis.angle) if axis.rate else wrapped(goal)
-            if name == self._frozen_axis or not capabilities & _HAS_AXIS[name]:
+            if name == self._frozen_axis or not capabilities & has_axis:
                 goal = axis.angle
             axis.advance(seconds, goal, span if self._limited else NO_STOPS,
-                         endless=name == 'yaw' and span.turns)
+                         endless=name == 'yaw' and span.is_endless)
             self.travelled += abs(axis.velocity) * seconds
 
     @property
@@ -288,7 +263,7 @@ class GimbalMotion:
 
     def limits(self) -> ErrorFlags:
         """Return the flags of the axes that the end of their range has stopped."""
-        return ErrorFlags(sum(flag for flag, axis in zip(_AT_LIMIT, self._axes, strict=True)
+        return ErrorFlags(sum(flag for flag, axis in zip(AT_LIMIT, self._axes, strict=True)
                               if axis.stopped))
 
     def attitude(self, frame: YawFrame) -> Quaternion:

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""``python3 -m illuminator_ros.rededge``."""
+"""``python3 -m illuminator_ros.rededge``: the bridge with the payload rededge."""
 
 import sys
 

@@ -35,10 +35,10 @@ from ..payload.checks.requirement import (
     PayloadChecks,
     Requirement,
     requirement,
+    Specification,
     Tester,
 )
 from ..payload.checks.session import Failed, Session, Skipped
-from ..payload.checks.specification import Specification
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 
 SERIAL_API = Specification(

@@ -20,7 +20,8 @@ import re
 from typing import Any
 
 from illuminator_ros.cli.bridge import Executable, usage
-from illuminator_ros.cli.monitor import graph, key_bindings, model
+from illuminator_ros.cli.monitor import key_bindings, model
+from illuminator_ros.cli.monitor import ros_graph as graph
 from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.model import ErrorFlag

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.checks.manager import CHECKS
 from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
-from illuminator_ros.gimbal.manager_setpoint import Range
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address

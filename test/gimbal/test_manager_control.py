@@ -21,9 +21,9 @@ import re
 
 from illuminator_ros.gimbal.manager_control import (
     ControlArbiter,
-    ControlChanged,
     ControlSettings,
     Role,
+    RoleHolderChanged,
 )
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Cause, Policy
@@ -99,7 +99,7 @@ def test_control_ends_after_the_lease_without_a_heartbeat_of_its_player(
 
     assert one.next_deadline() == 1.0 + LEASE
     assert one.poll(3.9) == []
-    assert one.poll(4.0) == [ControlChanged(role, PLAYER, None, Cause.SILENCE)]
+    assert one.poll(4.0) == [RoleHolderChanged(role, PLAYER, None, Cause.SILENCE)]
     assert one.holder(role) is None
 
 
@@ -122,7 +122,7 @@ def test_the_sender_takes_control_with_the_id_for_itself() -> None:
     one = control()
 
     assert one.configure(PLAYER, (-2, -2, -1, -1), 0.0) == [
-        ControlChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
+        RoleHolderChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
 
 
 def test_both_roles_change_or_neither() -> None:
@@ -138,7 +138,7 @@ def test_a_player_that_claims_both_roles_gets_the_primary_one_beside_another_sec
     one.configure(LOWER, (-1, -1, *LOWER), 0.0)
 
     assert one.configure(PLAYER, (*PLAYER, *PLAYER), 1.0) == [
-        ControlChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
+        RoleHolderChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
     assert [one.holder(role) for role in Role] == [PLAYER, LOWER]
 
 
@@ -148,4 +148,5 @@ def test_a_player_that_has_both_roles_releases_both() -> None:
 
     changes = one.configure(PLAYER, (-3, -3, -3, -3), 1.0)
 
-    assert changes == [ControlChanged(role, PLAYER, None, Cause.RELEASE, PLAYER) for role in Role]
+    assert changes == [
+        RoleHolderChanged(role, PLAYER, None, Cause.RELEASE, PLAYER) for role in Role]

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role
-from illuminator_ros.gimbal.manager_presence import ManagerState
+from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import MAV_TYPE_GIMBAL
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component

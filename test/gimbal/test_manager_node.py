@@ -24,8 +24,8 @@ from typing import Any
 from unittest.mock import Mock
 
 from illuminator_ros.gimbal.manager import DemandRefused, GimbalManager, ManagerSettings
-from illuminator_ros.gimbal.manager_control import ControlChanged, Role
-from illuminator_ros.gimbal.manager_presence import ManagerState, StateChanged
+from illuminator_ros.gimbal.manager_control import Role, RoleHolderChanged
+from illuminator_ros.gimbal.manager_state import ManagerState, StateChanged
 from illuminator_ros.gimbal.messages import GimbalManagerStatus
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
@@ -313,7 +313,7 @@ def test_no_player_floods_the_log_or_holds_back_the_error_about_another_manager(
     for number in range(2 * MAX_KINDS):
         player = Address(1 + number // 100, 1 + number % 100)
         ManagerNode._take(node, DemandRefused(player, 'reason', 0))
-        ManagerNode._take(node, ControlChanged(Role.PRIMARY, None, player, Cause.CLAIM, player))
+        ManagerNode._take(node, RoleHolderChanged(Role.PRIMARY, None, player, Cause.CLAIM, player))
 
     ManagerNode._state_changed(node, StateChanged(
         ManagerState.ACTIVE, ManagerState.INACTIVE, 154, DEVICE, Address(1, 191)))

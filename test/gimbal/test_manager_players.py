@@ -28,7 +28,7 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from illuminator_ros.gimbal.manager_control import ControlChanged, ControlSettings, Role
+from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
 from illuminator_ros.gimbal.messages import (
     GimbalDeviceSetAttitude,
     GimbalManagerSetPitchyaw,
@@ -191,7 +191,7 @@ class Arena:
 
     def _check_changes(self, before: int, source: Address | None) -> None:
         """Check that control moves by release, lease or an overruling player only."""
-        for change in of(ControlChanged, self.rig.events[before:]):
+        for change in of(RoleHolderChanged, self.rig.events[before:]):
             self.changes += 1
             assert change.by == source
             if change.cause is Cause.RELEASE:

@@ -21,6 +21,7 @@ from typing import Any
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.manager_setpoint import (
     clip,
     Demand,
@@ -29,7 +30,6 @@ from illuminator_ros.gimbal.manager_setpoint import (
     GimbalModel,
     mix,
     nudge,
-    Range,
     resolve,
     Setpoint,
     stopped,

@@ -20,12 +20,12 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
-from illuminator_ros.gimbal.manager_presence import ManagerState
-from illuminator_ros.gimbal.manager_setpoint import Range
+from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus
 from illuminator_ros.mavlink.command_sender import CommandSender

@@ -19,8 +19,8 @@ from __future__ import annotations
 from illuminator_ros.mavlink.messages import Heartbeat
 from illuminator_ros.payload.checks import component_requirements as component
 from illuminator_ros.payload.checks import requirement as base
+from illuminator_ros.payload.checks.requirement import MESSAGES
 from illuminator_ros.payload.checks.session import Session
-from illuminator_ros.payload.checks.specification import MESSAGES
 from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTROL, WinchStatus
 
 

@@ -16,13 +16,13 @@
 
 from collections.abc import Iterator
 
-from illuminator_ros.cli.monitor.graph import lights_among, TOPICS, type_name
 from illuminator_ros.cli.monitor.key_bindings import (
     refresh,
     strobe,
     switch,
 )
 from illuminator_ros.cli.monitor.model import Outcome, State
+from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS, type_name
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from support.light import ServedLight

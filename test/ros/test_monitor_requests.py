@@ -16,9 +16,9 @@
 
 from typing import Any, cast
 
-from illuminator_ros.cli.monitor.graph import ANSWER_LIMIT, Requests
 from illuminator_ros.cli.monitor.key_bindings import dim, strobe, switch
 from illuminator_ros.cli.monitor.model import Fleet, Outcome
+from illuminator_ros.cli.monitor.ros_graph import ANSWER_LIMIT, Requests
 import pytest
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerEvent, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings
-from illuminator_ros.gimbal.manager_presence import ManagerState
+from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
     Capabilities,
     GimbalCommand,

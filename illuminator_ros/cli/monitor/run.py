@@ -31,9 +31,9 @@ from rich.console import Console
 from rich.live import Live
 
 from . import terminal
-from .graph import Graph
 from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
+from .ros_graph import Graph
 from .view import plain, screen, ViewState
 from ..entry_point import discard_output, one_line
 from ..options import option, Parser

@@ -24,7 +24,6 @@ import math
 
 from .tester import (
     GimbalTester,
-    LEVEL,
     Limits,
     NAN,
     Pose,
@@ -33,12 +32,18 @@ from .tester import (
     STEP,
     TOLERANCE,
 )
+from ..axes import LEVEL
 from ..messages import Capabilities, ErrorFlags
 from ...mavlink.messages import MavCmd, MavResult, Message
 from ...payload.checks.component_requirements import none_of
-from ...payload.checks.requirement import AnyRequirement, Requirement, requirement
+from ...payload.checks.requirement import (
+    AnyRequirement,
+    COMMAND,
+    MESSAGES,
+    Requirement,
+    requirement,
+)
 from ...payload.checks.session import Failed, Skipped
-from ...payload.checks.specification import COMMAND, MESSAGES
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import MountFlags, yaw_frame
 from ...payload.rotation import Quaternion

@@ -30,7 +30,6 @@ from .tester import (
     free_address,
     GIMBAL,
     GimbalTester,
-    LEVEL,
     NAN,
     Pose,
     PROPOSAL,
@@ -40,18 +39,20 @@ from .tester import (
     TOLERANCE,
 )
 from .. import messages as gimbal
+from ..axes import LEVEL
 from ..messages import Capabilities, GimbalCommand
 from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, MavType, Message
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
     Conditions,
+    MESSAGES,
     Option,
     PayloadChecks,
     Requirement,
     requirement,
+    ROUTING,
 )
 from ...payload.checks.session import Failed, Session, Skipped
-from ...payload.checks.specification import MESSAGES, ROUTING
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import MountFlags, UNSET_VECTOR
 from ...payload.rotation import Quaternion

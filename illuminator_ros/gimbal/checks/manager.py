@@ -36,7 +36,6 @@ from .tester import (
     free_address,
     GIMBAL,
     GimbalTester,
-    LEVEL,
     NAN,
     Pose,
     PROPOSAL,
@@ -47,12 +46,19 @@ from .tester import (
     TOLERANCE,
 )
 from .. import messages as gimbal
+from ..axes import LEVEL
 from ..messages import Capabilities, GimbalCommand
 from ...mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message
 from ...payload.checks import component_requirements as component
-from ...payload.checks.requirement import Conditions, PayloadChecks, Requirement, requirement
+from ...payload.checks.requirement import (
+    Conditions,
+    MESSAGES,
+    PayloadChecks,
+    Requirement,
+    requirement,
+    ROUTING,
+)
 from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transaction
-from ...payload.checks.specification import MESSAGES, ROUTING
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import MountFlags, UNSET_VECTOR

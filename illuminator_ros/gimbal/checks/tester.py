@@ -23,12 +23,12 @@ import math
 from typing import Any, NamedTuple
 
 from .. import messages as gimbal
+from ..axes import LEVEL
 from ..messages import Capabilities
 from ...mavlink.messages import Address, Message
 from ...payload.checks.component_requirements import restore_interval
-from ...payload.checks.requirement import Conditions
+from ...payload.checks.requirement import Conditions, Specification
 from ...payload.checks.session import Failed, Session, Skipped
-from ...payload.checks.specification import Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import (
     AXES,
@@ -56,7 +56,6 @@ TOLERANCE = 3.0
 STEP = 15.0
 RATE = 6.0
 NAN = math.nan
-LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
 Control = tuple[Address, Address]
 _LIMIT_NAMES = [f'{axis}_{end}' for axis in AXES for end in ('min', 'max')]
 

@@ -28,6 +28,7 @@ from std_msgs.msg import Header
 
 from .conversions import Frames, quaternion_message, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
+from ..axes import Range
 from ..manager import (
     AddressShared,
     DemandRefused,
@@ -38,9 +39,9 @@ from ..manager import (
     SetpointClipped,
     SetpointSent,
 )
-from ..manager_control import ControlChanged, ControlSettings, Role
-from ..manager_presence import ManagerState, StateChanged
-from ..manager_setpoint import GeoPoint, Range
+from ..manager_control import ControlSettings, Role, RoleHolderChanged
+from ..manager_setpoint import GeoPoint
+from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
@@ -184,7 +185,7 @@ class ManagerNode(ServedPayload):
             self._publish(event)
         elif isinstance(event, StateChanged):
             self._state_changed(event)
-        elif isinstance(event, ControlChanged):
+        elif isinstance(event, RoleHolderChanged):
             self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
         elif isinstance(event, DemandRefused):
             more = f' ({event.unreported} more)' if event.unreported else ''
@@ -280,7 +281,7 @@ def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
         'other_manager': str(manager.other or 'none')}
 
 
-def _control_text(event: ControlChanged, lease: float) -> str:
+def _control_text(event: RoleHolderChanged, lease: float) -> str:
     before, after = event.before or 'none', event.after or 'none'
     why = (f'{event.before} was silent for {lease:g} s' if event.cause is Cause.SILENCE
            else f'by {event.by}')

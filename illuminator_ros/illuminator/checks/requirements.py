@@ -36,9 +36,17 @@ from ..messages import IlluminatorStatus
 from ..model import ErrorFlag, flag_names, float32, KNOWN_FLAGS, Limits, Mode, Status
 from ...mavlink import messages
 from ...payload.checks import component_requirements as component
-from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...payload.checks.requirement import (
+    COMMAND,
+    MESSAGES,
+    Option,
+    PayloadChecks,
+    Requirement,
+    requirement,
+    ROUTING,
+    Specification,
+)
 from ...payload.checks.session import fail_if, Failed, Skipped
-from ...payload.checks.specification import COMMAND, MESSAGES, ROUTING, Specification
 
 CONFIGURE_SECTION = 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE'
 INTERNAL = float(Mode.INTERNAL_CONTROL)

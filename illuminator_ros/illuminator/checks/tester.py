@@ -23,9 +23,8 @@ from ..messages import IlluminatorStatus
 from ..model import Configuration, DIMMING_FLAGS, flag_names, Mode, NOTHING, shortest, Status
 from ...mavlink.messages import MavCmd, MavResult
 from ...payload.checks.component_requirements import restore_interval
-from ...payload.checks.requirement import Conditions, NOT_AGREED
+from ...payload.checks.requirement import Conditions, NOT_AGREED, Specification
 from ...payload.checks.session import Failed, MESSAGE_TIMEOUT, Session, Skipped, Transaction
-from ...payload.checks.specification import Specification
 
 ILLUMINATOR = Specification(
     'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')

@@ -23,9 +23,18 @@ from itertools import pairwise
 import math
 from statistics import median_high
 
-from .requirement import Requirement, requirement, Tester
+from .requirement import (
+    COMMAND,
+    HEARTBEAT,
+    MESSAGES,
+    Requirement,
+    requirement,
+    ROUTING,
+    SERIALIZATION,
+    Specification,
+    Tester,
+)
 from .session import fail_if, Failed, Session, Skipped, Transaction
-from .specification import COMMAND, HEARTBEAT, MESSAGES, ROUTING, SERIALIZATION, Specification
 from ...mavlink import messages
 from ...mavlink.messages import Address, Heartbeat, MavCmd, MavResult, Message, result_name
 

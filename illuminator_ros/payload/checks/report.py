@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import json
 from xml.etree import ElementTree
 
-from .requirement import AnyRequirement, Result, Verdict
-from .specification import HEARTBEAT
+from .requirement import AnyRequirement, HEARTBEAT, Result, Verdict
 from ... import __version__
 
 SHOWN_LINES = 12

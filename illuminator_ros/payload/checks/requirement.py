@@ -22,10 +22,25 @@ from enum import Enum
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from .session import Session
-from .specification import Specification
 from ...mavlink.messages import Address, Message
 
 NOT_AGREED = 'not agreed to; see --yes'
+
+
+class Specification(NamedTuple):
+    """A page that contains requirements."""
+
+    title: str
+    url: str
+
+
+# Pages of the MAVLink guide.
+_GUIDE = 'https://mavlink.io/en/'
+HEARTBEAT = Specification('heartbeat protocol', _GUIDE + 'services/heartbeat.html')
+COMMAND = Specification('command protocol', _GUIDE + 'services/command.html')
+MESSAGES = Specification('common message set', _GUIDE + 'messages/common.html')
+ROUTING = Specification('routing', _GUIDE + 'guide/routing.html')
+SERIALIZATION = Specification('serialization', _GUIDE + 'guide/serialization.html')
 
 
 class Verdict(Enum):

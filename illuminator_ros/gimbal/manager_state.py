@@ -87,7 +87,7 @@ class StateChanged:
     other: Address | None
 
 
-class Presence:
+class StateTracker:
     """
     The device of a manager, and other managers of it. No I/O; times are s.
 

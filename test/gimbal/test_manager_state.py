@@ -20,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 import re
 
-from illuminator_ros.gimbal.manager_presence import (
+from illuminator_ros.gimbal.manager_state import (
     MANAGER_TIMEOUT,
     ManagerInput,
     ManagerState,

@@ -1,0 +1,55 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The axes of a gimbal: their ranges, and the flags of each in the order of AXES."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from .messages import Capabilities, ErrorFlags
+from ..payload.mount_attitude import MountFlags
+
+HAS_AXIS = (Capabilities.HAS_ROLL_AXIS, Capabilities.HAS_PITCH_AXIS, Capabilities.HAS_YAW_AXIS)
+HAS_FOLLOW = (Capabilities.HAS_ROLL_FOLLOW, Capabilities.HAS_PITCH_FOLLOW,
+              Capabilities.HAS_YAW_FOLLOW)
+HAS_LOCK = (Capabilities.HAS_ROLL_LOCK, Capabilities.HAS_PITCH_LOCK, Capabilities.HAS_YAW_LOCK)
+LOCKS = (MountFlags.ROLL_LOCK, MountFlags.PITCH_LOCK, MountFlags.YAW_LOCK)
+AT_LIMIT = (ErrorFlags.AT_ROLL_LIMIT, ErrorFlags.AT_PITCH_LIMIT, ErrorFlags.AT_YAW_LIMIT)
+# Roll and pitch are relative to the horizon.
+LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+# Angles that are equal, rad.
+RESOLUTION = 1e-6
+
+
+class Range(NamedTuple):
+    """The range of an axis, rad, infinite where it is not known."""
+
+    low: float = -math.inf
+    high: float = math.inf
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the axis cannot turn."""
+        return self.low == self.high
+
+    @property
+    def is_endless(self) -> bool:
+        """Whether it is a full turn, which has no stop."""
+        return self.high - self.low >= math.tau - RESOLUTION
+
+    def clip(self, angle: float) -> float:
+        """Return the nearest angle within the range."""
+        return min(max(angle, self.low), self.high)
