@@ -25,20 +25,11 @@ import threading
 import time
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandLong,
-    heartbeat,
-    MavCmd,
-    MavResult,
-    MavType,
-    Message,
-)
 from support.frames import frame_of
 
-LIGHT = Address(1, 243)
+LIGHT = mav.Address(1, 243)
 COMMAND_LONG = struct.Struct('<7fHBBB')
 
 
@@ -52,7 +43,7 @@ class MinimalLight:
     :ivar sent: CLOCK_MONOTONIC just before each status was sent, s, by its uptime, ms.
     """
 
-    def __init__(self, port: int, address: Address = LIGHT) -> None:
+    def __init__(self, port: int, address: mav.Address = LIGHT) -> None:
         self.silent: set[int] = set()
         self.asked = threading.Event()
         self.received = 0
@@ -77,7 +68,7 @@ class MinimalLight:
         uptime = int((now - self._began) * 1000)
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + 1.0
-            self._send(heartbeat(MavType.ILLUMINATOR))
+            self._send(mav.heartbeat(mav.MavType.ILLUMINATOR))
             self._answer()
         message = IlluminatorStatus(
             uptime, self._on, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0)
@@ -106,7 +97,7 @@ class MinimalLight:
                 data = self._socket.recv(65536)
                 self.received += len(data)
                 for frame in self._decoder.feed(data):
-                    if frame.message_id == CommandLong.id:
+                    if frame.message_id == mav.CommandLong.id:
                         self._command(bytes(frame.payload))
 
     def _command(self, payload: bytes) -> None:
@@ -114,21 +105,21 @@ class MinimalLight:
         command = int(values[7])
         if command in self.silent:
             self.asked.set()
-        elif command == MavCmd.ILLUMINATOR_ON_OFF:
+        elif command == mav.MavCmd.ILLUMINATOR_ON_OFF:
             self._on = int(values[0])
-            self._send(CommandAck(command, MavResult.ACCEPTED))
+            self._send(mav.CommandAck(command, mav.MavResult.ACCEPTED))
             self.status()
         else:
-            self._send(CommandAck(command, MavResult.UNSUPPORTED))
+            self._send(mav.CommandAck(command, mav.MavResult.UNSUPPORTED))
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: mav.Message) -> None:
         self._sequence = (self._sequence + 1) & 0xFF
         with contextlib.suppress(ConnectionError):
             self._socket.send(frame_of(message, self._sequence, self._address))
 
 
 @contextlib.contextmanager
-def serving(port: int, address: Address = LIGHT) -> Iterator[MinimalLight]:
+def serving(port: int, address: mav.Address = LIGHT) -> Iterator[MinimalLight]:
     """Serve a light in a thread of this process."""
     light, ended = MinimalLight(port, address), threading.Event()
     thread = threading.Thread(target=light.serve, args=(ended,))

@@ -36,26 +36,18 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerStatus,
     MAV_TYPE_GIMBAL,
 )
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandLong,
-    decode_payload,
-    heartbeat,
-    MavType,
-    Message,
-)
 from illuminator_ros.payload.rotation import Quaternion
 from support.frames import Codec
 
 from ..rig import Bench, bridge, free_port, peer
 from ..rows import at_most, one, quantiles, Row, times
 
-MANAGER, DEVICE = Address(1, 194), Address(1, 154)
-PLAYERS = [Address(255, 100 + number) for number in range(20)]
-CLASSES: dict[int, type[Message]] = {cls.id: cls for cls in (
-    CommandAck, GimbalDeviceSetAttitude, GimbalManagerStatus)}
+MANAGER, DEVICE = mav.Address(1, 194), mav.Address(1, 154)
+PLAYERS = [mav.Address(255, 100 + number) for number in range(20)]
+CLASSES: dict[int, type[mav.Message]] = {cls.id: cls for cls in (
+    mav.CommandAck, GimbalDeviceSetAttitude, GimbalManagerStatus)}
 WARM_UP = 50
 RATE, SECONDS = 1000, 10.0
 # rad between the yaws by which the setpoints of two players differ.
@@ -71,11 +63,11 @@ class Line:
         self.socket.bind(('127.0.0.1', port))
         self._codec, self._decoder = Codec(), Decoder()
 
-    def frame(self, source: Address, message: Message) -> bytes:
+    def frame(self, source: mav.Address, message: mav.Message) -> bytes:
         """Return a message as a frame."""
         return self._codec.frame(source, message)
 
-    def send(self, source: Address, message: Message, port: int) -> None:
+    def send(self, source: mav.Address, message: mav.Message, port: int) -> None:
         """Send a message."""
         self.socket.sendto(self.frame(source, message), ('127.0.0.1', port))
 
@@ -86,7 +78,7 @@ class Line:
             data = self.socket.recv(65536)
         except TimeoutError:
             return []
-        return [decode_payload(CLASSES[frame.message_id], frame.payload)
+        return [mav.decode_payload(CLASSES[frame.message_id], frame.payload)
                 for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
 
     def drain(self) -> None:
@@ -97,13 +89,13 @@ class Line:
                 self.socket.recv(65536)
 
 
-def configure(player: Address) -> CommandLong:
+def configure(player: mav.Address) -> mav.CommandLong:
     """Return the command by which a player takes control."""
-    return CommandLong(*MANAGER, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0,
-                       0, 0)
+    return mav.CommandLong(
+        *MANAGER, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0, 0, 0)
 
 
-def setpoint(player: Address, pitch: float = 0.0) -> GimbalManagerSetPitchyaw:
+def setpoint(player: mav.Address, pitch: float = 0.0) -> GimbalManagerSetPitchyaw:
     """Return a setpoint whose yaw belongs to one player."""
     return GimbalManagerSetPitchyaw(
         *MANAGER, 0, 0, pitch, STEP * (PLAYERS.index(player) - 10), math.nan, math.nan)
@@ -118,11 +110,11 @@ def managed() -> Iterator[tuple[int, Line, Line]]:
                 payloads='[gimbal_manager]'):
         until = time.monotonic() + 20.0
         while time.monotonic() < until:
-            device.send(DEVICE, heartbeat(MAV_TYPE_GIMBAL), port)
-            players.send(PLAYERS[0], heartbeat(MavType.GCS), port)
+            device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
+            players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
             players.send(PLAYERS[0], configure(PLAYERS[0]), port)
             device.receive(0.1)
-            if any(isinstance(message, CommandAck) and message.result == 0
+            if any(isinstance(message, mav.CommandAck) and message.result == 0
                    for _ in range(20) for message in players.receive(0.01)):
                 yield port, device, players
                 break
@@ -147,8 +139,8 @@ def _setpoints(bench: Bench) -> Row:
             for number in range(bench.amount(2000, 20)):
                 if time.monotonic() >= beat:
                     beat = time.monotonic() + 0.5
-                    device.send(DEVICE, heartbeat(MAV_TYPE_GIMBAL), port)
-                    players.send(PLAYERS[0], heartbeat(MavType.GCS), port)
+                    device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
+                    players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
                     time.sleep(0.01)
                 message = setpoint(PLAYERS[0], pitch=0.3 * math.sin(number))
                 device.drain()
@@ -197,9 +189,9 @@ def _competition(bench: Bench) -> Iterator[Row]:
         while (now := time.monotonic()) < began + seconds + 1.0:
             if now >= beat:
                 beat = now + 0.5
-                device.send(DEVICE, heartbeat(MAV_TYPE_GIMBAL), port)
+                device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
                 for player in PLAYERS:
-                    players.send(player, heartbeat(MavType.GCS), port)
+                    players.send(player, mav.heartbeat(mav.MavType.GCS), port)
             while sent < min(now - began, seconds) * RATE:
                 player = PLAYERS[sent % len(PLAYERS)]
                 players.send(player, configure(player), port)
@@ -207,7 +199,7 @@ def _competition(bench: Bench) -> Iterator[Row]:
                 sent += 1
             while received := players.receive(0.0):
                 results.update(message.result for message in received
-                               if isinstance(message, CommandAck))
+                               if isinstance(message, mav.CommandAck))
             for message in device.receive(0.001):
                 if isinstance(message, GimbalDeviceSetAttitude):
                     obeyed.add(round(Quaternion(*message.q).euler()[2] / STEP))

@@ -29,18 +29,7 @@ import time
 from std_msgs.msg import Float64
 
 from .status import STATE
-from ..rig import (
-    Bench,
-    Client,
-    free_port,
-    interleaved,
-    PATIENCE,
-    PEERS,
-    Program,
-    python,
-    running,
-    simulator,
-)
+from .. import rig
 from ..rows import quantiles, Row, times
 
 OURS, EMPTY = 'bridge', 'empty node'
@@ -48,13 +37,13 @@ STATUS_PERIOD = 1.0
 RATIO = 1.2
 
 
-def measure(bench: Bench) -> Iterator[Row]:
+def measure(bench: rig.Bench) -> Iterator[Row]:
     """Start each again and again, in alternate order."""
-    port = free_port()
+    port = rig.free_port()
     service: dict[str, list[float]] = {OURS: [], EMPTY: []}
     status: list[float] = []
-    with simulator(f'udpout://127.0.0.1:{port}', '--status-interval', str(STATUS_PERIOD)):
-        for number, name in enumerate(interleaved([OURS, EMPTY], bench.amount(8, 1))):
+    with rig.simulator(f'udpout://127.0.0.1:{port}', '--status-interval', str(STATUS_PERIOD)):
+        for number, name in enumerate(rig.interleaved([OURS, EMPTY], bench.amount(8, 1))):
             # Each start has a node name of its own: a name that was discovered before is faster.
             answering, publishing = start(bench, name, f'started_{number}', port)
             service[name].append(answering * 1e3)
@@ -69,7 +58,7 @@ def measure(bench: Bench) -> Iterator[Row]:
               {'empty node, its service': found[EMPTY]}, note=note)
 
 
-def start(bench: Bench, name: str, node: str, port: int) -> tuple[float, float]:
+def start(bench: rig.Bench, name: str, node: str, port: int) -> tuple[float, float]:
     """Return the s from a start until the service answers, and until a status is published."""
     published: list[float] = []
     first = threading.Event()
@@ -78,19 +67,19 @@ def start(bench: Bench, name: str, node: str, port: int) -> tuple[float, float]:
         published.append(time.monotonic())
         first.set()
 
-    with Client(bench.domain) as client:
+    with rig.Client(bench.domain) as client:
         client.client(f'/{node}/enable')
         client.subscribe(Float64, f'/{node}/uptime', came, STATE)
         began = time.monotonic()
         program = (
-            python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={node}',
-                   '-p', f'connection_url:=udpin://127.0.0.1:{port}') if name == OURS
-            else Program(sys.executable, str(PEERS / 'empty_server.py'), node))
-        with running(program):
+            rig.python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={node}',
+                       '-p', f'connection_url:=udpin://127.0.0.1:{port}') if name == OURS
+            else rig.Program(sys.executable, str(rig.PEERS / 'empty_server.py'), node))
+        with rig.running(program):
             client.meet(f'/{node}/enable', success=False)
             answering = time.monotonic() - began
             if name == EMPTY:
                 return answering, 0.0
-            if not first.wait(PATIENCE):
+            if not first.wait(rig.PATIENCE):
                 raise RuntimeError(f'no status was published:\n{program.log}')
             return answering, published[0] - began

@@ -21,22 +21,8 @@ from dataclasses import dataclass, field, replace
 import math
 from typing import Any, TypeVar
 
+from . import events
 from .commands import Configure, Control, SetFlags, setpoint_flags
-from .events import (
-    AttitudeReceived,
-    AutomaticTakeFailed,
-    ControlChanged,
-    DeviceIdentity,
-    GimbalConnected,
-    GimbalEvent,
-    GimbalHeld,
-    GimbalKey,
-    GimbalLost,
-    GimbalSnapshot,
-    ManagerChanged,
-    Ranges,
-    SecondManager,
-)
 from .messages import (
     Capabilities,
     ErrorFlags,
@@ -175,8 +161,8 @@ class Gimbal:
     """
 
     def __init__(
-        self, key: GimbalKey, commands: CommandSender, settings: GimbalSettings,
-        emit: Callable[[GimbalEvent], None],
+        self, key: events.GimbalKey, commands: CommandSender, settings: GimbalSettings,
+        emit: Callable[[events.GimbalEvent], None],
     ) -> None:
         self.key = key
         self.was_commanded = False
@@ -192,8 +178,8 @@ class Gimbal:
         self._control: Control | None = None
         self._may_take = settings.auto_take_control
         self._releasing = False
-        self._identity: DeviceIdentity | None = None
-        self._device_ranges: Ranges | None = None
+        self._identity: events.DeviceIdentity | None = None
+        self._device_ranges: events.Ranges | None = None
         self._identity_query = Repetition()
         self._interval_query = Repetition(
             -math.inf if settings.attitude_interval else math.inf)
@@ -255,14 +241,14 @@ class Gimbal:
         if self._connected is bool(reason):
             self._connected = not reason
             if reason:
-                self._emit(GimbalLost(self.key, reason))
+                self._emit(events.GimbalLost(self.key, reason))
             else:
                 self._link_problem = ''
                 self._may_take = self._settings.auto_take_control
                 self._identity_query = Repetition()
                 if self._settings.attitude_interval:
                     self._interval_query = Repetition()
-                self._emit(GimbalConnected(self.key, self._manager))
+                self._emit(events.GimbalConnected(self.key, self._manager))
         control = (manager.control if manager and self._manager_heard
                    and now < manager.status_at + STATUS_LIMIT else None)
         if control != self._control:
@@ -284,7 +270,7 @@ class Gimbal:
                     self._send_rates(STILL, now)
         elif not self.in_control:
             self._stop()
-        self._emit(ControlChanged(
+        self._emit(events.ControlChanged(
             self.key, before, after, self.in_control,
             was_lost=had and after is not None and not self.in_control and not self._releasing))
 
@@ -297,10 +283,10 @@ class Gimbal:
             if before in self._managers:
                 for queue in self._managers[before].queues:
                     queue.cancel('the manager was lost', now)
-                self._emit(ManagerChanged(self.key, before, self._manager))
+                self._emit(events.ManagerChanged(self.key, before, self._manager))
         others = set(heard) - {self._manager}
         for other in others - self._others:
-            self._emit(SecondManager(self.key, self._manager, other))
+            self._emit(events.SecondManager(self.key, self._manager, other))
         self._others = others
 
     # Messages
@@ -347,8 +333,8 @@ class Gimbal:
 
     def take_device_information(self, message: GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION of the device."""
-        self._identity = DeviceIdentity.of(message)
-        self._device_ranges = Ranges.of(message)
+        self._identity = events.DeviceIdentity.of(message)
+        self._device_ranges = events.Ranges.of(message)
         self._identity_query.finish()
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
@@ -362,7 +348,7 @@ class Gimbal:
         self._check(now)
         if (manager := self._active) is not None:
             manager.flag_requests.take(request.Report(status, now, has_clock=False), now)
-        self._emit(AttitudeReceived(self.key, self._attitude, self._flags, self._errors))
+        self._emit(events.AttitudeReceived(self.key, self._attitude, self._flags, self._errors))
 
     # Control
 
@@ -476,7 +462,7 @@ class Gimbal:
         if self._active is not None and change.before is not None:
             self._active.flag_requests.cancel(self.refusal(change.before), now)
             self._commands.end_all(now, CommandStatus.CANCELLED, self._manager, _MOVES)
-        self._emit(GimbalHeld(self.key, change))
+        self._emit(events.GimbalHeld(self.key, change))
 
     # Requests
 
@@ -674,7 +660,7 @@ class Gimbal:
 
     def _taken_automatically(self, result: request.Result, now: float) -> None:
         if not result.success:
-            self._emit(AutomaticTakeFailed(self.key, result.message))
+            self._emit(events.AutomaticTakeFailed(self.key, result.message))
 
     def _interval_answered(self, result: CommandResult, now: float) -> None:
         if result.result is not None:
@@ -710,14 +696,14 @@ class Gimbal:
             deadlines += self._setpoint.zero_at, *self._setpoint.repeats[:1]
         return min(deadlines)
 
-    def snapshot(self, now: float) -> GimbalSnapshot:
+    def snapshot(self, now: float) -> events.GimbalSnapshot:
         """Return the gimbal at this moment."""
         manager = self._active
         information = manager.information if manager else None
-        return GimbalSnapshot(
+        return events.GimbalSnapshot(
             self.key, self.unreachable(now), (self._manager, *sorted(self._others)),
             self._capabilities(),
-            self._device_ranges or (Ranges.of(information) if information else None),
+            self._device_ranges or (events.Ranges.of(information) if information else None),
             self._identity, self._attitude, self._attitude_at, self._problem, self._flags,
             self._errors, self._control, self.in_control,
             manager.status_at if manager else -math.inf, self.enforces_control,

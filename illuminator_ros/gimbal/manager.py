@@ -583,7 +583,7 @@ class GimbalManager(Payload):
 
     def _place_flags(self) -> MountFlags:
         return LEVEL | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
-                             else MountFlags.YAW_LOCK)
+                        else MountFlags.YAW_LOCK)
 
     def _follow(self, now: float) -> None:
         """Send the setpoint, which follows a place if there is one."""

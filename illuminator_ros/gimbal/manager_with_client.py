@@ -30,19 +30,10 @@ from typing import Any, TypeVar
 from .client import GimbalClient
 from .gimbal import GimbalSettings
 from .manager import GimbalManager, ManagerSettings
+from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand, CommandReceiver
 from ..mavlink.command_sender import CommandSender, CommandStatus
 from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
-from ..mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    heartbeat,
-    MavResult,
-    MavType,
-    Message,
-)
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
 T = TypeVar('T')
@@ -55,7 +46,7 @@ class ManagerWithClient(Payload):
     :ivar client: knows the gimbal of the manager, and no other.
     """
 
-    messages = (*GimbalManager.messages, CommandAck)
+    messages = (*GimbalManager.messages, mav.CommandAck)
     sends = (*GimbalManager.sends, *GimbalClient.sends)
 
     def __init__(
@@ -80,9 +71,9 @@ class ManagerWithClient(Payload):
         self.manager.link_closed(now, reason)
         self.client.link_closed(now, reason)
 
-    def receive(self, source: Address, message: Message, now: float) -> None:
+    def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
-        if isinstance(message, CommandAck):
+        if isinstance(message, mav.CommandAck):
             self._own.acknowledge(source, message, now)
         else:
             self._manage(self.manager.receive, source, message, now)
@@ -90,11 +81,13 @@ class ManagerWithClient(Payload):
                 self.client.receive(source, message, now)
         self._serve_client(now)
 
-    def receive_conflicting(self, message: Message, now: float) -> None:
+    def receive_conflicting(self, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive_conflicting`."""
         self.manager.receive_conflicting(message, now)
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+    def execute(
+        self, source: mav.Address, command: AnyCommand, now: float,
+    ) -> mav.MavResult | None:
         """See :meth:`Payload.execute`."""
         result = self._manage(self.manager.execute, source, command, now)
         self._serve_client(now)
@@ -108,7 +101,7 @@ class ManagerWithClient(Payload):
         """See :meth:`Payload.poll`."""
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + HEARTBEAT_INTERVAL
-            alive = heartbeat(MavType.ONBOARD_CONTROLLER)
+            alive = mav.heartbeat(mav.MavType.ONBOARD_CONTROLLER)
             self.client.receive(self._commands.address, alive, now)
             self.manager.receive(self._commands.address, alive, now)
         self._manage(self.manager.poll, now)
@@ -146,12 +139,14 @@ class ManagerWithClient(Payload):
                       getattr(message, 'target_component', 0))
             if target != self._commands.address:
                 self._commands.send(message)
-            elif isinstance(message, CommandLong | CommandInt):
+            elif isinstance(message, mav.CommandLong | mav.CommandInt):
                 ack = self._received.take(source, message, now, self._execute)
                 if ack is not None:
                     self._own.acknowledge(source, ack, now)
             else:
                 self._manage(self.manager.receive, source, message, now)
 
-    def _execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+    def _execute(
+        self, source: mav.Address, command: AnyCommand, now: float,
+    ) -> mav.MavResult | None:
         return self._manage(self.manager.execute, source, command, now)

@@ -35,20 +35,12 @@ from .messages import Capabilities, ErrorFlags
 from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields
 from .. import __version__
 from ..mavlink.messages import Address, Message
+from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, MountFlags, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
-from ..payload.simulated import (
-    AnyCommand,
-    Change,
-    ConsoleCommand,
-    Reply,
-    SimulatedDevice,
-    SimulatedType,
-    Snapshot,
-)
 from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 
 # s without an announcement after which a component is no longer the manager.
@@ -249,7 +241,7 @@ class SimulatedMount:
             capabilities & 0xFFFF, 0, **self.limits(behaviour),
             gimbal_device_id=self._device_id, cap_flags2=capabilities)
 
-    def describe(self, now: float, *notes: str) -> Snapshot:
+    def describe(self, now: float, *notes: str) -> simulated.Snapshot:
         """Return the actual state of this moment, for people."""
         motion = self.motion
         motion.advance(now)
@@ -259,23 +251,23 @@ class SimulatedMount:
                  *(str(flag.name) for flag in ErrorFlags if flag & motion.limits()),
                  *filter(None, notes))
         shown = tuple(str(one).lower().replace('_', ' ') for one in state)
-        return Snapshot(
+        return simulated.Snapshot(
             '  '.join((f'roll {roll:6.1f}  pitch {pitch:6.1f}  yaw {yaw:6.1f} deg', *shown)),
             (*shown, motion.moving), motion.travelled / TRAVEL_STEP)
 
 
-def _turn(device: Any, words: list[str], now: float) -> Change:
+def _turn(device: Any, words: list[str], now: float) -> simulated.Change:
     pitch, yaw = (math.radians(_degrees(word)) for word in words)
     return partial(device.mount.motion.turn, pitch, yaw, now)
 
 
-COMMANDS: tuple[ConsoleCommand[Any, Change], ...] = (
-    ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon and vehicle',
-                   _turn, (2,)),
+COMMANDS: tuple[simulated.ConsoleCommand[Any, simulated.Change], ...] = (
+    simulated.ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon '
+                             'and vehicle', _turn, (2,)),
 )
 
 
-class SimulatedGimbal(SimulatedDevice):
+class SimulatedGimbal(simulated.SimulatedDevice):
     """
     A simulated gimbal device, without the link: see :class:`SimulatedDevice`.
 
@@ -322,7 +314,9 @@ class SimulatedGimbal(SimulatedDevice):
             return self.mount.information(self.behaviour, now)
         return None
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
+    def execute(
+        self, source: Address, command: simulated.AnyCommand, now: float,
+    ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`: no command moves a device."""
         return None
 
@@ -378,7 +372,7 @@ class SimulatedGimbal(SimulatedDevice):
             (message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
             self.behaviour, now)
 
-    def snapshot(self, now: float) -> Snapshot:
+    def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
         self._expire(now)
         return self.mount.describe(
@@ -455,7 +449,7 @@ def properties(settings: Values, address: Address) -> GimbalProperties:
         manager=Address(address.system, manager) if manager else None)
 
 
-SIMULATED = SimulatedType(
+SIMULATED = simulated.SimulatedType(
     'gimbal', 'gimbals', SimulatedGimbal,
     make=lambda settings, address, several: SimulatedGimbal(properties(settings, address)),
     address=lambda settings: GimbalProperties.address, settings=SETTINGS,

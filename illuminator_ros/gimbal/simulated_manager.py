@@ -51,19 +51,11 @@ from ..mavlink.messages import (
     MavResult,
     Message,
 )
+from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
-from ..payload.simulated import (
-    AnyCommand,
-    Change,
-    CommandReply,
-    Reply,
-    SimulatedDevice,
-    SimulatedType,
-    Snapshot,
-)
 from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
@@ -188,7 +180,7 @@ class _Setpoint(NamedTuple):
     rates: Vector
 
 
-class SimulatedManager(SimulatedDevice):
+class SimulatedManager(simulated.SimulatedDevice):
     """
     A simulated gimbal with a manager, without the link: see :class:`SimulatedDevice`.
 
@@ -343,36 +335,38 @@ class SimulatedManager(SimulatedDevice):
 
     # Commands
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
+    def execute(
+        self, source: Address, command: simulated.AnyCommand, now: float,
+    ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
         first = (command.param1, command.param2, command.param3, command.param4)
         last = ((command.x, command.y, command.z) if isinstance(command, CommandInt)
                 else (command.param5, command.param6, command.param7))
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
             if not self._is_for_device(last[2]):
-                return CommandReply(MavResult.DENIED)
+                return simulated.CommandReply(MavResult.DENIED)
             return self._pitchyaw(source, first, last[0], now)
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
             if not self._is_for_device(last[2]):
-                return CommandReply(MavResult.DENIED)
+                return simulated.CommandReply(MavResult.DENIED)
             return self._configure(source, first)
         if command.command not in self.changes:
             return None
         if not self._is_for_device(command.param1):
-            return CommandReply(MavResult.DENIED)
-        change: Change = partial(self._clear_roi, now)
+            return simulated.CommandReply(MavResult.DENIED)
+        change: simulated.Change = partial(self._clear_roi, now)
         if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
             place = self._place(command, last)
             if not isinstance(place, GeoPoint):
-                return CommandReply(place)
+                return simulated.CommandReply(place)
             change = partial(self._set_roi, place, now)
         allowed = not self.behaviour.enforces_roi or source == self.primary
-        return CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, change)
+        return simulated.CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, change)
 
     def _pitchyaw(
         self, source: Address, values: tuple[float, float, float, float], flags: float,
         now: float,
-    ) -> CommandReply:
+    ) -> simulated.CommandReply:
         pitch, yaw, pitch_rate, yaw_rate = map(math.radians, values)
         if not self.behaviour.rates_in_degrees:
             pitch_rate, yaw_rate = values[2:]
@@ -381,25 +375,25 @@ class SimulatedManager(SimulatedDevice):
             bits = int(flags)
             frame = self._frame(bits)
         except (ValueError, OverflowError):
-            return CommandReply(MavResult.DENIED)
+            return simulated.CommandReply(MavResult.DENIED)
         complete = self._complete(_Setpoint(
             bits, frame, (0.0, pitch, yaw), (math.nan, pitch_rate, yaw_rate)))
         if complete is None:
             assert self.behaviour.partial_angles is not None
-            return CommandReply(self.behaviour.partial_angles)
-        return CommandReply(
+            return simulated.CommandReply(self.behaviour.partial_angles)
+        return simulated.CommandReply(
             MavResult.ACCEPTED if self._may_control(source) else MavResult.DENIED,
             partial(self._obey, source, complete, now))
 
     def _configure(
         self, source: Address, values: tuple[float, float, float, float],
-    ) -> CommandReply:
+    ) -> simulated.CommandReply:
         behaviour = self.behaviour
         if not all(value % 1 == 0 and -3 <= value <= 255 for value in values):
-            return CommandReply(behaviour.invalid_configure)
+            return simulated.CommandReply(behaviour.invalid_configure)
         primary = self._resolved(self.primary, values[:2], source)
         secondary = self._resolved(self.secondary, values[2:], source)
-        return CommandReply(MavResult.ACCEPTED, partial(
+        return simulated.CommandReply(MavResult.ACCEPTED, partial(
             self._give_control, primary, secondary if behaviour.has_secondary else NO_COMPONENT))
 
     def _resolved(
@@ -421,7 +415,9 @@ class SimulatedManager(SimulatedDevice):
 
     # Region of interest
 
-    def _place(self, command: AnyCommand, last: tuple[float, ...]) -> GeoPoint | MavResult:
+    def _place(
+        self, command: simulated.AnyCommand, last: tuple[float, ...],
+    ) -> GeoPoint | MavResult:
         latitude, longitude, altitude = last
         if isinstance(command, CommandInt):
             latitude, longitude = latitude / 1e7, longitude / 1e7
@@ -454,7 +450,7 @@ class SimulatedManager(SimulatedDevice):
         self.mount.set(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH,
                        (0.0, pitch, math.atan2(east, north)), UNSET_VECTOR, self.behaviour, now)
 
-    def snapshot(self, now: float) -> Snapshot:
+    def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
         control = ', '.join(
             f'{name} {one}' for name, one in (
@@ -494,7 +490,7 @@ def manager_properties(settings: Values, address: Address) -> ManagerProperties:
         heading=math.radians(settings.get('heading', 0.0)))
 
 
-SIMULATED = SimulatedType(
+SIMULATED = simulated.SimulatedType(
     'manager', 'managers', SimulatedManager,
     make=lambda settings, address, several: SimulatedManager(
         manager_properties(settings, address)),

@@ -25,17 +25,8 @@ from dataclasses import fields, replace
 from functools import partial
 import math
 
+from . import model
 from .messages import IlluminatorStatus, STATUS_ID
-from .model import (
-    checked,
-    Configuration,
-    ErrorFlag,
-    flag_names,
-    InvalidValue,
-    Limits,
-    Mode,
-    MODES,
-)
 from .simulated_properties import (
     Extension,
     FAULTS,
@@ -44,14 +35,7 @@ from .simulated_properties import (
     PROFILES,
 )
 from .thermal import ThermalModel, ThermalProperties
-from ..mavlink.messages import (
-    Address,
-    ComponentInformationBasic,
-    INFORMATION_ID,
-    MavCmd,
-    MavResult,
-    Message,
-)
+from ..mavlink import messages as mav
 from ..payload.faults import Behaviour
 from ..payload.identity import Identity
 from ..payload.simulated import (
@@ -108,8 +92,8 @@ class SimulatedIlluminator(SimulatedDevice):
     :ivar configuration: as commanded.
     """
 
-    changes = frozenset({MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE})
-    sends = (IlluminatorStatus, ComponentInformationBasic)
+    changes = frozenset({mav.MavCmd.ILLUMINATOR_ON_OFF, mav.MavCmd.DO_ILLUMINATOR_CONFIGURE})
+    sends = (IlluminatorStatus, mav.ComponentInformationBasic)
     faults = FAULTS
     commands = COMMANDS
     behaviour: IlluminatorBehaviour
@@ -130,7 +114,7 @@ class SimulatedIlluminator(SimulatedDevice):
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; the temperature stays."""
         self.enabled = False
-        self.configuration = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
+        self.configuration = model.Configuration(model.Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
         self._last_brightness = self.configuration.brightness
         self._booted_at = now
         self._warmed_at = now
@@ -139,11 +123,11 @@ class SimulatedIlluminator(SimulatedDevice):
         """See :meth:`SimulatedDevice.streams`."""
         return {STATUS_ID: self.properties.status_interval}
 
-    def message(self, message_id: int, now: float) -> Message | None:
+    def message(self, message_id: int, now: float) -> mav.Message | None:
         """See :meth:`SimulatedDevice.message`."""
         if message_id == STATUS_ID:
             return self.status(now)
-        if message_id == INFORMATION_ID and self.behaviour.identifies:
+        if message_id == mav.INFORMATION_ID and self.behaviour.identifies:
             return self._information(now)
         return None
 
@@ -160,8 +144,8 @@ class SimulatedIlluminator(SimulatedDevice):
             brightness = 0.0
         flags = int(self.thermal.flags) | behaviour.false_flags
         if behaviour.inverted_flags and self.enabled:
-            flags ^= ErrorFlag.THERMAL_THROTTLING
-        limits = self.properties.limits if behaviour.measures else Limits()
+            flags ^= model.ErrorFlag.THERMAL_THROTTLING
+        limits = self.properties.limits if behaviour.measures else model.Limits()
         fields = (
             self.uptime_ms(now) if behaviour.has_clock else 0, int(self.enabled),
             self.properties.reported_bitmask, flags, int(configuration.mode), brightness,
@@ -170,7 +154,7 @@ class SimulatedIlluminator(SimulatedDevice):
             limits.min_strobe_period, limits.max_strobe_period)
         return IlluminatorStatus(*fields, *(behaviour.extension or ()))
 
-    def _information(self, now: float) -> ComponentInformationBasic:
+    def _information(self, now: float) -> mav.ComponentInformationBasic:
         behaviour, identity = self.behaviour, self.properties.identity
 
         def string(text: str, size: int) -> bytes:
@@ -178,21 +162,22 @@ class SimulatedIlluminator(SimulatedDevice):
                 return text.ljust(size, behaviour.padding).encode()[:size]
             return text.encode()[:size - behaviour.terminates]
 
-        return ComponentInformationBasic(
+        return mav.ComponentInformationBasic(
             self.uptime_ms(now) if behaviour.has_clock else 0, 0, 0,
             string(identity.vendor, 32), string(identity.model, 32),
             string(identity.software_version, 24), string(identity.hardware_version, 24),
             string(identity.serial_number, 32))
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
+    def execute(self, source: mav.Address, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""
         self.warm(now)
-        if command.command == MavCmd.ILLUMINATOR_ON_OFF:
+        if command.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
             valid = command.param1 in (0.0, 1.0) or self.behaviour.accepts_out_of_range
             on = command.param1 == 1.0 and not (self.behaviour.toggles and self.enabled)
             return CommandReply(
-                MavResult.ACCEPTED if valid else MavResult.DENIED, partial(self._switch, on))
-        if command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE:
+                mav.MavResult.ACCEPTED if valid else mav.MavResult.DENIED,
+                partial(self._switch, on))
+        if command.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
             return self._configuration_reply(
                 command.param1, command.param2, command.param3, command.param4)
         return None
@@ -201,23 +186,24 @@ class SimulatedIlluminator(SimulatedDevice):
         self, mode: float, brightness: float, period: float, duty_cycle: float,
     ) -> CommandReply:
         behaviour, limits = self.behaviour, self.properties.limits
-        known = mode in (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
-        configuration = Configuration(
-            Mode(int(mode)) if known else self.configuration.mode, brightness, period, duty_cycle)
+        known = mode in (model.Mode.INTERNAL_CONTROL, model.Mode.EXTERNAL_SYNC)
+        configuration = model.Configuration(
+            model.Mode(int(mode)) if known else self.configuration.mode, brightness, period,
+            duty_cycle)
         try:
             if mode not in self.properties.modes:
-                raise InvalidValue(f'mode {mode}')
+                raise model.InvalidValue(f'mode {mode}')
             if period and not behaviour.measures:
-                raise InvalidValue('this light does not strobe')
+                raise model.InvalidValue('this light does not strobe')
             for name, value in (('brightness', brightness), ('strobe_period', period),
                                 ('strobe_duty_cycle', duty_cycle)):
                 if not (math.isnan(value) and behaviour.accepts_nan):
-                    checked(name, value, limits)
-        except InvalidValue:
+                    model.checked(name, value, limits)
+        except model.InvalidValue:
             accepted = behaviour.accepts_out_of_range
         else:
             accepted = True
-        return CommandReply(MavResult.ACCEPTED if accepted else MavResult.DENIED,
+        return CommandReply(mav.MavResult.ACCEPTED if accepted else mav.MavResult.DENIED,
                             partial(self._configure, configuration))
 
     def _switch(self, on: bool) -> None:
@@ -226,7 +212,7 @@ class SimulatedIlluminator(SimulatedDevice):
         if (on and self.behaviour.brightness_is_switch and not self.configuration.brightness):
             self.configuration = replace(self.configuration, brightness=self._last_brightness)
 
-    def _configure(self, configuration: Configuration) -> None:
+    def _configure(self, configuration: model.Configuration) -> None:
         self.configuration = configuration
         if configuration.brightness > 0:
             self._last_brightness = configuration.brightness
@@ -241,7 +227,7 @@ class SimulatedIlluminator(SimulatedDevice):
         """
         self.warm(now)
         configuration = self.configuration.with_changes({
-            name: checked(name, value, self.properties.limits)
+            name: model.checked(name, value, self.properties.limits)
             for name, value in changes.items()})
 
         def change() -> None:
@@ -276,12 +262,12 @@ class SimulatedIlluminator(SimulatedDevice):
         """See :meth:`SimulatedDevice.snapshot`."""
         status, temperature = self.status(now), self.thermal.temperature
         period, duty = status.strobe_period, status.strobe_duty_cycle
-        mode = Mode(status.mode)
+        mode = model.Mode(status.mode)
         state = ('ON ' if self.enabled else 'off', f'{status.brightness:>5.3g} %',
                  f'{f"strobe {period:g} s, {duty:g} %" if period else "no strobe":18}')
         notes = tuple(filter(None, (
-            '' if mode is Mode.INTERNAL_CONTROL else mode.label,
-            ', '.join(flag_names(status.error_status)))))
+            '' if mode is model.Mode.INTERNAL_CONTROL else mode.label,
+            ', '.join(model.flag_names(status.error_status)))))
         return Snapshot('  '.join((*state, f'{temperature:6.1f} degC', *notes)),
                         (*state, *notes), temperature / TEMPERATURE_STEP)
 
@@ -291,8 +277,9 @@ class SimulatedIlluminator(SimulatedDevice):
 THERMAL = {field.name: field.default for field in fields(ThermalProperties)}
 
 
-def _modes(names: str) -> tuple[Mode, ...]:
-    modes = tuple(MODES[one_of(MODES)(name.strip())] for name in names.split(',') if name.strip())
+def _modes(names: str) -> tuple[model.Mode, ...]:
+    modes = tuple(model.MODES[one_of(model.MODES)(name.strip())]
+                  for name in names.split(',') if name.strip())
     if not modes:
         raise ValueError('at least one mode is needed')
     return modes
@@ -325,7 +312,7 @@ SETTINGS: dict[str, Setting] = {
                                  number(0, 3600)),
     'max_strobe_period': Setting('S', 'longest strobe period (default: 10)', number(0, 3600)),
     'modes': Setting('MODE,...', 'modes that it can be configured to (default: '
-                     f'{",".join(MODES)})', _modes),
+                     f'{",".join(model.MODES)})', _modes),
     'mode_bitmask': Setting('N', 'mode_bitmask, if it does not follow from the modes', _byte),
     'ambient': Setting('DEG_C', 'ambient temperature (default: 25)', number(-60, 150)),
     'thermal': Setting('NAME=VALUE,...', 'thermal model, see below', _thermal, True),
@@ -342,7 +329,7 @@ def _profile(settings: Values) -> IlluminatorProperties:
 
 
 def properties(
-    settings: Values, address: Address, several: bool = False,
+    settings: Values, address: mav.Address, several: bool = False,
 ) -> IlluminatorProperties:
     """
     Return the light that settings describe.
@@ -354,7 +341,7 @@ def properties(
         return {name: settings[name] for name in names if name in settings}
 
     profile = _profile(settings)
-    limits = replace(profile.limits, **given(field.name for field in fields(Limits)))
+    limits = replace(profile.limits, **given(field.name for field in fields(model.Limits)))
     if limits.min_strobe_period > limits.max_strobe_period:
         raise ValueError('min_strobe_period is above max_strobe_period')
     behaviour = profile.behaviour

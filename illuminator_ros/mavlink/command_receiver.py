@@ -27,28 +27,21 @@ from dataclasses import replace
 import math
 from typing import NamedTuple
 
-from .messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    encode_payload,
-    MavResult,
-)
+from . import messages as mav
 
 # Commands whose result is remembered, one of each kind from each sender.
 MAX_RESULTS = 256
 # s since the last frame of a command within which one with a higher confirmation repeats it.
 REPEAT_TIME = 5.0
 
-AnyCommand = CommandLong | CommandInt
+AnyCommand = mav.CommandLong | mav.CommandInt
 # Executes a command; None if it is not supported.
-Execute = Callable[[Address, AnyCommand, float], MavResult | None]
+Execute = Callable[[mav.Address, AnyCommand, float], mav.MavResult | None]
 
 
 class _Executed(NamedTuple):
     payload: bytes
-    result: MavResult
+    result: mav.MavResult
     at: float
 
 
@@ -59,20 +52,20 @@ class CommandReceiver:
     :param address: our own address.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: mav.Address) -> None:
         self._address = address
-        self._executed: dict[tuple[Address, int], _Executed] = {}
+        self._executed: dict[tuple[mav.Address, int], _Executed] = {}
 
     def take(
-        self, source: Address, command: AnyCommand, now: float, execute: Execute,
-    ) -> CommandAck | None:
+        self, source: mav.Address, command: AnyCommand, now: float, execute: Execute,
+    ) -> mav.CommandAck | None:
         """
         Take a command and return its acknowledgement.
 
         :return: None for a command to another component, and for one to all components that is
             not supported.
         """
-        target = Address(command.target_system, command.target_component)
+        target = mav.Address(command.target_system, command.target_component)
         if target.system not in (self._address.system, 0) or target.component not in (
                 self._address.component, 0):
             return None
@@ -80,23 +73,23 @@ class CommandReceiver:
         if result is None:
             if target != self._address:
                 return None
-            result = MavResult.UNSUPPORTED
-        return CommandAck(command.command, result, 0, 0, *source)
+            result = mav.MavResult.UNSUPPORTED
+        return mav.CommandAck(command.command, result, 0, 0, *source)
 
     def _result(
-        self, source: Address, command: AnyCommand, now: float, execute: Execute,
-    ) -> MavResult | None:
-        if isinstance(command, CommandInt):
+        self, source: mav.Address, command: AnyCommand, now: float, execute: Execute,
+    ) -> mav.MavResult | None:
+        if isinstance(command, mav.CommandInt):
             return execute(source, command, now)
         key = source, command.command
-        payload = encode_payload(replace(command, confirmation=0))
-        last = self._executed.pop(key, _Executed(b'', MavResult.FAILED, -math.inf))
+        payload = mav.encode_payload(replace(command, confirmation=0))
+        last = self._executed.pop(key, _Executed(b'', mav.MavResult.FAILED, -math.inf))
         if command.confirmation and last.payload == payload and now < last.at + REPEAT_TIME:
-            result: MavResult | None = last.result
+            result: mav.MavResult | None = last.result
         else:
             result = execute(source, command, now)
         # A command that was rejected temporarily is repeated to be executed.
-        if result not in (None, MavResult.TEMPORARILY_REJECTED):
+        if result not in (None, mav.MavResult.TEMPORARILY_REJECTED):
             self._executed[key] = _Executed(payload, result, now)
             if len(self._executed) > MAX_RESULTS:
                 del self._executed[next(iter(self._executed))]

@@ -29,13 +29,7 @@ from enum import Enum
 import math
 from typing import Generic, Protocol, TypeVar
 
-from ..mavlink.command_sender import (
-    Command,
-    CommandResult,
-    CommandSender,
-    CommandStatus,
-    format_seconds,
-)
+from ..mavlink import command_sender
 from ..mavlink.messages import Address, MavCmd, MavResult
 
 # s from the acknowledgement to the status that shows the change.
@@ -57,7 +51,7 @@ PERMANENT_RESULTS = frozenset((
 
 S = TypeVar('S')
 S_contra = TypeVar('S_contra', contravariant=True)
-CommandDone = Callable[[CommandResult, float], None]
+CommandDone = Callable[[command_sender.CommandResult, float], None]
 
 
 class Target:
@@ -71,7 +65,7 @@ class Target:
     """
 
     def __init__(
-        self, address: Address, commands: CommandSender, ended: CommandDone, *,
+        self, address: Address, commands: command_sender.CommandSender, ended: CommandDone, *,
         kind: str, status_id: int, status_name: str, status_sender: Address | None = None,
     ) -> None:
         self.address = address
@@ -90,12 +84,12 @@ class Target:
         overtake: bool = False, to: Address | None = None,
     ) -> None:
         """Send a command, to the device or to another component; see :class:`CommandSender`."""
-        def ended(result: CommandResult, now: float) -> None:
+        def ended(result: command_sender.CommandResult, now: float) -> None:
             done(result, now)
             self._ended(result, now)
 
         self._commands.start(
-            Command(to or self.address, command, params), now, ended, limit=limit,
+            command_sender.Command(to or self.address, command, params), now, ended, limit=limit,
             overtake=overtake)
 
     def request_message(
@@ -113,7 +107,7 @@ class Target:
             self.request_message(
                 self._status_id, now, self._status_answered, to=self._status_sender)
 
-    def _status_answered(self, result: CommandResult, now: float) -> None:
+    def _status_answered(self, result: command_sender.CommandResult, now: float) -> None:
         self._status_requested = False
 
     @property
@@ -259,7 +253,7 @@ class Request(Generic[S]):
         # Times that it is sent again since acknowledgements of earlier commands may come.
         self._repeats: int | None = None
         self._was_repeated = False
-        self._outcome: CommandResult | None = None
+        self._outcome: command_sender.CommandResult | None = None
         self._before: S | None = None
         self._has_status = False
         self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
@@ -290,7 +284,7 @@ class Request(Generic[S]):
         return self.change
 
     @property
-    def _answer(self) -> CommandResult:
+    def _answer(self) -> command_sender.CommandResult:
         assert self._outcome is not None
         return self._outcome
 
@@ -316,11 +310,11 @@ class Request(Generic[S]):
             self._sent.command, self._sent.params, now, self._answered, limit=self.limit,
             overtake=self.overtakes)
 
-    def _answered(self, outcome: CommandResult, now: float) -> None:
+    def _answered(self, outcome: command_sender.CommandResult, now: float) -> None:
         if self.is_finished:
             return
         self._outcome = outcome
-        if outcome.status is CommandStatus.CANCELLED:
+        if outcome.status is command_sender.CommandStatus.CANCELLED:
             self.fail(OVERTAKEN, now)
         elif outcome.accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
@@ -334,7 +328,7 @@ class Request(Generic[S]):
         else:
             self._refused(now)
 
-    def _must_repeat(self, outcome: CommandResult, now: float) -> bool:
+    def _must_repeat(self, outcome: command_sender.CommandResult, now: float) -> bool:
         """
         Return whether the acknowledgement may belong to an earlier, unacknowledged command.
 
@@ -414,7 +408,7 @@ class Request(Generic[S]):
 
     def _refused(self, now: float) -> None:
         answer = self._answer
-        answered = answer.status is CommandStatus.ANSWERED
+        answered = answer.status is command_sender.CommandStatus.ANSWERED
         if self._was_repeated and answer.result is None:
             self._end(f'{self._sent.goal} not confirmed: the acknowledgement may belong to an '
                       'earlier command', now)
@@ -434,7 +428,7 @@ class Request(Generic[S]):
                       f'sent {name}')
         elif self._has_status:
             reason = (f'no {"later " if self._is_outdated else ""}{name} came within '
-                      f'{format_seconds(now - self._acknowledged_at)}')
+                      f'{command_sender.format_seconds(now - self._acknowledged_at)}')
         else:
             self._succeed(f'accepted, not confirmed (the {kind} sends no {name})', now)
             return

@@ -17,16 +17,8 @@
 from __future__ import annotations
 
 from illuminator_ros.gimbal import client as limits
-from illuminator_ros.gimbal.events import (
-    AttitudeReceived,
-    GimbalConnected,
-    GimbalForgotten,
-    GimbalFound,
-    GimbalKey,
-    GimbalLost,
-    ManagerChanged,
-    SecondManager,
-)
+from illuminator_ros.gimbal import events
+from illuminator_ros.gimbal.events import GimbalKey
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, MavCmd, MavResult
 import pytest
 from support.gimbals import AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
@@ -44,8 +36,9 @@ def requests(rig: Rig, message_id: int = INFORMATION) -> list[tuple[float, Addre
 def test_gm_27_gimbal_is_found_by_the_information_of_its_manager() -> None:
     rig = Rig(FakeManager()).run(3.0)
 
-    assert rig.all_of(GimbalFound) == [GimbalFound(GimbalKey(DEVICE))]
-    assert rig.all_of(GimbalConnected) == [GimbalConnected(GimbalKey(DEVICE), AUTOPILOT)]
+    assert rig.all_of(events.GimbalFound) == [events.GimbalFound(GimbalKey(DEVICE))]
+    assert rig.all_of(events.GimbalConnected) == [
+        events.GimbalConnected(GimbalKey(DEVICE), AUTOPILOT)]
     assert [target for _, target in requests(rig)].count(AUTOPILOT) == 1
     snapshot = rig.gimbal.snapshot(rig.now)
     assert (snapshot.unreachable, snapshot.managers) == ('', (AUTOPILOT,))
@@ -73,8 +66,8 @@ def test_gm_25_gm_26_several_gimbals_behind_one_or_several_managers_are_told_apa
     rig = Rig(*managers).run(6.0)
 
     assert sorted(keys(rig)) == sorted(found)
-    assert {event.key for event in rig.all_of(GimbalConnected)} == set(found)
-    headings = {event.key: event.attitude.heading for event in rig.all_of(AttitudeReceived)
+    assert {event.key for event in rig.all_of(events.GimbalConnected)} == set(found)
+    headings = {event.key: event.attitude.heading for event in rig.all_of(events.AttitudeReceived)
                 if event.attitude}
     assert len(set(headings.values())) == len(managers)
 
@@ -82,8 +75,8 @@ def test_gm_25_gm_26_several_gimbals_behind_one_or_several_managers_are_told_apa
 def test_attitude_of_an_older_device_without_an_id_is_that_of_the_only_gimbal() -> None:
     rig = Rig(FakeManager(device_id=1, attitude_number=0)).run(3.0)
 
-    assert rig.all_of(GimbalConnected)
-    assert rig.all_of(AttitudeReceived)[0].key == GimbalKey(AUTOPILOT, 1)
+    assert rig.all_of(events.GimbalConnected)
+    assert rig.all_of(events.AttitudeReceived)[0].key == GimbalKey(AUTOPILOT, 1)
 
 
 def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one() -> None:
@@ -102,7 +95,7 @@ def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one
 def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> None:
     rig = Rig(FakeManager(announces=False)).run(30.0)
 
-    assert rig.all_of(GimbalConnected)
+    assert rig.all_of(events.GimbalConnected)
     assert rig.gimbal.snapshot(rig.now).capabilities is None
     # Less and less often.
     assert 3 <= len(requests(rig)) <= 15
@@ -165,7 +158,7 @@ def test_wanted_gimbal_is_found_among_forged_ones() -> None:
     rig.managers.append(FakeManager())
     rig.run(3.0)
 
-    assert [event.key for event in rig.all_of(GimbalConnected)] == [GimbalKey(DEVICE)]
+    assert [event.key for event in rig.all_of(events.GimbalConnected)] == [GimbalKey(DEVICE)]
     assert len(keys(rig)) == limits.MAX_GIMBALS + 1
 
 
@@ -176,12 +169,12 @@ def test_gimbal_is_lost_with_its_manager_or_its_device(silent: str, reason: str)
     rig = Rig(FakeManager()).run(3.0)
     setattr(rig.managers[0], silent, False)
     rig.run(4.5)
-    assert rig.all_of(GimbalLost)[-1].reason.startswith(reason)
+    assert rig.all_of(events.GimbalLost)[-1].reason.startswith(reason)
 
     setattr(rig.managers[0], silent, True)
     rig.run(2.0)
 
-    assert len(rig.all_of(GimbalConnected)) == 2
+    assert len(rig.all_of(events.GimbalConnected)) == 2
     assert rig.gimbal.snapshot(rig.now).unreachable == ''
 
 
@@ -190,7 +183,7 @@ def test_closed_link_loses_the_gimbal_at_once() -> None:
 
     rig.component.link_closed(rig.now, 'cable pulled')
 
-    assert rig.all_of(GimbalLost)[-1].reason == 'cable pulled'
+    assert rig.all_of(events.GimbalLost)[-1].reason == 'cable pulled'
     assert not rig.run(3.0).gimbal.snapshot(rig.now).unreachable
 
 
@@ -202,7 +195,7 @@ def test_silent_gimbal_is_forgotten_unless_it_was_commanded(was_commanded: bool)
     rig.managers.clear()
     rig.run(70.0)
 
-    assert bool(rig.all_of(GimbalForgotten)) is not was_commanded
+    assert bool(rig.all_of(events.GimbalForgotten)) is not was_commanded
     assert bool(keys(rig)) is was_commanded
 
 
@@ -210,19 +203,19 @@ def test_gm_18_second_manager_of_a_gimbal_is_told_and_takes_over_when_the_first_
     rig = Rig(FakeManager(), FakeManager(OTHER, device_alive=False)).run(4.0)
     key = GimbalKey(DEVICE)
     first, second = rig.gimbal.snapshot(rig.now).managers
-    assert rig.all_of(SecondManager) == [SecondManager(key, first, second)]
+    assert rig.all_of(events.SecondManager) == [events.SecondManager(key, first, second)]
 
     rig.managers[0 if first == AUTOPILOT else 1].alive = False
     rig.run(5.0)
 
-    assert rig.all_of(ManagerChanged) == [ManagerChanged(key, first, second)]
+    assert rig.all_of(events.ManagerChanged) == [events.ManagerChanged(key, first, second)]
     assert rig.gimbal.snapshot(rig.now).managers == (second,)
 
 
 def test_gm_20_attitude_is_taken_from_the_device_itself_whoever_manages_it() -> None:
     rig = Rig(FakeManager(q=(NAN,) * 4)).run(3.0)
 
-    assert rig.all_of(AttitudeReceived)[-1].attitude is None
+    assert rig.all_of(events.AttitudeReceived)[-1].attitude is None
     assert 'not a rotation' in rig.gimbal.snapshot(rig.now).attitude_problem
     assert {target for _, target in requests(rig, DEVICE_INFORMATION)} == {DEVICE}
 

@@ -34,18 +34,8 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetPitchyaw,
     GimbalManagerStatus,
 )
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    decode_payload,
-    heartbeat,
-    MavResult,
-    MavType,
-    Message,
-)
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.rotation import Quaternion
 from support.faulty_wire import Faults, FaultyWire
@@ -68,8 +58,8 @@ EVERYWHERE: dict[str, Any] = {
     f'{axis}_{end}': NAN for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')}
 
 
-def address_of(number: int) -> Address:
-    return Address(255 - number // 10, 100 + number)
+def address_of(number: int) -> mav.Address:
+    return mav.Address(255 - number // 10, 100 + number)
 
 
 @dataclass
@@ -91,7 +81,7 @@ class Player:
             return
         if now >= self.heartbeat_due:
             self.heartbeat_due = now + 1.0
-            self._transmit(self.number, heartbeat(MavType.GCS), now)
+            self._transmit(self.number, mav.heartbeat(mav.MavType.GCS), now)
         rate = 0.5 if self.kind == 'floods' else 0.03
         if self.random.random() < rate:
             number = self.number
@@ -99,9 +89,9 @@ class Player:
                 number = self.random.randrange(self.players)
             self._transmit(number, self._message(number), now)
 
-    def _message(self, number: int) -> Message:
+    def _message(self, number: int) -> mav.Message:
         own, yaw = address_of(number), mark(number)
-        sane: list[Message] = [
+        sane: list[mav.Message] = [
             configure(*own, *own), configure(*own), pitch_yaw(0.0, yaw), pitch_yaw(0.0, yaw),
             pitch_yaw_command(0.0, math.degrees(yaw)), configure(-3, -3, -3, -3)]
         if self.kind != 'lies':
@@ -112,7 +102,7 @@ class Player:
             configure(-1, -7), configure(*other, *own, confirmation=1), region(47.0, 8.0, 0.0),
             configure(-2, -2), pitch_yaw(0.0, yaw, device_id=33)])
 
-    def _transmit(self, number: int, message: Message, now: float) -> None:
+    def _transmit(self, number: int, message: mav.Message, now: float) -> None:
         self.wire.send(self.codec.frame(address_of(number), message), now)
 
 
@@ -136,9 +126,9 @@ class Arena:
                    dies_at=self.rig.now + chance.uniform(1, 8) if kind == 'dies' else math.inf)
             for number, kind in enumerate(kinds)]
         self.decoders = [Decoder() for _ in kinds]
-        self.heard: dict[Address, float] = {}
+        self.heard: dict[mav.Address, float] = {}
         # The address whose setpoint the device has.
-        self.obeyed: Address | None = None
+        self.obeyed: mav.Address | None = None
         self.changes = 0
 
     def run(self) -> None:
@@ -155,29 +145,30 @@ class Arena:
             self._check_sent([message for _, message in self.rig.sent[before[0]:]], None)
             self._check_changes(before[1], None)
 
-    def _give(self, source: Address, message_id: int, payload: bytes) -> None:
+    def _give(self, source: mav.Address, message_id: int, payload: bytes) -> None:
         [cls] = [cls for cls in self.rig.component.messages if cls.id == message_id]
-        message = decode_payload(cls, payload)
+        message = mav.decode_payload(cls, payload)
         events, holder = len(self.rig.events), self.rig.manager.control.holder(Role.PRIMARY)
         if cls.name == 'HEARTBEAT':
             self.heard[source] = self.rig.now
         sent = self.rig.give(source, message)
         answers = [(ack.command, ack.target_system, ack.target_component)
-                   for ack in of(CommandAck, sent)]
-        commanded = isinstance(message, CommandLong | CommandInt)
+                   for ack in of(mav.CommandAck, sent)]
+        commanded = isinstance(message, mav.CommandLong | mav.CommandInt)
         assert answers == (
-            [(message.command, *source)] if isinstance(message, CommandLong | CommandInt) else [])
+            [(message.command, *source)]
+            if isinstance(message, mav.CommandLong | mav.CommandInt) else [])
         self._check_changes(events, source)
         is_setpoint = isinstance(message, GimbalManagerSetPitchyaw) or (
-            isinstance(message, CommandLong) and message.command == 1000)
+            isinstance(message, mav.CommandLong) and message.command == 1000)
         if is_setpoint and source == holder and of(GimbalDeviceSetAttitude, sent):
             self.obeyed = source
         elif is_setpoint and commanded and source not in (
                 holder, self.rig.manager.control.holder(Role.SECONDARY)):
-            assert of(CommandAck, sent)[0].result == MavResult.DENIED
+            assert of(mav.CommandAck, sent)[0].result == mav.MavResult.DENIED
         self._check_sent(sent, source)
 
-    def _check_sent(self, sent: list[Any], source: Address | None) -> None:
+    def _check_sent(self, sent: list[Any], source: mav.Address | None) -> None:
         """Check that the device keeps a setpoint of the player that was obeyed last."""
         for message in of(GimbalDeviceSetAttitude, sent):
             _, pitch, yaw = Quaternion(*message.q).euler()
@@ -186,10 +177,10 @@ class Arena:
                         if abs(mark(player.number) - yaw) <= 0.02 + 1e-4]
             assert address_of(number) == self.obeyed, (number, source)
         for status in of(GimbalManagerStatus, sent):
-            shown = Address(status.primary_control_sysid, status.primary_control_compid)
-            assert shown == (self.rig.manager.control.holder(Role.PRIMARY) or Address(0, 0))
+            shown = mav.Address(status.primary_control_sysid, status.primary_control_compid)
+            assert shown == (self.rig.manager.control.holder(Role.PRIMARY) or mav.Address(0, 0))
 
-    def _check_changes(self, before: int, source: Address | None) -> None:
+    def _check_changes(self, before: int, source: mav.Address | None) -> None:
         """Check that control moves by release, lease or an overruling player only."""
         for change in of(RoleHolderChanged, self.rig.events[before:]):
             self.changes += 1
@@ -227,10 +218,10 @@ def test_gm_13_control_moves_and_setpoints_reach_the_device_in_that_test() -> No
 
 def test_gm_16_of_1000_players_that_take_control_at_once_one_has_it() -> None:
     rig = ManagerRig()
-    players = [Address(2 + number // 250, 1 + number % 250) for number in range(1000)]
+    players = [mav.Address(2 + number // 250, 1 + number % 250) for number in range(1000)]
 
     results = [rig.take(player) for player in players]
 
-    assert results == [MavResult.ACCEPTED, *[MavResult.DENIED] * 999]
+    assert results == [mav.MavResult.ACCEPTED, *[mav.MavResult.DENIED] * 999]
     assert rig.manager.control.holder(Role.PRIMARY) == players[0]
     assert [player for player in players if rig.points(player)] == players[:1]

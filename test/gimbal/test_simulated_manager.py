@@ -22,14 +22,7 @@ from typing import Any
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags, GimbalCommand
 from illuminator_ros.gimbal.simulated_manager import FAULTS, PROFILES, SIMULATED, SimulatedManager
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    MavCmd,
-    MavResult,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.messages import (
     Attitude,
     GimbalDeviceAttitudeStatus,
@@ -42,8 +35,8 @@ import pytest
 
 NAN = math.nan
 UNSET = (NAN, NAN, NAN)
-PLAYER, OTHER, NOBODY = Address(1, 195), Address(255, 190), Address(0, 0)
-ACCEPTED, DENIED, FAILED = MavResult.ACCEPTED, MavResult.DENIED, MavResult.FAILED
+PLAYER, OTHER, NOBODY = mav.Address(1, 195), mav.Address(255, 190), mav.Address(0, 0)
+ACCEPTED, DENIED, FAILED = mav.MavResult.ACCEPTED, mav.MavResult.DENIED, mav.MavResult.FAILED
 CONFIGURE, PITCHYAW = (GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE,
                        GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW)
 ROI, ROI_NONE = GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE
@@ -69,25 +62,25 @@ class Bench:
             self.take()
 
     def command(
-        self, command: int, *params: float, source: Address = PLAYER, as_int: bool = False,
+        self, command: int, *params: float, source: mav.Address = PLAYER, as_int: bool = False,
         frame: int = 0,
-    ) -> MavResult:
+    ) -> mav.MavResult:
         """Send a command, and return its result."""
         self.endpoint.outgoing.clear()
         one, two, three, four, five, six, seven = [*params, *[0.0] * (7 - len(params))]
-        self.endpoint.receive(source, CommandInt(
+        self.endpoint.receive(source, mav.CommandInt(
             *self.address, frame, command, 0, 0, one, two, three, four, int(five), int(six),
-            seven) if as_int else CommandLong(
+            seven) if as_int else mav.CommandLong(
             *self.address, command, 0, one, two, three, four, five, six, seven), self.now)
-        return next(MavResult(message.result) for _, message in self.endpoint.outgoing
-                    if isinstance(message, CommandAck))
+        return next(mav.MavResult(message.result) for _, message in self.endpoint.outgoing
+                    if isinstance(message, mav.CommandAck))
 
-    def take(self, source: Address = PLAYER, secondary: Address = NOBODY) -> MavResult:
+    def take(self, source: mav.Address = PLAYER, secondary: mav.Address = NOBODY) -> mav.MavResult:
         return self.command(CONFIGURE, *source, *secondary, source=source)
 
     def point(
         self, *degrees: float, flags: int = FOLLOW, rates: tuple[float, float, float] = UNSET,
-        source: Address = PLAYER, device_id: int = 1,
+        source: mav.Address = PLAYER, device_id: int = 1,
     ) -> None:
         q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
         self.endpoint.receive(source, gimbal.GimbalManagerSetAttitude(
@@ -95,12 +88,12 @@ class Bench:
 
     def pitchyaw(
         self, *values: float, kind: Any = gimbal.GimbalManagerSetPitchyaw,
-        source: Address = PLAYER,
+        source: mav.Address = PLAYER,
     ) -> None:
         self.endpoint.receive(source, kind(*self.address, FOLLOW, 1, *values), self.now)
 
     def vehicle(self, heading: float) -> None:
-        self.endpoint.receive(Address(1, 1), Attitude(
+        self.endpoint.receive(mav.Address(1, 1), Attitude(
             0, 0.0, 0.0, math.radians(heading), 0.0, 0.0, 0.0), self.now)
 
     def message(self, cls: Any) -> Any:
@@ -129,7 +122,7 @@ def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: 
     assert bool(information.cap_flags & Capabilities.HAS_RETRACT) is (profile != 'px4')
     assert bench.message(GimbalDeviceAttitudeStatus).gimbal_device_id == 1
     assert bench.message(gimbal.GimbalDeviceInformation).gimbal_device_id == 1
-    assert bench.command(MavCmd.REQUEST_MESSAGE, 280) == ACCEPTED
+    assert bench.command(mav.MavCmd.REQUEST_MESSAGE, 280) == ACCEPTED
 
 
 # Control
@@ -149,7 +142,7 @@ def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: 
     ('ardupilot', (-2, -2, -2, -2), ACCEPTED, (255, 190, 0, 0)),
     ('ardupilot', (-4, 256, 0, 0), FAILED, (1, 195, 0, 0))])
 def test_configure_gives_control_as_the_status_shows(
-        profile: str, values: tuple[float, ...], result: MavResult, control: tuple[int, ...],
+        profile: str, values: tuple[float, ...], result: mav.MavResult, control: tuple[int, ...],
 ) -> None:
     bench = Bench(profile)
     assert bench.command(CONFIGURE, *values, source=OTHER) == result
@@ -160,7 +153,7 @@ def test_px4_releases_the_component_id_of_a_sender_in_another_system() -> None:
     for profile, control in (('px4', (1, 0, 0, 0)), ('reference', (1, 195, 0, 0)),
                              ('ardupilot', (1, 195, 0, 0))):
         bench = Bench(profile)
-        bench.command(CONFIGURE, -3, -3, -3, -3, source=Address(9, 195))
+        bench.command(CONFIGURE, -3, -3, -3, -3, source=mav.Address(9, 195))
         assert bench.control == control
 
 
@@ -168,7 +161,7 @@ def test_px4_releases_the_component_id_of_a_sender_in_another_system() -> None:
     ('reference', False, DENIED, DENIED), ('px4', False, DENIED, ACCEPTED),
     ('ardupilot', True, ACCEPTED, ACCEPTED)])
 def test_a_component_without_control_moves_it_only_where_the_profile_lets_it(
-        profile: str, moved: bool, result: MavResult, roi: MavResult) -> None:
+        profile: str, moved: bool, result: mav.MavResult, roi: mav.MavResult) -> None:
     bench = Bench(profile)
     bench.point(0.0, -20.0, 30.0, source=OTHER)
     assert bench.angles() == ((0.0, -20.0, 30.0) if moved else (0.0, 0.0, 0.0))
@@ -303,21 +296,21 @@ def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_n
     bench = Bench()
     bench.command(ROI, 0, 0, 0, 0, 47.398742, 8.545594, 488.0)
     moved = GlobalPositionInt(0, 473987420, 85455940 - 10000, 488000, 0, 0, 0, 0, 0)
-    bench.endpoint.receive(Address(2, 1), moved, bench.now)
+    bench.endpoint.receive(mav.Address(2, 1), moved, bench.now)
     assert bench.angles() == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
-    bench.endpoint.receive(Address(1, 1), moved, bench.now)
+    bench.endpoint.receive(mav.Address(1, 1), moved, bench.now)
     assert bench.angles() == pytest.approx((0.0, 0.0, 90.0), abs=0.01)
     bench.point(0.0, -10.0, 0.0)
-    bench.endpoint.receive(Address(1, 1), moved, bench.now)
+    bench.endpoint.receive(mav.Address(1, 1), moved, bench.now)
     assert bench.angles() == (0.0, -10.0, 0.0)
 
 
 @pytest.mark.parametrize(('params', 'frame', 'result'), [
     ((1, 0, 0, 0, 910000000, 0, 0), 0, DENIED), ((1, 0, 0, 0, 0, 0, NAN), 0, DENIED),
-    ((1, 0, 0, 0, 0, 0, 0), 10, MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
+    ((1, 0, 0, 0, 0, 0, 0), 10, mav.MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
     ((3, 0, 0, 0, 0, 0, 0), 0, DENIED)])
 def test_a_place_that_does_not_exist_is_refused(
-        params: tuple[float, ...], frame: int, result: MavResult) -> None:
+        params: tuple[float, ...], frame: int, result: mav.MavResult) -> None:
     assert Bench().command(ROI, *params, as_int=True, frame=frame) == result
 
 

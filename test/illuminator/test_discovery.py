@@ -25,24 +25,16 @@ from illuminator_ros.illuminator.events import (
     LightFound,
 )
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    ComponentInformationBasic,
-    heartbeat,
-    MavCmd,
-    MavType,
-    Message,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.client import Client
 from support.fake_light import FakeLight, LIGHT, status_message
 
-ILLUMINATOR = heartbeat(MavType.ILLUMINATOR)
-ANSWER = CommandAck(MavCmd.REQUEST_MESSAGE, 0, 0, 0, *BRIDGE)
-FORGED = [Address(system, component) for system in (2, 3) for component in range(1, 200)]
+ILLUMINATOR = mav.heartbeat(mav.MavType.ILLUMINATOR)
+ANSWER = mav.CommandAck(mav.MavCmd.REQUEST_MESSAGE, 0, 0, 0, *BRIDGE)
+FORGED = [mav.Address(system, component) for system in (2, 3) for component in range(1, 200)]
 
 
 class Heard(Client):
@@ -66,11 +58,11 @@ def client() -> Heard:
 
 
 @pytest.mark.parametrize('source', [
-    LIGHT, Address(1, 1), Address(255, 0), Address(7, 190), Address(1, 255)])
+    LIGHT, mav.Address(1, 1), mav.Address(255, 0), mav.Address(7, 190), mav.Address(1, 255)])
 @pytest.mark.parametrize('messages', [[ILLUMINATOR, ANSWER], [status_message()]],
                          ids=['heartbeat and answer', 'status'])
 def test_a_light_is_found_by_its_messages_at_any_address(
-    client: Heard, source: Address, messages: list[Message],
+    client: Heard, source: mav.Address, messages: list[mav.Message],
 ) -> None:
     for message in messages:
         client.receive(source, message, 0.0)
@@ -80,11 +72,11 @@ def test_a_light_is_found_by_its_messages_at_any_address(
 
 
 @pytest.mark.parametrize('message', [
-    ILLUMINATOR, heartbeat(MavType.ONBOARD_CONTROLLER), heartbeat(0), ANSWER,
-    ComponentInformationBasic(0, 0, 0, b'maker', b'torch', b'1', b'1', b'n'),
+    ILLUMINATOR, mav.heartbeat(mav.MavType.ONBOARD_CONTROLLER), mav.heartbeat(0), ANSWER,
+    mav.ComponentInformationBasic(0, 0, 0, b'maker', b'torch', b'1', b'1', b'n'),
 ], ids=lambda message: type(message).__name__)
 def test_one_message_that_any_component_may_send_announces_no_light(
-    client: Heard, message: Message,
+    client: Heard, message: mav.Message,
 ) -> None:
     client.receive(LIGHT, message, 0.0)
     assert client.lights == {}
@@ -138,8 +130,8 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
 def test_a_light_that_is_not_wanted_is_named_and_not_commanded() -> None:
     client = Heard(wanted=lambda source: source.system == 2)
     for system in (1, 2):
-        client.receive(Address(system, 243), status_message(), 0.0)
-    assert list(client.lights) == [Address(2, 243)]
-    assert client.ignored == (Address(1, 243),)
+        client.receive(mav.Address(system, 243), status_message(), 0.0)
+    assert list(client.lights) == [mav.Address(2, 243)]
+    assert client.ignored == (mav.Address(1, 243),)
     assert {message.target_system for _, message in client.outgoing
             if hasattr(message, 'target_system')} == {2}

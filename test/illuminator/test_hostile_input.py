@@ -21,13 +21,8 @@ from collections.abc import Iterable, Iterator
 import itertools
 from typing import Any
 
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
-from illuminator_ros.mavlink.messages import (
-    Address,
-    Heartbeat,
-    heartbeat,
-    LAYOUTS,
-)
 from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
@@ -67,23 +62,23 @@ def flood(siege: Siege, frames: Iterable[bytes], *, peers: int = 1) -> None:
         siege.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
 
 
-def forged(count: int) -> list[Address]:
+def forged(count: int) -> list[mav.Address]:
     """Return addresses of components that do not exist."""
-    return [Address(2 + number // 250, 1 + number % 250) for number in range(count)]
+    return [mav.Address(2 + number // 250, 1 + number % 250) for number in range(count)]
 
 
 def unknown_ids() -> Iterator[int]:
-    return (number for number in range(1 << 20, 1 << 24) if number not in LAYOUTS)
+    return (number for number in range(1 << 20, 1 << 24) if number not in mav.LAYOUTS)
 
 
 @pytest.mark.parametrize(('frames', 'peers', 'full'), [
     ([heartbeat_frame(address) for address in forged(3 * MAX_DEVICES)], 1, {}),
     ([heartbeat_frame(address, mav_type=2) for address in forged(3000)], 1,
      {'sources': MAX_SOURCES, 'routes': MAX_ROUTES}),
-    ([heartbeat_frame(Address(2, 1))] * 3000, 3000,
+    ([heartbeat_frame(mav.Address(2, 1))] * 3000, 3000,
      {'peers': MAX_PEERS, 'decoders': MAX_DECODERS, 'ways': MAX_WAYS}),
     ([heartbeat_frame(GENUINE)] * 3000, 3000, {'ways': MAX_WAYS}),
-    ([raw_v2(message_id, b'x', crc_extra=0, source=Address(9, 9))
+    ([raw_v2(message_id, b'x', crc_extra=0, source=mav.Address(9, 9))
       for message_id in itertools.islice(unknown_ids(), 5000)], 1, {'sources': 1}),
     ([frame_of(status_message(uptime_ms=number % 2 * 1_000_000), 0, GENUINE)
       for number in range(2000)], 1, {}),
@@ -117,11 +112,11 @@ class NeverEmpty(deque[Any]):
 
 
 @pytest.mark.parametrize('frames', [
-    [frame_of(heartbeat(2), number, Address(9, 9)) for number in range(256)],
-    [raw_v2(30, bytes(28), crc_extra=39, source=Address(1, 1), sequence=number)
+    [frame_of(mav.heartbeat(2), number, mav.Address(9, 9)) for number in range(256)],
+    [raw_v2(30, bytes(28), crc_extra=39, source=mav.Address(1, 1), sequence=number)
      for number in range(256)],
     [heartbeat_frame(address) for address in forged(300)],
-    [frame_of(status_message(number), number % 256, Address(1, 1)) for number in range(500)],
+    [frame_of(status_message(number), number % 256, mav.Address(1, 1)) for number in range(500)],
     [bytes(range(256)) * 5],
 ], ids=['heartbeats', 'unused messages', 'lights', 'statuses', 'noise'])
 @pytest.mark.parametrize('fault', ['', 'silence'])
@@ -146,7 +141,7 @@ def test_a_set_ends_within_0_9_s_in_a_flood_that_never_ends(
 
 def test_a_flood_of_signed_streams_is_bounded() -> None:
     siege = BridgeSiege('streams', SigningMode.REQUIRE)
-    flood(siege, (siege.attacker.signed(Heartbeat.id, bytes(9), 0, source, siege.link.now)
+    flood(siege, (siege.attacker.signed(mav.Heartbeat.id, bytes(9), 0, source, siege.link.now)
                   for source in forged(20 * MAX_STREAMS)))
     assert siege.sizes()['streams'] == MAX_STREAMS
     siege.check_service()

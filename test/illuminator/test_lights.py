@@ -21,21 +21,13 @@ from typing import Any
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.messages import (
-    Address,
-    ComponentInformationBasic,
-    decode_payload,
-    encode_payload,
-    INFORMATION_ID,
-    MavCmd,
-    MavResult,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.identity import Identity, MAX_QUESTIONS, SETTLING_TIME, text
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight
 
-CONFIGURE, REQUEST = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.REQUEST_MESSAGE
+CONFIGURE, REQUEST = mav.MavCmd.DO_ILLUMINATOR_CONFIGURE, mav.MavCmd.REQUEST_MESSAGE
 
 
 def requests_of(pair: Pair, message_id: int, since: float = 0.0) -> int:
@@ -83,7 +75,7 @@ def test_a_lost_link_loses_the_light_at_once_and_a_new_one_finds_it(pair: Pair) 
 
 
 def test_a_link_that_is_open_again_is_not_filled_with_requests() -> None:
-    pair = Pair([IlluminatorProperties(address=Address(1, 1 + i))
+    pair = Pair([IlluminatorProperties(address=mav.Address(1, 1 + i))
                  for i in range(24)]).settle()
     pair.close()
     pair.open()
@@ -154,7 +146,7 @@ def test_the_interval_of_the_settings_is_requested_at_first_and_after_a_restart(
     pair = Pair(fake, settings=Settings(status_interval=interval)).settle(30.0)
     expected = [(STATUS_ID, pytest.approx(interval * 1e6))] if interval else []
     assert [(command.param1, command.param2) for command in pair.commands(
-        MavCmd.SET_MESSAGE_INTERVAL)] == expected
+        mav.MavCmd.SET_MESSAGE_INTERVAL)] == expected
     assert fake.stream == pytest.approx(interval or 1.0)
     assert requests_of(pair, STATUS_ID, since=START + 3.0) == 0
     fake.restart(pair.now)
@@ -192,13 +184,13 @@ def test_a_temperature_is_measured_from_the_first_that_is_not_0_unless_the_senso
 class Selective(FakeLight):
     """A light that answers a request for its identity with one result, or not at all."""
 
-    def __init__(self, result: MavResult | None, **options: Any) -> None:
+    def __init__(self, result: mav.MavResult | None, **options: Any) -> None:
         super().__init__(**options)
         self.result = result
 
     def receive(self, source: Any, message: Any, now: float) -> None:
         usual = self.results
-        if getattr(message, 'param1', None) == INFORMATION_ID:
+        if getattr(message, 'param1', None) == mav.INFORMATION_ID:
             self.results = {REQUEST: self.result}
         super().receive(source, message, now)
         self.results = usual
@@ -213,8 +205,8 @@ def test_a_char_field_is_read_as_printable_text_up_to_its_terminator(
     field: bytes, expected: str,
 ) -> None:
     assert text(field) == expected
-    sent = ComponentInformationBasic(0, 0, 0, b'm' * 32, field, b'1', b'2', b'n-1')
-    message = decode_payload(ComponentInformationBasic, encode_payload(sent))
+    sent = mav.ComponentInformationBasic(0, 0, 0, b'm' * 32, field, b'1', b'2', b'n-1')
+    message = mav.decode_payload(mav.ComponentInformationBasic, mav.encode_payload(sent))
     assert Identity.from_message(message) == Identity('m' * 32, expected, '1', '2', 'n-1')
 
 
@@ -223,7 +215,7 @@ def test_the_identity_is_requested_once_and_again_after_a_loss(
 ) -> None:
     first = fake.identity
     faked.run(60.0)
-    assert requests_of(faked, INFORMATION_ID) == 1
+    assert requests_of(faked, mav.INFORMATION_ID) == 1
     fake.silent = True
     faked.run(10.0)
     fake.identity = Identity(serial_number='T-2')
@@ -234,17 +226,17 @@ def test_the_identity_is_requested_once_and_again_after_a_loss(
 
 
 @pytest.mark.parametrize(('light', 'count', 'failure'), [
-    (Selective(MavResult.DENIED), 1, 'refused: MAV_RESULT_DENIED'),
-    (Selective(MavResult.UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
+    (Selective(mav.MavResult.DENIED), 1, 'refused: MAV_RESULT_DENIED'),
+    (Selective(mav.MavResult.UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
     (Selective(None), 4, 'no acknowledgement'),
     (FakeLight(), MAX_QUESTIONS, 'acknowledged, but not sent'),
 ])
 def test_an_identity_that_does_not_come_is_requested_so_often_and_the_reason_named(
     light: FakeLight, count: int, failure: str,
 ) -> None:
-    light.answers.discard(INFORMATION_ID)
+    light.answers.discard(mav.INFORMATION_ID)
     pair = Pair(light, command_retries=3).settle(30.0)
-    assert requests_of(pair, INFORMATION_ID) == count
+    assert requests_of(pair, mav.INFORMATION_ID) == count
     assert pair.snapshot.identity_is_settled
     result = pair.wait_for(pair.ask_refresh())
     assert f'COMPONENT_INFORMATION_BASIC: {failure}' in result.message
@@ -268,7 +260,8 @@ def test_a_light_that_ignores_the_request_for_its_identity_confirms_changes_as_f
 
 def test_a_light_that_supports_its_own_two_commands_only_is_served() -> None:
     pair = Pair(FakeLight(stream=0.5, results={
-        REQUEST: MavResult.UNSUPPORTED, MavCmd.SET_MESSAGE_INTERVAL: MavResult.UNSUPPORTED}),
+        REQUEST: mav.MavResult.UNSUPPORTED,
+        mav.MavCmd.SET_MESSAGE_INTERVAL: mav.MavResult.UNSUPPORTED}),
         settings=Settings(status_interval=0.1)).settle()
     assert pair.enable(True).success
     assert pair.configure(brightness=50).success

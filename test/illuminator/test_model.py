@@ -23,29 +23,18 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from illuminator_ros.illuminator import model
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
-from illuminator_ros.illuminator.model import (
-    checked,
-    Configuration,
-    flag_names,
-    float32,
-    InvalidValue,
-    Limits,
-    Mode,
-    shortest,
-    Status,
-    unexpected_differences,
-)
 from illuminator_ros.mavlink.messages import encode_payload
 import pytest
 from support.fake_light import status_message
 from support.messages import decode_payload
 
 NAN, INF = math.nan, math.inf
-LIMITS = Limits(float32(0.05), float32(10.0))
-BASE = Configuration(Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)
-SYNCED = replace(BASE, mode=Mode.EXTERNAL_SYNC)
-UNKNOWN = replace(BASE, mode=Mode.UNKNOWN)
+LIMITS = model.Limits(model.float32(0.05), model.float32(10.0))
+BASE = model.Configuration(model.Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)
+SYNCED = replace(BASE, mode=model.Mode.EXTERNAL_SYNC)
+UNKNOWN = replace(BASE, mode=model.Mode.UNKNOWN)
 # The numbers of a status: the field of the message, the attribute, the largest and smallest.
 NUMBERS = [('brightness', 'brightness', 0.0, 100.0),
            ('strobe_period', 'strobe_period', 0.0, 3600.0),
@@ -56,14 +45,14 @@ NUMBERS = [('brightness', 'brightness', 0.0, 100.0),
 # Values to be sent
 
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
-    ('mode', 'internal_control', Mode.INTERNAL_CONTROL),
-    ('mode', Mode.EXTERNAL_SYNC, Mode.EXTERNAL_SYNC),
+    ('mode', 'internal_control', model.Mode.INTERNAL_CONTROL),
+    ('mode', model.Mode.EXTERNAL_SYNC, model.Mode.EXTERNAL_SYNC),
     *((name, value, float(value)) for name, values in (
         ('brightness', (0, 33.3, 100)), ('strobe_duty_cycle', (0.0, 100)),
         ('strobe_period', (0, 0.05, 0.1, 5, 10.0))) for value in values),
 ])
 def test_a_valid_value_is_returned_as_it_is_sent(name: str, value: Any, expected: Any) -> None:
-    result = checked(name, value, LIMITS)
+    result = model.checked(name, value, LIMITS)
     assert result == expected
     assert type(result) is type(expected)
 
@@ -77,20 +66,21 @@ def test_a_valid_value_is_returned_as_it_is_sent(name: str, value: Any, expected
     *(('strobe_period', value, r'0 \(no strobe\) or 0\.05 to 10 s')
       for value in (0.0499, 10.0001)),
     *(('mode', value, 'none of internal_control, external_sync') for value in (
-        'unknown', 'INTERNAL_CONTROL', '', 1, None, True, ['external_sync'], Mode.UNKNOWN)),
+        'unknown', 'INTERNAL_CONTROL', '', 1, None, True, ['external_sync'], model.Mode.UNKNOWN)),
 ])
 def test_an_invalid_value_is_refused_with_a_short_reason(
     name: str, value: Any, reason: str,
 ) -> None:
-    with pytest.raises(InvalidValue, match=reason) as caught:
-        checked(name, value, LIMITS)
+    with pytest.raises(model.InvalidValue, match=reason) as caught:
+        model.checked(name, value, LIMITS)
     assert len(str(caught.value)) < 200
 
 
 @given(st.integers(1, 100_000).map(lambda number: number / 1000))
 def test_a_period_on_a_limit_is_valid_although_float32_moves_the_limit(limit: float) -> None:
-    assert checked('strobe_period', limit, Limits(float32(limit), 3600.0)) == limit
-    assert checked('strobe_period', limit, Limits(0.0, float32(limit))) == limit
+    for limits in (model.Limits(model.float32(limit), 3600.0),
+                   model.Limits(0.0, model.float32(limit))):
+        assert model.checked('strobe_period', limit, limits) == limit
 
 
 @pytest.mark.parametrize(('low', 'high', 'known'), [
@@ -104,34 +94,34 @@ def test_limits_of_a_light_count_only_where_they_are_possible(
     limits = read(min_strobe_period=low, max_strobe_period=high).limits
     assert limits.known is known
     if not known:
-        assert checked('strobe_period', 77.0, limits) == 77.0
+        assert model.checked('strobe_period', 77.0, limits) == 77.0
 
 
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
 def test_the_shortest_number_is_the_same_float32(value: float) -> None:
-    assert float32(shortest(value)) == value
+    assert model.float32(model.shortest(value)) == value
 
 
 @pytest.mark.parametrize('value', [60.1, 0.1, 100.0, 0.0, 1e-7, 12345.678, 99.99, 0.123456])
 def test_the_shortest_number_is_the_one_that_was_sent(value: float) -> None:
-    assert shortest(float32(value)) == value
+    assert model.shortest(model.float32(value)) == value
 
 
 def test_a_number_too_large_for_a_float_field_is_infinite() -> None:
-    assert [float32(value) for value in (1e39, -1e39, 0.5)] == [INF, -INF, 0.5]
+    assert [model.float32(value) for value in (1e39, -1e39, 0.5)] == [INF, -INF, 0.5]
 
 
 # Comparison
 
 @pytest.mark.parametrize(('changes', 'by_steps', 'exactly'), [
     ({}, [], []),
-    ({'brightness': float32(50.000001)}, [], []),
+    ({'brightness': model.float32(50.000001)}, [], []),
     ({'brightness': 50.4}, [], ['brightness']),
     ({'brightness': 49.6, 'strobe_duty_cycle': 25.4}, [], ['brightness', 'strobe_duty_cycle']),
     ({'strobe_period': 1.009}, [], ['strobe_period']),
     *(({name: value}, [name], [name]) for name, value in (
         ('brightness', 50.6), ('strobe_duty_cycle', 24.4), ('strobe_period', 1.02),
-        ('strobe_period', 0.0), ('mode', Mode.EXTERNAL_SYNC))),
+        ('strobe_period', 0.0), ('mode', model.Mode.EXTERNAL_SYNC))),
 ])
 def test_a_difference_counts_beyond_the_steps_of_a_light_or_beyond_float32(
     changes: dict[str, Any], by_steps: list[str], exactly: list[str],
@@ -149,16 +139,16 @@ def test_a_difference_counts_beyond_the_steps_of_a_light_or_beyond_float32(
     (BASE, replace(BASE, brightness=75.0), 1, ['brightness'], ['brightness']),
     (BASE, UNKNOWN, 0, [], []),
     (UNKNOWN, BASE, 0, [], ['mode']),
-    (SYNCED, Configuration(Mode.EXTERNAL_SYNC, 3.0, 0.2, 77.0), 0, [], []),
+    (SYNCED, model.Configuration(model.Mode.EXTERNAL_SYNC, 3.0, 0.2, 77.0), 0, [], []),
     (SYNCED, BASE, 0, ['mode'], ['mode']),
 ], ids=['dimmer', 'throttled', 'shut down', 'thermistor', 'throttled but brighter',
         'mode not reported', 'mode reported later', 'external sync', 'external sync ended'])
 def test_heat_external_sync_and_an_unknown_mode_explain_differences(
-    confirmed: Configuration, reported: Configuration, flags: int, by_steps: list[str],
+    confirmed: model.Configuration, reported: model.Configuration, flags: int, by_steps: list[str],
     exactly: list[str],
 ) -> None:
     for step, names in ((True, by_steps), (False, exactly)):
-        assert unexpected_differences(confirmed, reported, flags, step=step) == names
+        assert model.unexpected_differences(confirmed, reported, flags, step=step) == names
 
 
 def test_the_params_of_a_configuration_are_in_the_order_of_the_command() -> None:
@@ -176,26 +166,26 @@ def test_a_description_has_units_and_can_be_partial() -> None:
     (0, []), (2, ['over temperature shutdown']), (5, ['thermal throttling', 'thermistor failure']),
     (0x80000001, ['thermal throttling', 'unknown flags 0x80000000'])])
 def test_error_flags_have_readable_names(flags: int, names: list[str]) -> None:
-    assert flag_names(flags) == names
+    assert model.flag_names(flags) == names
 
 
 # Reading
 
-def read(**fields: Any) -> Status:
+def read(**fields: Any) -> model.Status:
     """Return a status as it comes from the wire."""
     message = decode_payload(STATUS_ID, encode_payload(status_message(**fields)))
     assert isinstance(message, IlluminatorStatus)
-    return Status.from_message(message)
+    return model.Status.from_message(message)
 
 
 def test_a_plausible_status_is_read_as_sent() -> None:
     status = read(uptime_ms=1234, enable=1, mode_bitmask=2, error_status=5, mode=2,
                   brightness=50.0, strobe_period=0.5, strobe_duty_cycle=25.0, temp_c=-40.5,
                   min_strobe_period=0.25, max_strobe_period=8.0)
-    assert status == Status(
-        uptime_ms=1234, enabled=True, mode=Mode.EXTERNAL_SYNC, mode_bitmask=2, error_flags=5,
+    assert status == model.Status(
+        uptime_ms=1234, enabled=True, mode=model.Mode.EXTERNAL_SYNC, mode_bitmask=2, error_flags=5,
         brightness=50.0, strobe_period=0.5, strobe_duty_cycle=25.0, temperature=-40.5,
-        limits=Limits(0.25, 8.0), invalid=())
+        limits=model.Limits(0.25, 8.0), invalid=())
 
 
 @pytest.mark.parametrize('value', [NAN, INF, -INF, 3.0e38, -3.0e38])
@@ -217,8 +207,8 @@ def test_numbers_just_within_the_range_are_read() -> None:
 
 def test_enumerators_that_are_not_defined_are_unknown_and_named() -> None:
     assert (read(enable=2).enabled, read(enable=2).invalid) == (None, ('enable 2',))
-    assert (read(mode=3).mode, read(mode=3).invalid) == (Mode.UNKNOWN, ('mode 3',))
-    assert (read(mode=0).mode, read(mode=0).invalid) == (Mode.UNKNOWN, ())
+    assert (read(mode=3).mode, read(mode=3).invalid) == (model.Mode.UNKNOWN, ('mode 3',))
+    assert (read(mode=0).mode, read(mode=0).invalid) == (model.Mode.UNKNOWN, ())
 
 
 def test_a_status_names_all_its_implausible_fields() -> None:

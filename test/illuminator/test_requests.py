@@ -25,14 +25,7 @@ from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.light import PROGRESS_LIMIT, REFRESH_LIMIT
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    INFORMATION_ID,
-    MavCmd,
-    MavResult,
-    result_name,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.request import MAX_WAITING, Result
 import pytest
@@ -41,10 +34,11 @@ from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 from support.records import Answer
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
-REQUEST = MavCmd.REQUEST_MESSAGE
+ON_OFF, CONFIGURE = mav.MavCmd.ILLUMINATOR_ON_OFF, mav.MavCmd.DO_ILLUMINATOR_CONFIGURE
+REQUEST = mav.MavCmd.REQUEST_MESSAGE
 ACCEPTED, DENIED, IN_PROGRESS, REJECTED = (
-    MavResult.ACCEPTED, MavResult.DENIED, MavResult.IN_PROGRESS, MavResult.TEMPORARILY_REJECTED)
+    mav.MavResult.ACCEPTED, mav.MavResult.DENIED, mav.MavResult.IN_PROGRESS,
+    mav.MavResult.TEMPORARILY_REJECTED)
 # The end of a message: tries and time.
 TIMING = re.compile(r' \((\d+) (?:try|tries), (?:(\d+) ms|(\d+\.\d\d) s)\)$')
 NO_STATUS: dict[str, Any] = {'stream': 0.0, 'answers': set()}
@@ -85,8 +79,8 @@ def change(fake: FakeLight, **attributes: Any) -> None:
     (True, NO_STATUS, False,
      'on not confirmed: MAV_RESULT_ACCEPTED, but no ILLUMINATOR_STATUS came within 1.00 s'),
     (True, {'results': {ON_OFF: None}}, False, 'no acknowledgement'),
-    *((True, {'results': {ON_OFF: result}}, False, f'refused: {result_name(result)}')
-      for result in (DENIED, MavResult.UNSUPPORTED, MavResult.FAILED, 11, 200)),
+    *((True, {'results': {ON_OFF: result}}, False, f'refused: {mav.result_name(result)}')
+      for result in (DENIED, mav.MavResult.UNSUPPORTED, mav.MavResult.FAILED, 11, 200)),
 ])
 def test_the_answer_to_a_switch_says_what_the_light_did(
     fake: FakeLight, faked: Pair, on: bool, light: dict[str, Any], success: bool, text: str,
@@ -170,7 +164,7 @@ def test_a_newer_status_that_was_sent_before_the_command_does_not_confirm(
     faked.run(0.5)
     fake.results[ON_OFF] = None
     answer = faked.ask_enable(True)
-    fake.send(CommandAck(ON_OFF, ACCEPTED, 0, 0, *BRIDGE))
+    fake.send(mav.CommandAck(ON_OFF, ACCEPTED, 0, 0, *BRIDGE))
     fake.send(in_between)
     assert not faked.wait_for(answer).success
 
@@ -198,7 +192,7 @@ def test_progress_is_waited_for_up_to_a_limit(fake: FakeLight, faked: Pair) -> N
     fake.results[ON_OFF] = None
     answer = faked.ask_enable(True)
     while not answer.results and faked.now < answer.asked_at + 60.0:
-        fake.send(CommandAck(ON_OFF, IN_PROGRESS, 50, 0, *BRIDGE))
+        fake.send(mav.CommandAck(ON_OFF, IN_PROGRESS, 50, 0, *BRIDGE))
         faked.run(1.0)
     assert not answer.result.success
     assert 'MAV_RESULT_IN_PROGRESS at 50 %' in answer.result.message
@@ -277,7 +271,7 @@ def test_requests_fail_with_the_link_and_are_not_sent_later(fake: FakeLight, fak
 
 
 def test_many_lights_are_served_at_once_and_a_dead_one_delays_no_other() -> None:
-    addresses = [Address(1, component) for component in range(100, 130)]
+    addresses = [mav.Address(1, component) for component in range(100, 130)]
     pair = Pair([IlluminatorProperties(address=address) for address in addresses],
                 there=Faults(latency=0.05)).settle()
     pair.device.receive = lambda *message: None  # type: ignore[method-assign]
@@ -288,7 +282,7 @@ def test_many_lights_are_served_at_once_and_a_dead_one_delays_no_other() -> None
 
 
 @pytest.mark.parametrize('kind', [ON_OFF, CONFIGURE])
-def test_an_answer_may_start_the_next_request(pair: Pair, kind: MavCmd) -> None:
+def test_an_answer_may_start_the_next_request(pair: Pair, kind: mav.MavCmd) -> None:
     log: list[bool] = []
 
     def ask(now: float) -> None:
@@ -341,7 +335,7 @@ def test_cancelling_ends_each_request_once_and_sends_nothing_that_waited(
 # The time of a set
 
 SET_LIMIT = 0.9
-PROGRESS = CommandAck(CONFIGURE, IN_PROGRESS, 1, 0, *BRIDGE)
+PROGRESS = mav.CommandAck(CONFIGURE, IN_PROGRESS, 1, 0, *BRIDGE)
 LIGHTS: dict[str, dict[str, Any]] = {
     'silent': {'silent': True},
     'no acknowledgement': {'results': {CONFIGURE: None}},
@@ -350,10 +344,10 @@ LIGHTS: dict[str, dict[str, Any]] = {
         'results': {CONFIGURE: None}, 'stream': 0.1, 'status': lambda now: PROGRESS},
     'always rejected': {'results': {CONFIGURE: REJECTED}},
     'accepted at the fourth try': {'results': {CONFIGURE: [REJECTED] * 3 + [ACCEPTED]}},
-    'COMMAND_INT only': {'results': {CONFIGURE: MavResult.COMMAND_INT_ONLY}},
+    'COMMAND_INT only': {'results': {CONFIGURE: mav.MavResult.COMMAND_INT_ONLY}},
     'not done': {'applies': False},
     'done late': {'apply_after': 0.7},
-    'no status any more': {'stream': 0.0, 'answers': {INFORMATION_ID}},
+    'no status any more': {'stream': 0.0, 'answers': {mav.INFORMATION_ID}},
     'no answer to requests': {'stream': 0.0, 'results': {REQUEST: None}},
     'denied': {'results': {CONFIGURE: DENIED}},
 }
@@ -404,7 +398,7 @@ def test_a_refresh_requests_status_and_identity_and_takes_both(
     assert result.message == ('ILLUMINATOR_STATUS: received, '
                               'COMPONENT_INFORMATION_BASIC: received (4 ms)')
     assert {message.param1 for message in faked.commands(REQUEST, since=at)} == {
-        STATUS_ID, INFORMATION_ID}
+        STATUS_ID, mav.INFORMATION_ID}
     assert faked.light.status is not None
     assert faked.light.status.brightness == 12.0
     assert faked.snapshot.identity == Identity(serial_number='T-2')
@@ -412,9 +406,9 @@ def test_a_refresh_requests_status_and_identity_and_takes_both(
 
 @pytest.mark.parametrize(('light', 'success', 'status', 'identity'), [
     ({'answers': {STATUS_ID}}, True, 'received', 'acknowledged, but not sent'),
-    ({'stream': 0.0, 'results': {REQUEST: MavResult.UNSUPPORTED}}, False,
+    ({'stream': 0.0, 'results': {REQUEST: mav.MavResult.UNSUPPORTED}}, False,
      'MAV_RESULT_UNSUPPORTED', 'refused: MAV_RESULT_UNSUPPORTED'),
-    ({'stream': 0.0, 'answers': {INFORMATION_ID}}, False, 'nothing came', 'received'),
+    ({'stream': 0.0, 'answers': {mav.INFORMATION_ID}}, False, 'nothing came', 'received'),
     (NO_STATUS, False, 'nothing came', 'acknowledged, but not sent'),
     *(({**NO_STATUS, 'results': {REQUEST: result}}, False, '', '')
       for result in (None, IN_PROGRESS, REJECTED)),
@@ -437,7 +431,7 @@ def test_a_refresh_ends_once_and_in_time_with_the_reason(
 @pytest.fixture
 def three() -> Pair:
     """Return a client and three lights that know each other."""
-    return Pair([IlluminatorProperties(Address(1, one)) for one in (243, 244, 245)]).settle()
+    return Pair([IlluminatorProperties(mav.Address(1, one)) for one in (243, 244, 245)]).settle()
 
 
 def ask_all(pair: Pair) -> Answer:
@@ -457,7 +451,7 @@ def deafen(pair: Pair) -> None:
                                'lamp 1/245: on, ']),
     (deafen, False, ['2 of 3 on', 'lamp 1/243: no acknowledgement (4 tries', 'lamp 1/244: on, ',
                      'lamp 1/245: on, ']),
-    (lambda pair: pair.controller.lights[Address(1, 244)].lose('gone', pair.now), True,
+    (lambda pair: pair.controller.lights[mav.Address(1, 244)].lose('gone', pair.now), True,
      ['2 of 2 on', 'lamp 1/243: on, ', 'lamp 1/244: light 1/244 is lost', 'lamp 1/245: on, ']),
     (Pair.close, False, [f'lamp 1/{one}: light 1/{one} is lost: ' for one in (243, 244, 245)]),
 ], ids=['all', 'one fails', 'one is lost', 'all are lost'])

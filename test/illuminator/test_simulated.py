@@ -20,26 +20,16 @@ from typing import Any
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandInt,
-    CommandLong,
-    encode_payload,
-    Heartbeat,
-    INFORMATION_ID,
-    MavCmd,
-    MavResult,
-    MavType,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.light_bench import GROUND, LightBench
 from support.simulated_lights import simulated_lights
 
 NAN, INF = float('nan'), float('inf')
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
-REQUEST, SET_INTERVAL = MavCmd.REQUEST_MESSAGE, MavCmd.SET_MESSAGE_INTERVAL
-ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
+ON_OFF, CONFIGURE = mav.MavCmd.ILLUMINATOR_ON_OFF, mav.MavCmd.DO_ILLUMINATOR_CONFIGURE
+REQUEST, SET_INTERVAL = mav.MavCmd.REQUEST_MESSAGE, mav.MavCmd.SET_MESSAGE_INTERVAL
+ACCEPTED, DENIED = mav.MavResult.ACCEPTED, mav.MavResult.DENIED
 HOT = ThermalProperties(ambient=40.0, rise=80.0, time_constant=10.0)
 
 
@@ -71,15 +61,15 @@ def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench: LightBench
 
 def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
     bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
-    _, information = bench.command(REQUEST, INFORMATION_ID)
-    assert encode_payload(information)[16:] == (
+    _, information = bench.command(REQUEST, mav.INFORMATION_ID)
+    assert mav.encode_payload(information)[16:] == (
         b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
         + b'n' * 31 + b'\0')
 
 
 def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start() -> None:
-    beats = [m for m in LightBench().run(4.5) if isinstance(m, Heartbeat)]
-    assert {(m.type, m.autopilot) for m in beats} == {(MavType.ILLUMINATOR, 8)}
+    beats = [m for m in LightBench().run(4.5) if isinstance(m, mav.Heartbeat)]
+    assert {(m.type, m.autopilot) for m in beats} == {(mav.MavType.ILLUMINATOR, 8)}
     assert len(beats) == 5
 
 
@@ -97,15 +87,15 @@ def test_lights_on_one_link_obey_only_their_own_commands(
     target: tuple[int, int], enabled: list[bool],
 ) -> None:
     lights = simulated_lights(
-        [IlluminatorProperties(address=Address(1, one)) for one in (243, 244)], 0.0)
-    lights.receive(GROUND, CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
+        [IlluminatorProperties(address=mav.Address(1, one)) for one in (243, 244)], 0.0)
+    lights.receive(GROUND, mav.CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
     assert [light.device.enabled for light in lights.components] == enabled
     assert len({source for source, _ in lights.outgoing}) == sum(enabled)
 
 
-@pytest.mark.parametrize('form', [CommandLong, CommandInt])
+@pytest.mark.parametrize('form', [mav.CommandLong, mav.CommandInt])
 def test_a_change_is_acknowledged_then_applied_then_reported(
-    bench: LightBench, form: type[CommandLong | CommandInt],
+    bench: LightBench, form: type[mav.CommandLong | mav.CommandInt],
 ) -> None:
     for value in (1, 0):
         ack, status = bench.command(ON_OFF, value, form=form)
@@ -137,7 +127,7 @@ def test_a_restart_resets_the_settings_and_keeps_the_temperature() -> None:
     bench.lamp.heat_to(60.0, 0.0)
     bench.now = 100.0
     bench.component.restart(bench.now)
-    assert isinstance(bench.run(0.0)[0], Heartbeat)
+    assert isinstance(bench.run(0.0)[0], mav.Heartbeat)
     status = bench.status()
     assert (status.uptime_ms, status.enable, status.temp_c) == (0, 0, 60.0)
     assert bench.shown() == (1, 100.0, 0, 0)
@@ -172,12 +162,12 @@ def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
 
 @pytest.mark.parametrize(('command', 'params', 'result'), [
     *((REQUEST, (message_id,), DENIED) for message_id in (0, 1, 33, NAN, INF, -1, 440.5)),
-    *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, INFORMATION_ID, NAN)),
+    *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, mav.INFORMATION_ID, NAN)),
     *((SET_INTERVAL, (STATUS_ID, interval), DENIED) for interval in (NAN, INF, -INF, -2, -0.5)),
-    *((command, (), MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
+    *((command, (), mav.MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
     *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
 def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
-    bench: LightBench, command: MavCmd, params: tuple[float, ...], result: MavResult,
+    bench: LightBench, command: mav.MavCmd, params: tuple[float, ...], result: mav.MavResult,
 ) -> None:
     (ack,) = bench.command(command, *params)
     assert ack.result == result

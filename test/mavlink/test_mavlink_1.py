@@ -19,17 +19,10 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Payload
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    Message,
-)
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.url import parse_url
 import pytest
@@ -44,24 +37,24 @@ PEER = ('127.0.0.1', 14550)
 class Talker1(Talker):
     """Handles the messages given, and acknowledges each."""
 
-    def __init__(self, *messages: type[Message]) -> None:
+    def __init__(self, *messages: type[mav.Message]) -> None:
         super().__init__()
         self.messages = messages
 
-    def receive(self, source: Address, message: Message, now: float) -> None:
-        self.outgoing.append((BRIDGE, CommandAck(405, 0, 50, -1, *source)))
+    def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
+        self.outgoing.append((BRIDGE, mav.CommandAck(405, 0, 50, -1, *source)))
 
 
 def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_frames() -> None:
     sent: list[bytes] = []
-    endpoint = Talker1(Heartbeat, CommandAck)
+    endpoint = Talker1(mav.Heartbeat, mav.CommandAck)
     link = SimulatedLink(endpoint, lambda data, peer: sent.append(data), mavlink_version=1)
 
     # Whatever it receives: this is a MAVLink 2 frame.
-    link.receive((heartbeat_frame(Address(1, 1)), PEER))
+    link.receive((heartbeat_frame(mav.Address(1, 1)), PEER))
     link.ask(lambda now: endpoint.outgoing.extend([
-        (BRIDGE, CommandLong(1, 2, 512, 0, 0, 0, 0, 0, 0, 0, 0)),
-        (BRIDGE, CommandInt(1, 2, 0, 195, 0, 0, 0, 0, 0, 0, 0, 0, 0))]))
+        (BRIDGE, mav.CommandLong(1, 2, 512, 0, 0, 0, 0, 0, 0, 0, 0)),
+        (BRIDGE, mav.CommandInt(1, 2, 0, 195, 0, 0, 0, 0, 0, 0, 0, 0, 0))]))
 
     assert parse_strictly(b''.join(sent)) == [
         (0, bytes((0, 0, 0, 0, 18, 8, 0, 4, 3))), (77, bytes((149, 1, 0))),
@@ -70,10 +63,10 @@ def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_
 
 def test_link_of_version_1_refuses_messages_that_only_a_payload_of_its_component_sends() -> None:
     class Sender(Payload):
-        messages = (Heartbeat,)
+        messages = (mav.Heartbeat,)
         sends = (IlluminatorStatus,)
 
-        def receive(self, source: Address, message: Message, now: float) -> None:
+        def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
             raise AssertionError('the link is not made')
 
     with pytest.raises(ValueError, match='cannot carry ILLUMINATOR_STATUS:'):
@@ -82,11 +75,11 @@ def test_link_of_version_1_refuses_messages_that_only_a_payload_of_its_component
 
 
 @pytest.mark.parametrize(('messages', 'options', 'reason'), [
-    ((Heartbeat, IlluminatorStatus), {}, 'MAVLink 1 cannot carry ILLUMINATOR_STATUS:'),
+    ((mav.Heartbeat, IlluminatorStatus), {}, 'MAVLink 1 cannot carry ILLUMINATOR_STATUS:'),
     ((), {'signing': Signing(SigningMode.SIGN, bytes(32))}, 'cannot be signed'),
     ((), {'mavlink_version': 3}, 'version 3 is neither')])
 def test_link_that_mavlink_1_cannot_serve_is_refused_with_the_reason(
-        messages: tuple[type[Message], ...], options: dict[str, Any], reason: str) -> None:
+        messages: tuple[type[mav.Message], ...], options: dict[str, Any], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         Link(parse_url('memory://one'), Talker1(*messages), label='one',
              **{'mavlink_version': 1, **options})

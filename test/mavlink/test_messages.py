@@ -24,20 +24,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink import messages
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.crc_extra import DIALECT
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    decode_payload,
-    encode_payload,
-    heartbeat,
-    LAYOUTS,
-    MavCmd,
-    MavResult,
-    MavType,
-    Message,
-    result_name,
-)
 from pymavlink.dialects.v20 import ardupilotmega, common
 import pytest
 from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
@@ -47,68 +35,68 @@ each_message = pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda one:
 
 
 @each_message
-def test_definition_is_that_of_the_generator(message: Message) -> None:
+def test_definition_is_that_of_the_generator(message: mav.Message) -> None:
     generated = reference().mavlink_map[message.id]
 
     assert (message.name, message.crc_extra, message.codec.size) == (
         generated.msgname, generated.crc_extra, generated.unpacker.size)
-    assert LAYOUTS[message.id] == (generated.crc_extra, generated.unpacker.size)
-    assert encode_payload(message) == twin(message).unpacker.pack(
+    assert mav.LAYOUTS[message.id] == (generated.crc_extra, generated.unpacker.size)
+    assert mav.encode_payload(message) == twin(message).unpacker.pack(
         *(fields_of(twin(message))[name] for name in generated.ordered_fieldnames))
 
 
 def test_status_and_information_lie_on_the_wire_as_specified() -> None:
     assert (STATUS.id, STATUS.crc_extra, INFORMATION.id, INFORMATION.crc_extra) == (
         440, 66, 396, 50)
-    assert encode_payload(STATUS) == struct.pack(
+    assert mav.encode_payload(STATUS) == struct.pack(
         '<IIffffffBBBBBB', 123456, 5, 62.5, 0.25, 40.0, 71.5, 0.0625, 10.0, 1, 3, 2, 25, 1, 154)
-    assert encode_payload(INFORMATION) == struct.pack(
+    assert mav.encode_payload(INFORMATION) == struct.pack(
         '<QII32s32s24s24s32s', 1 << 40, 5000, 1_600_000_000, b'Maker', b'Torch', b'1.2.3',
         b'B', b'SN-7')
 
 
 @each_message
-def test_cut_zeros_and_unknown_extensions_change_no_known_field(message: Message) -> None:
-    payload = encode_payload(message)
+def test_cut_zeros_and_unknown_extensions_change_no_known_field(message: mav.Message) -> None:
+    payload = mav.encode_payload(message)
 
     for variant in (payload.rstrip(b'\0'), payload, payload + bytes(range(1, 50))):
-        read = decode_payload(type(message), variant)
-        assert encode_payload(read) == payload
-    assert not encode_payload(decode_payload(type(message), b'')).strip(b'\0')
+        read = mav.decode_payload(type(message), variant)
+        assert mav.encode_payload(read) == payload
+    assert not mav.encode_payload(mav.decode_payload(type(message), b'')).strip(b'\0')
 
 
 @given(st.binary(max_size=255), st.sampled_from(EVERY_MESSAGE))
 def test_any_payload_decodes_to_the_fields_that_the_generator_reads(
-        payload: bytes, message: Message) -> None:
+        payload: bytes, message: mav.Message) -> None:
     generated = reference().mavlink_map[message.id]
     values = generated.unpacker.unpack(
         payload[:message.codec.size].ljust(message.codec.size, b'\0'))
 
-    read = asdict(decode_payload(type(message), payload))  # type: ignore[call-overload]
+    read = asdict(mav.decode_payload(type(message), payload))  # type: ignore[call-overload]
 
     assert repr(read) == repr(dict(zip(
         generated.fieldnames, (values[i] for i in generated.orders), strict=True)))
 
 
 def test_mavlink_1_acknowledgement_has_neither_progress_nor_target() -> None:
-    assert CommandAck.base_size == 3
-    assert decode_payload(CommandAck, struct.pack('<HB', 405, 4)) == CommandAck(405, 4)
+    assert mav.CommandAck.base_size == 3
+    assert mav.decode_payload(mav.CommandAck, struct.pack('<HB', 405, 4)) == mav.CommandAck(405, 4)
 
 
 def test_value_that_does_not_fit_its_field_is_refused() -> None:
     with pytest.raises(struct.error):
-        encode_payload(CommandAck(405, 256))
+        mav.encode_payload(mav.CommandAck(405, 256))
 
 
 def test_frames_of_all_messages_of_pymavlink_can_be_checked() -> None:
     # A newer pymavlink may have more messages, but no other layout of these.
     known = ardupilotmega.mavlink_map
     assert {id_: (known[id_].crc_extra, known[id_].unpacker.size) for id_ in DIALECT} == DIALECT
-    assert {*common.mavlink_map, STATUS_ID} <= {*LAYOUTS}
+    assert {*common.mavlink_map, STATUS_ID} <= {*mav.LAYOUTS}
 
 
 @pytest.mark.parametrize(('enum', 'prefix'), [
-    (MavCmd, 'MAV_CMD'), (MavResult, 'MAV_RESULT'), (MavType, 'MAV_TYPE')])
+    (mav.MavCmd, 'MAV_CMD'), (mav.MavResult, 'MAV_RESULT'), (mav.MavType, 'MAV_TYPE')])
 def test_numbers_are_those_of_pymavlink(enum: Any, prefix: str) -> None:
     missing = {entry.name for entry in enum if not hasattr(common, f'{prefix}_{entry.name}')}
 
@@ -119,7 +107,7 @@ def test_numbers_are_those_of_pymavlink(enum: Any, prefix: str) -> None:
 
 
 def test_every_result_has_a_name_of_its_own() -> None:
-    names = [result_name(result) for result in range(256)]
+    names = [mav.result_name(result) for result in range(256)]
 
     assert len(set(names)) == 256
     assert names[4:6] == ['MAV_RESULT_FAILED', 'MAV_RESULT_IN_PROGRESS']
@@ -127,11 +115,11 @@ def test_every_result_has_a_name_of_its_own() -> None:
 
 
 def test_heartbeat_is_that_of_an_active_component_and_not_of_an_autopilot() -> None:
-    assert asdict(heartbeat(MavType.ILLUMINATOR)) == {
+    assert asdict(mav.heartbeat(mav.MavType.ILLUMINATOR)) == {
         'type': common.MAV_TYPE_ILLUMINATOR, 'autopilot': common.MAV_AUTOPILOT_INVALID,
         'base_mode': 0, 'custom_mode': 0, 'system_status': common.MAV_STATE_ACTIVE,
         'mavlink_version': 3}
 
 
 def test_address_reads_as_system_and_component() -> None:
-    assert str(Address(1, 243)) == '1/243'
+    assert str(mav.Address(1, 243)) == '1/243'

@@ -16,22 +16,11 @@
 
 from typing import Any
 
-from illuminator_ros.cli.monitor.key_bindings import (
-    Ask,
-    BINDINGS,
-    dim,
-    KeyBindings,
-    KeyDecoder,
-    Request,
-    Service,
-    strobe,
-    switch,
-    switch_off,
-)
+from illuminator_ros.cli.monitor import key_bindings
 from illuminator_ros.cli.monitor.model import Light
 import pytest
 
-KEYS = [key for keys, _, _ in BINDINGS for key in keys]
+KEYS = [key for keys, _, _ in key_bindings.BINDINGS for key in keys]
 
 
 @pytest.mark.parametrize(('sent', 'keys'), [
@@ -41,15 +30,15 @@ KEYS = [key for keys, _, _ in BINDINGS for key in keys]
     (b'\x1b[1;5A', ['escape']), (b'\x1bx', ['escape', 'x']), (b'\xff', ['\ufffd']), (b'', []),
 ])
 def test_bytes_are_decoded_whole_and_in_pieces(sent: bytes, keys: list[str]) -> None:
-    assert KeyDecoder().feed(sent) == keys
+    assert key_bindings.KeyDecoder().feed(sent) == keys
     if sent.isascii():
-        decoder = KeyDecoder()
+        decoder = key_bindings.KeyDecoder()
         assert sum((decoder.feed(bytes([byte])) for byte in sent), []) == keys
         assert not decoder.waiting
 
 
 def test_escape_is_a_key_if_no_byte_follows() -> None:
-    decoder = KeyDecoder()
+    decoder = key_bindings.KeyDecoder()
 
     assert (decoder.feed(b'\x1b'), decoder.waiting) == ([], True)
     assert (decoder.feed(b''), decoder.waiting) == (['escape'], False)
@@ -65,8 +54,9 @@ def light(setpoint: float | None = None, wanted: dict[str, Any] | None = None,
     (light(enabled=True), False), (light(enabled=False), True), (light(), True),
     (light(enabled=False, wanted={'enabled': True}), False)])
 def test_switch_reverses_the_newest_wanted_or_reported_state(one: Light, on: bool) -> None:
-    assert switch(one) == Request(Service.ENABLE, 'on' if on else 'off', on)
-    assert switch_off(one).value is False
+    assert key_bindings.switch(one) == key_bindings.Request(
+        key_bindings.Service.ENABLE, 'on' if on else 'off', on)
+    assert key_bindings.switch_off(one).value is False
 
 
 @pytest.mark.parametrize(('one', 'step', 'target'), [
@@ -80,13 +70,13 @@ def test_switch_reverses_the_newest_wanted_or_reported_state(one: Light, on: boo
 def test_dim_steps_from_the_newest_brightness_within_the_range(
     one: Light, step: float, target: float,
 ) -> None:
-    request = dim(one, step)
+    request = key_bindings.dim(one, step)
     assert request is not None
-    assert (request.service, request.value) == (Service.SET, {'brightness': target})
+    assert (request.service, request.value) == (key_bindings.Service.SET, {'brightness': target})
 
 
 def test_dim_makes_no_request_without_a_known_brightness() -> None:
-    assert dim(light(), 10.0) is None
+    assert key_bindings.dim(light(), 10.0) is None
 
 
 @pytest.mark.parametrize(('one', 'value'), [
@@ -97,7 +87,7 @@ def test_dim_makes_no_request_without_a_known_brightness() -> None:
     (light(strobe_period=0.5), {'strobe_period': 0.0}),
     (light(strobe_period=0.0, wanted={'strobe_period': 1.0}), {'strobe_period': 0.0})])
 def test_strobe_starts_with_the_last_duty_cycle_or_ends(one: Light, value: object) -> None:
-    assert strobe(one).value == value
+    assert key_bindings.strobe(one).value == value
 
 
 class Desk:
@@ -109,10 +99,10 @@ class Desk:
                        for name in ('/a', '/b', '/c')]
         self.asked: list[tuple[str, object]] = []
         self.cleared = 0
-        self.bindings = KeyBindings(self.submit, self.clear_gone)
+        self.bindings = key_bindings.KeyBindings(self.submit, self.clear_gone)
         self.bindings.update(self.lights)
 
-    def submit(self, name: str, ask: Ask) -> None:
+    def submit(self, name: str, ask: key_bindings.Ask) -> None:
         [light] = [light for light in self.lights if light.name == name]
         request = ask(light)
         assert request is not None

@@ -14,23 +14,15 @@
 
 """The lights of the monitor over time."""
 
-from illuminator_ros.cli.monitor.model import (
-    Diagnosis,
-    Fleet,
-    MAX_LIGHTS,
-    printable,
-    SILENCE,
-    State,
-    Trend,
-)
+from illuminator_ros.cli.monitor import model
 import pytest
 
 BOW = '/bow'
 
 
-def fleet_with(**values: object) -> Fleet:
+def fleet_with(**values: object) -> model.Fleet:
     """Return a fleet with one light that has published these values at time 100."""
-    fleet = Fleet()
+    fleet = model.Fleet()
     fleet.seen([BOW], 100.0)
     for topic, value in values.items():
         fleet.take(BOW, topic, value, 100.0)
@@ -38,41 +30,41 @@ def fleet_with(**values: object) -> Fleet:
 
 
 @pytest.mark.parametrize(('values', 'state'), [
-    ({}, State.UNKNOWN),
-    ({'connected': True}, State.UNKNOWN),
-    ({'connected': True, 'enabled': True}, State.ON),
-    ({'connected': True, 'enabled': False}, State.OFF),
-    ({'connected': False, 'enabled': True}, State.LOST),
+    ({}, model.State.UNKNOWN),
+    ({'connected': True}, model.State.UNKNOWN),
+    ({'connected': True, 'enabled': True}, model.State.ON),
+    ({'connected': True, 'enabled': False}, model.State.OFF),
+    ({'connected': False, 'enabled': True}, model.State.LOST),
 ])
-def test_state_follows_from_the_topics(values: dict[str, bool], state: State) -> None:
+def test_state_follows_from_the_topics(values: dict[str, bool], state: model.State) -> None:
     assert fleet_with(**values).snapshot()[0].state(100.0) is state
 
 
 def test_light_without_topics_and_diagnostics_is_silent() -> None:
     fleet = fleet_with(connected=True, enabled=True)
     [light] = fleet.snapshot()
-    assert light.state(100.0 + SILENCE) is State.ON
-    assert light.state(100.1 + SILENCE) is State.SILENT
+    assert light.state(100.0 + model.SILENCE) is model.State.ON
+    assert light.state(100.1 + model.SILENCE) is model.State.SILENT
 
-    fleet.diagnosed(BOW, 'link', Diagnosis(0, 'open', {}), 110.0)
+    fleet.diagnosed(BOW, 'link', model.Diagnosis(0, 'open', {}), 110.0)
 
-    assert fleet.snapshot()[0].state(111.0) is State.ON
+    assert fleet.snapshot()[0].state(111.0) is model.State.ON
 
 
 def test_light_that_left_the_graph_is_gone_and_returns_without_its_setpoint() -> None:
     fleet = fleet_with(connected=True, enabled=True)
     fleet.agreed(BOW, 30.0)
     fleet.seen([], 101.0)
-    assert fleet.snapshot()[0].state(101.0) is State.GONE
+    assert fleet.snapshot()[0].state(101.0) is model.State.GONE
 
     assert fleet.seen([BOW], 102.0) == []
 
-    assert fleet.snapshot()[0].state(102.0) is State.ON
+    assert fleet.snapshot()[0].state(102.0) is model.State.ON
     assert fleet.snapshot()[0].setpoint is None
 
 
 def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
-    fleet = Fleet()
+    fleet = model.Fleet()
 
     assert fleet.seen(['/b', '/a'], 0.0) == ['/a', '/b']
     assert fleet.seen(['/a', '/b', '/aa'], 1.0) == ['/aa']
@@ -80,15 +72,15 @@ def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
     fleet.seen(['/b'], 2.0)
     assert fleet.clear_gone() == ['/a', '/aa']
     assert [light.name for light in fleet.snapshot()] == ['/b']
-    fleet.seen(['/b', *(f'/light_{number}' for number in range(MAX_LIGHTS + 5))], 3.0)
-    assert len(fleet.snapshot()) == MAX_LIGHTS
+    fleet.seen(['/b', *(f'/light_{number}' for number in range(model.MAX_LIGHTS + 5))], 3.0)
+    assert len(fleet.snapshot()) == model.MAX_LIGHTS
 
 
 def test_values_of_unknown_lights_are_ignored() -> None:
     fleet = fleet_with()
 
     fleet.take('/other', 'enabled', True, 100.0)
-    fleet.diagnosed('', 'lamp', Diagnosis(2, 'broken', {}), 100.0)
+    fleet.diagnosed('', 'lamp', model.Diagnosis(2, 'broken', {}), 100.0)
     fleet.agreed('/other', 1.0)
 
     assert [(light.name, light.lamp) for light in fleet.snapshot()] == [(BOW, None)]
@@ -101,22 +93,22 @@ def test_error_flags_have_texts() -> None:
 
 def test_control_characters_of_others_never_reach_the_terminal() -> None:
     fleet = fleet_with(mode='\x1b[2J')
-    fleet.diagnosed(BOW, 'lamp', Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
+    fleet.diagnosed(BOW, 'lamp', model.Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
     [light] = fleet.snapshot()
 
     assert light.lamp is not None
     texts = [light.value('mode'), light.lamp.message, *light.lamp.values.values()]
     assert all(text.isprintable() for text in texts)
-    assert printable('Ünï 20 %') == 'Ünï 20 %'
+    assert model.printable('Ünï 20 %') == 'Ünï 20 %'
 
 
 def test_trend_has_the_newest_value_of_each_step_up_to_its_size() -> None:
-    trend = Trend(step=2.0, size=10)
+    trend = model.Trend(step=2.0, size=10)
     for now, value in ((0.0, 20.0), (1.9, 21.0), (2.0, 22.0), (8.5, 23.0)):
         trend.add(value, now)
 
     assert trend.last(6, 9.0) == [None, 21.0, 22.0, None, None, 23.0]
-    short = Trend(step=1.0, size=3)
+    short = model.Trend(step=1.0, size=3)
     for second in range(100):
         short.add(float(second), float(second))
     assert short.last(10, 99.0) == [97.0, 98.0, 99.0]
@@ -129,4 +121,4 @@ def test_number_of_a_diagnosis_is_finite_or_none(
 ) -> None:
     values = {} if text is None else {'loss_percent': text}
 
-    assert Diagnosis(0, '', values).number('loss_percent') == number
+    assert model.Diagnosis(0, '', values).number('loss_percent') == number

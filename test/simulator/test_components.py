@@ -18,14 +18,7 @@ from pathlib import Path
 import sys
 from typing import Any, cast
 
-from illuminator_ros.cli.simulator.components import (
-    components,
-    Listed,
-    load,
-    Scenario,
-    scenario,
-    SettingError,
-)
+from illuminator_ros.cli.simulator import components
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.gimbal.simulated_manager import SIMULATED as MANAGERS
 from illuminator_ros.illuminator.model import Limits, Mode
@@ -46,9 +39,9 @@ FILE = {
 
 
 def described(*arguments: str, file: object = None) -> list[Description[SimulatedIlluminator]]:
-    return cast('list[Description[SimulatedIlluminator]]', components(
+    return cast('list[Description[SimulatedIlluminator]]', components.components(
         parser().parse_args(list(arguments)),
-        scenario(file, 'f.yaml', TYPES) if file else Scenario(), TYPES))
+        components.scenario(file, 'f.yaml', TYPES) if file else components.Scenario(), TYPES))
 
 
 def properties(*arguments: str, file: object = None) -> list[IlluminatorProperties]:
@@ -111,15 +104,16 @@ def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names() -> None:
 
 def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
     types: list[SimulatedType[Any]] = [SIMULATED, MANAGERS]
-    file = scenario({'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types)
-    light, manager = cast('list[Any]', components(parser(types).parse_args([
+    file = components.scenario({'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types)
+    light, manager = cast('list[Any]', components.components(parser(types).parse_args([
         '--profile', 'px4', '--fault', 'lie,frozen-axis', '--vendor', 'ACME']), file, types))
     assert light.device.properties.identity.vendor == 'ACME'
     assert manager.device.properties.gimbal.vendor == 'ACME'
     assert [faults(one) for one in (light, manager)] == [['lie'], ['lie', 'frozen-axis']]
     assert not manager.device.behaviour.takes_pitchyaw
-    with pytest.raises(SettingError, match="'ardusup' is not one of default"):
-        components(parser(types).parse_args(['--profile', 'ardusup']), Scenario(), types)
+    with pytest.raises(components.SettingError, match="'ardusup' is not one of default"):
+        components.components(
+            parser(types).parse_args(['--profile', 'ardusup']), components.Scenario(), types)
 
 
 def test_a_file_has_settings_for_all_lights_and_for_each() -> None:
@@ -155,7 +149,7 @@ def test_a_file_without_lights_leaves_their_number_to_the_command_line() -> None
     ({'profile': 'x'}, "profile: 'x' is not one of default, reference"),
     ({'profiel': 'x'}, "no setting 'profiel'")])
 def test_an_error_in_a_file_names_its_place_and_the_reason(content: object, reason: str) -> None:
-    with pytest.raises(SettingError) as caught:
+    with pytest.raises(components.SettingError) as caught:
         described(file=content)
     assert reason in str(caught.value)
 
@@ -177,7 +171,7 @@ def test_an_error_in_a_file_names_its_place_and_the_reason(content: object, reas
     (['--ambient', 'x'], "--ambient: 'x' is not a number")])
 def test_options_that_contradict_each_other_are_refused_with_the_reason(
         arguments: list[str], reason: str) -> None:
-    with pytest.raises(SettingError) as caught:
+    with pytest.raises(components.SettingError) as caught:
         described(*arguments)
     assert reason in str(caught.value)
 
@@ -203,14 +197,14 @@ def test_a_yaml_file_is_read_or_refused_with_the_reason(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / 'lights.yaml'
     path.write_text('url: udpin://127.0.0.1:1\nlights:\n  - {id: 1/9, ambient: 3}\n')
-    found = load(str(path), TYPES)
+    found = components.load(str(path), TYPES)
     assert (found.url, found.listed['light']) == (
-        'udpin://127.0.0.1:1', [Listed(Address(1, 9), '', {'ambient': 3.0})])
+        'udpin://127.0.0.1:1', [components.Listed(Address(1, 9), '', {'ambient': 3.0})])
     path.write_text('a: [')
-    with pytest.raises(SettingError, match='not YAML'):
-        load(str(path), TYPES)
-    with pytest.raises(SettingError, match='No such file'):
-        load(str(tmp_path / 'nowhere'), TYPES)
+    with pytest.raises(components.SettingError, match='not YAML'):
+        components.load(str(path), TYPES)
+    with pytest.raises(components.SettingError, match='No such file'):
+        components.load(str(tmp_path / 'nowhere'), TYPES)
     monkeypatch.setitem(sys.modules, 'yaml', None)
-    with pytest.raises(SettingError, match='need PyYAML: pip install pyyaml'):
-        load(str(path), TYPES)
+    with pytest.raises(components.SettingError, match='need PyYAML: pip install pyyaml'):
+        components.load(str(path), TYPES)

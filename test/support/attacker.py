@@ -23,35 +23,24 @@ import struct
 from typing import Any, get_args, get_type_hints
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    ComponentInformationBasic,
-    encode_payload,
-    Heartbeat,
-    LAYOUTS,
-    MavType,
-    Message,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.signing import MAX_TICKS, signature, ticks
 from support.frames import raw_v1, raw_v2
 
-MESSAGES: tuple[type[Message], ...] = (
-    Heartbeat, IlluminatorStatus, IlluminatorStatus, ComponentInformationBasic, CommandAck,
-    CommandAck, CommandLong, CommandInt)
+MESSAGES: tuple[type[mav.Message], ...] = (
+    mav.Heartbeat, IlluminatorStatus, IlluminatorStatus, mav.ComponentInformationBasic,
+    mav.CommandAck, mav.CommandAck, mav.CommandLong, mav.CommandInt)
 FLOATS = (0.0, -0.0, 1.0, 50.0, 100.0, 100.00001, -1.0, -1e-30, 1e-45, 3.4e38, -3.4e38, 25.5,
           math.nan, -math.nan, math.inf, -math.inf, 440.0, 396.0, 1e6, 0.05, 3600.5)
 # Values of fields that decide how far a message gets.
 TELLING = {'command': (405, 406, 511, 512, 80, 0, 65535), 'result': (*range(11), 255),
-           'type': (MavType.ILLUMINATOR, MavType.ILLUMINATOR, 0, 18, 255)}
+           'type': (mav.MavType.ILLUMINATOR, mav.MavType.ILLUMINATOR, 0, 18, 255)}
 # Every length that is of interest: too short, right, extended, the longest.
 LENGTHS = (0, 1, 2, 3, 9, 10, 30, 33, 34, 35, 36, 38, 160, 161, 200, 254, 255)
 Datagrams = list[tuple[bytes, Any]]
 
 
-def field_codes(cls: type[Message]) -> list[tuple[str, str]]:
+def field_codes(cls: type[mav.Message]) -> list[tuple[str, str]]:
     """Return the fields of a message, each with its code in :mod:`struct`."""
     hints = get_type_hints(cls, include_extras=True)
     return [(field.name, get_args(hints[field.name])[1])
@@ -69,7 +58,7 @@ class Attacker:
     :param sources: addresses worth claiming to be.
     """
 
-    def __init__(self, seed: object, key: bytes, sources: list[Address]) -> None:
+    def __init__(self, seed: object, key: bytes, sources: list[mav.Address]) -> None:
         self._draw = random.Random(repr(seed))
         self._key = key
         self._sources = sources
@@ -97,7 +86,8 @@ class Attacker:
             return [(raw_v2(draw.randrange(1 << 24), draw.randbytes(draw.choice(LENGTHS)),
                             crc_extra=0, source=self._source()), peer) for _ in range(10)]
         if kind < 21:
-            return [(self._framed(Heartbeat, self._any_source(), now), peer) for _ in range(10)]
+            return [(self._framed(mav.Heartbeat, self._any_source(), now), peer)
+                    for _ in range(10)]
         return [(self._frame(now), self._new_peer()) for _ in range(10)]
 
     def _peer(self) -> Any:
@@ -109,13 +99,13 @@ class Attacker:
         self._count += 1
         return f'127.{self._count >> 16 & 255}.{self._count >> 8 & 255}.{self._count & 255}', 9
 
-    def _source(self) -> Address:
+    def _source(self) -> mav.Address:
         if self._draw.random() < 0.6:
             return self._draw.choice(self._sources)
         return self._any_source()
 
-    def _any_source(self) -> Address:
-        return Address(self._draw.randrange(256), self._draw.randrange(256))
+    def _any_source(self) -> mav.Address:
+        return mav.Address(self._draw.randrange(256), self._draw.randrange(256))
 
     def _mutated(self, frame: bytes) -> bytes:
         draw, data = self._draw, bytearray(frame)
@@ -129,12 +119,12 @@ class Attacker:
 
     def _frame(self, now: float) -> bytes:
         if self._draw.random() < 0.05:
-            return raw_v2(self._draw.choice(list(LAYOUTS)),
+            return raw_v2(self._draw.choice(list(mav.LAYOUTS)),
                           self._draw.randbytes(self._draw.choice(LENGTHS)), source=self._source())
         return self._framed(self._draw.choice(MESSAGES), self._source(), now)
 
-    def _framed(self, cls: type[Message], source: Address, now: float) -> bytes:
-        draw, payload = self._draw, encode_payload(self._message(cls))
+    def _framed(self, cls: type[mav.Message], source: mav.Address, now: float) -> bytes:
+        draw, payload = self._draw, mav.encode_payload(self._message(cls))
         if draw.random() < 0.1:
             payload = (payload + draw.randbytes(255))[:draw.choice(LENGTHS)]
         elif draw.random() < 0.8:
@@ -148,7 +138,7 @@ class Attacker:
         return raw_v2(cls.id, payload, incompat=flags, sequence=sequence, source=source)
 
     def signed(
-        self, message_id: int, payload: bytes, sequence: int, source: Address, now: float,
+        self, message_id: int, payload: bytes, sequence: int, source: mav.Address, now: float,
     ) -> bytes:
         """Return a signed frame, whose signature and time stamp may be wrong."""
         frame = raw_v2(message_id, payload, incompat=1, sequence=sequence, source=source)
@@ -159,7 +149,7 @@ class Attacker:
         frame += bytes((self._draw.randrange(256),)) + stamp.to_bytes(6, 'little')
         return frame + (signature(self._key, frame) if genuine else self._draw.randbytes(6))
 
-    def _message(self, cls: type[Message]) -> Message:
+    def _message(self, cls: type[mav.Message]) -> mav.Message:
         target = self._draw.choice([(0, 0), *self._sources, self._any_source()])
         telling = {**TELLING, 'target_system': target[:1], 'target_component': target[1:]}
         return cls(*(

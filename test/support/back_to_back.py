@@ -24,17 +24,9 @@ from illuminator_ros.illuminator.events import AnyLightEvent, LightFound, LightS
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder, encode_frame
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandInt,
-    CommandLong,
-    decode_payload,
-    encode_payload,
-    LAYOUTS,
-    MavCmd,
-)
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
@@ -43,7 +35,7 @@ from support.faulty_wire import Faults, FaultyWire
 from support.records import Answer, Recorder
 from support.simulated_lights import simulated_lights
 
-BRIDGE = Address(1, 194)
+BRIDGE = mav.Address(1, 194)
 ONE_LIGHT = (IlluminatorProperties(),)
 # s on the clock of a pair at its beginning: not 0, so that 0 as a time is found out.
 START = 1000.0
@@ -60,8 +52,8 @@ class _End:
         self.decoder = Decoder()
         self.classes = {cls.id: cls for cls in endpoint.messages}
         self.sent: list[tuple[float, Any]] = []
-        self.received: list[tuple[float, Address, Any]] = []
-        self._sequences: dict[Address, int] = {}
+        self.received: list[tuple[float, mav.Address, Any]] = []
+        self._sequences: dict[mav.Address, int] = {}
         self._traffic = Traffic()
 
     def flush(self, now: float) -> None:
@@ -73,8 +65,8 @@ class _End:
             sequence = self._sequences.get(source, 0)
             self._sequences[source] = (sequence + 1) & 0xFF
             self.wire.send(encode_frame(
-                message.id, encode_payload(message), sequence=sequence, source=source,
-                crc_extra=LAYOUTS[message.id].crc_extra), now)
+                message.id, mav.encode_payload(message), sequence=sequence, source=source,
+                crc_extra=mav.LAYOUTS[message.id].crc_extra), now)
 
     def take(self, data: bytes, now: float) -> None:
         for frame in self.decoder.feed(data):
@@ -82,7 +74,7 @@ class _End:
             if cls is not None:
                 sender = self._traffic.count(frame.source, bytes((frame.sequence,)), hash(
                     (frame.message_id, frame.payload)))
-                message = decode_payload(cls, frame.payload, sender)
+                message = mav.decode_payload(cls, frame.payload, sender)
                 self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)
@@ -108,7 +100,7 @@ class Pair:
         on_light: Callable[[Light], None] = lambda light: None,
     ) -> None:
         self.now = START
-        self.recorders: dict[Address, Recorder] = {}
+        self.recorders: dict[mav.Address, Recorder] = {}
         self._on_light = on_light
         self.controller = Client(
             BRIDGE, settings or Settings(), command_timeout=command_timeout,
@@ -275,12 +267,12 @@ class Pair:
 
     # Sent messages
 
-    def commands(self, *kinds: MavCmd, since: float = 0.0) -> list[Any]:
+    def commands(self, *kinds: mav.MavCmd, since: float = 0.0) -> list[Any]:
         """Return the commands that the controller has sent, tries included, all or some kinds."""
         return [message for at, message in self.commands_at(*kinds) if at >= since]
 
-    def commands_at(self, *kinds: MavCmd) -> Iterator[tuple[float, Any]]:
+    def commands_at(self, *kinds: mav.MavCmd) -> Iterator[tuple[float, Any]]:
         """Return the same with the times of sending."""
         return ((at, message) for at, message in self.near.sent
-                if isinstance(message, CommandLong | CommandInt)
+                if isinstance(message, mav.CommandLong | mav.CommandInt)
                 and (not kinds or message.command in kinds))

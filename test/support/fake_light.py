@@ -21,21 +21,11 @@ import math
 from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    ComponentInformationBasic,
-    INFORMATION_ID,
-    MavCmd,
-    MavResult,
-    MavType,
-)
 from illuminator_ros.payload.identity import Identity
 
-LIGHT = Address(1, 243)
+LIGHT = mav.Address(1, 243)
 DEFAULT_STATUS = {
     'enable': 0, 'mode_bitmask': 3, 'error_status': 0, 'mode': 1, 'brightness': 100.0,
     'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'temp_c': 25.0, 'min_strobe_period': 0.05,
@@ -64,10 +54,10 @@ class FakeLight(Endpoint):
     :ivar fields: what it reports.
     """
 
-    messages = (CommandLong, CommandInt)
+    messages = (mav.CommandLong, mav.CommandInt)
 
     def __init__(
-        self, source: Address = LIGHT, *, heartbeat_type: int | None = MavType.ILLUMINATOR,
+        self, source: mav.Address = LIGHT, *, heartbeat_type: int | None = mav.MavType.ILLUMINATOR,
         stream: float = 1.0, results: Mapping[int, Any] | None = None, **fields: Any,
     ) -> None:
         super().__init__()
@@ -78,7 +68,7 @@ class FakeLight(Endpoint):
         self.applies = True
         self.apply_after = 0.0
         self.stream = stream
-        self.answers = {STATUS_ID, INFORMATION_ID}
+        self.answers = {STATUS_ID, mav.INFORMATION_ID}
         self.pushes = False
         self.targeted = True
         self.boot: float | None = 0.0
@@ -103,8 +93,8 @@ class FakeLight(Endpoint):
         """Have the statuses of the stream come later."""
         self._status_due += seconds
 
-    def receive(self, source: Address, message: Any, now: float) -> None:
-        if self.silent or not isinstance(message, CommandLong | CommandInt):
+    def receive(self, source: mav.Address, message: Any, now: float) -> None:
+        if self.silent or not isinstance(message, mav.CommandLong | mav.CommandInt):
             return
         if (message.target_system, message.target_component) != self.source:
             return
@@ -112,21 +102,21 @@ class FakeLight(Endpoint):
         if result is None:
             return
         target = source if self.targeted else (0, 0)
-        self.send(CommandAck(message.command, result, 0, 0, *target))
-        if result == MavResult.ACCEPTED:
+        self.send(mav.CommandAck(message.command, result, 0, 0, *target))
+        if result == mav.MavResult.ACCEPTED:
             self.carried_out.append(message)
             self._carry_out(message, now)
 
     def _result(self, command: int) -> int | None:
-        result = self.results.get(command, MavResult.ACCEPTED)
+        result = self.results.get(command, mav.MavResult.ACCEPTED)
         if isinstance(result, list):
             result = result.pop(0) if len(result) > 1 else result[0]
         return None if result is None else int(result)
 
     def _carry_out(self, message: Any, now: float) -> None:
-        if message.command == MavCmd.REQUEST_MESSAGE and message.param1 in self.answers:
+        if message.command == mav.MavCmd.REQUEST_MESSAGE and message.param1 in self.answers:
             self.send(self.status(now) if message.param1 == STATUS_ID else self.information())
-        elif message.command == MavCmd.SET_MESSAGE_INTERVAL:
+        elif message.command == mav.MavCmd.SET_MESSAGE_INTERVAL:
             self.stream = message.param2 / 1e6
             self._status_due = now + self.stream
         elif self.applies and self.apply_after:
@@ -135,9 +125,9 @@ class FakeLight(Endpoint):
             self._apply(message, now)
 
     def _apply(self, message: Any, now: float) -> None:
-        if message.command == MavCmd.ILLUMINATOR_ON_OFF:
+        if message.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
             self.fields['enable'] = int(message.param1)
-        elif message.command == MavCmd.DO_ILLUMINATOR_CONFIGURE:
+        elif message.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
             self.fields |= {
                 'mode': int(message.param1), 'brightness': message.param2,
                 'strobe_period': message.param3, 'strobe_duty_cycle': message.param4}
@@ -155,7 +145,7 @@ class FakeLight(Endpoint):
     def information(self) -> Any:
         """Return its COMPONENT_INFORMATION_BASIC."""
         one = self.identity
-        return ComponentInformationBasic(
+        return mav.ComponentInformationBasic(
             0, 0, 0, one.vendor.encode(), one.model.encode(), one.software_version.encode(),
             one.hardware_version.encode(), one.serial_number.encode())
 

@@ -19,36 +19,29 @@ from __future__ import annotations
 from collections import Counter
 
 from fastcrc.crc16 import mcrf4xx
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame import Decoder, encode_frame, Frame
-from illuminator_ros.mavlink.messages import (
-    Address,
-    encode_payload,
-    heartbeat,
-    LAYOUTS,
-    MavType,
-    Message,
-)
 from illuminator_ros.mavlink.signing import Signing
 from support.messages import decode_payload, HANDLED, STATUS
 
-LIGHT = Address(1, 243)
+LIGHT = mav.Address(1, 243)
 # Never the beginning of a frame, and long enough to end the wait for the rest of any.
 FILLER = bytes(300)
 
 
-def frame_of(message: Message = STATUS, sequence: int = 0, source: Address = LIGHT, *,
+def frame_of(message: mav.Message = STATUS, sequence: int = 0, source: mav.Address = LIGHT, *,
              signed: bool = False, version: int = 2) -> bytes:
     """Return a frame of ours, without the signature that a signed one still needs."""
-    payload = encode_payload(message)
+    payload = mav.encode_payload(message)
     return encode_frame(
         message.id, payload if version == 2 else payload[:message.base_size], sequence=sequence,
         source=source, crc_extra=message.crc_extra, signed=signed, version=version)
 
 
-def heartbeat_frame(source: Address = LIGHT, sequence: int = 0,
-                    mav_type: int = MavType.ILLUMINATOR) -> bytes:
+def heartbeat_frame(source: mav.Address = LIGHT, sequence: int = 0,
+                    mav_type: int = mav.MavType.ILLUMINATOR) -> bytes:
     """Return the heartbeat of a light, or of another component."""
-    return frame_of(heartbeat(mav_type), sequence, source)
+    return frame_of(mav.heartbeat(mav_type), sequence, source)
 
 
 class Codec:
@@ -63,37 +56,37 @@ class Codec:
         self.decoder = Decoder()
         self._version = version
         self._signing = signing or Signing()
-        self._sent: Counter[Address] = Counter()
+        self._sent: Counter[mav.Address] = Counter()
 
-    def frame(self, source: Address, message: Message, now: float = 0.0) -> bytes:
+    def frame(self, source: mav.Address, message: mav.Message, now: float = 0.0) -> bytes:
         """Return a message as a frame with the next sequence number of its sender."""
         data = frame_of(message, self._sent[source] & 0xFF, source, signed=self._signing.signs,
                         version=self._version)
         self._sent[source] += 1
         return self._signing.sign(data, 1.7e9 + now) if self._signing.signs else data
 
-    def messages(self, data: bytes) -> list[tuple[Address, Message]]:
+    def messages(self, data: bytes) -> list[tuple[mav.Address, mav.Message]]:
         """Return the messages in a stream, with their senders."""
         return [(frame.source, decode_payload(frame.message_id, frame.payload))
                 for frame in self.decoder.feed(data) if frame.message_id in HANDLED]
 
 
 def raw_v2(message_id: int, payload: bytes, *, crc_extra: int | None = None, incompat: int = 0,
-           compat: int = 0, sequence: int = 0, source: Address = LIGHT) -> bytes:
+           compat: int = 0, sequence: int = 0, source: mav.Address = LIGHT) -> bytes:
     """Return a MAVLink 2 frame as it is not written by us: any flags, any length, any seed."""
     header = bytes((len(payload), incompat, compat, sequence, *source))
     return _raw(0xFD, message_id, header + message_id.to_bytes(3, 'little') + payload, crc_extra)
 
 
 def raw_v1(message_id: int, payload: bytes, *, crc_extra: int | None = None, sequence: int = 0,
-           source: Address = LIGHT) -> bytes:
+           source: mav.Address = LIGHT) -> bytes:
     """Return a MAVLink 1 frame of any length."""
     return _raw(0xFE, message_id,
                 bytes((len(payload), sequence, *source, message_id)) + payload, crc_extra)
 
 
 def _raw(stx: int, message_id: int, body: bytes, crc_extra: int | None) -> bytes:
-    seed = LAYOUTS[message_id].crc_extra if crc_extra is None else crc_extra
+    seed = mav.LAYOUTS[message_id].crc_extra if crc_extra is None else crc_extra
     return bytes((stx,)) + body + mcrf4xx(body + bytes((seed,))).to_bytes(2, 'little')
 
 

@@ -32,19 +32,9 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetPitchyaw,
     MAV_TYPE_GIMBAL,
 )
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    heartbeat,
-    MavCmd,
-    MavResult,
-    MavType,
-    Message,
-)
 from illuminator_ros.payload.messages import (
     Attitude,
     GimbalDeviceAttitudeStatus,
@@ -53,8 +43,8 @@ from illuminator_ros.payload.messages import (
 from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.rotation import Quaternion
 
-OURS, DEVICE, AUTOPILOT = Address(1, 194), Address(1, 154), Address(1, 1)
-PILOT, GUEST, OWNER = Address(255, 190), Address(255, 191), Address(1, 191)
+OURS, DEVICE, AUTOPILOT = mav.Address(1, 194), mav.Address(1, 154), mav.Address(1, 1)
+PILOT, GUEST, OWNER = mav.Address(255, 190), mav.Address(255, 191), mav.Address(1, 191)
 NAN = float('nan')
 FULL = (Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL | Capabilities.HAS_ROLL_AXIS
         | Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK
@@ -90,7 +80,7 @@ class ManagerRig:
 
     def __init__(
         self, control: ControlSettings | None = None, *, device_id: int = 0,
-        device: GimbalDeviceInformation | None = None, address: Address = OURS,
+        device: GimbalDeviceInformation | None = None, address: mav.Address = OURS,
         active: bool = True, draws: Sequence[float] = (0.25,), **settings: Any,
     ) -> None:
         self.now = 1000.0
@@ -124,7 +114,7 @@ class ManagerRig:
             if self.now >= self._device_due:
                 self._device_due = self.now + 0.5
                 if self.device_is_there:
-                    self.component.receive(DEVICE, heartbeat(MAV_TYPE_GIMBAL), self.now)
+                    self.component.receive(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), self.now)
                     self.report()
                 each()
             self.component.poll(self.now)
@@ -139,7 +129,7 @@ class ManagerRig:
         self.component.receive(
             DEVICE, attitude_status(q, flags=flags, heading=self.heading), self.now)
 
-    def give(self, source: Address, *messages: Message) -> list[Any]:
+    def give(self, source: mav.Address, *messages: mav.Message) -> list[Any]:
         """Return what the manager sends when it receives messages."""
         before = len(self.sent)
         for message in messages:
@@ -154,33 +144,35 @@ class ManagerRig:
             source, message = outgoing.popleft()
             assert source == self.component.address
             self.sent.append((self.now, message))
-            if (isinstance(message, CommandLong) and self.device_is_there
+            if (isinstance(message, mav.CommandLong) and self.device_is_there
                     and (message.target_system, message.target_component) == DEVICE):
                 self.component.receive(
-                    DEVICE, CommandAck(message.command, 0, 0, 0, *source), self.now)
+                    DEVICE, mav.CommandAck(message.command, 0, 0, 0, *source), self.now)
                 self.component.receive(DEVICE, self.device_information, self.now)
 
     # Players
 
-    def heartbeats(self, *players: Address) -> Callable[[], None]:
+    def heartbeats(self, *players: mav.Address) -> Callable[[], None]:
         """Return what sends a heartbeat of each player."""
         def send() -> None:
             for player in players:
-                self.component.receive(player, heartbeat(MavType.GCS), self.now)
+                self.component.receive(player, mav.heartbeat(mav.MavType.GCS), self.now)
 
         return send
 
-    def result(self, source: Address, command: CommandLong | CommandInt) -> MavResult:
+    def result(
+        self, source: mav.Address, command: mav.CommandLong | mav.CommandInt,
+    ) -> mav.MavResult:
         """Return the result of a command."""
-        answer = of(CommandAck, self.give(source, command))
+        answer = of(mav.CommandAck, self.give(source, command))
         assert len(answer) == 1
-        return MavResult(answer[0].result)
+        return mav.MavResult(answer[0].result)
 
-    def take(self, player: Address) -> MavResult:
+    def take(self, player: mav.Address) -> mav.MavResult:
         """Return the result of taking primary control."""
         return self.result(player, configure(*player))
 
-    def points(self, player: Address, pitch: float = 0.1, yaw: float = 0.0) -> list[Any]:
+    def points(self, player: mav.Address, pitch: float = 0.1, yaw: float = 0.0) -> list[Any]:
         """Return what the device is sent when a player sets angles, rad."""
         return of(GimbalDeviceSetAttitude, self.give(player, pitch_yaw(pitch, yaw)))
 
@@ -200,22 +192,24 @@ def euler(message: GimbalDeviceSetAttitude) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def long(number: int, *params: float, to: Address = OURS, confirmation: int = 0) -> CommandLong:
+def long(
+    number: int, *params: float, to: mav.Address = OURS, confirmation: int = 0,
+) -> mav.CommandLong:
     """Return a command; params that are not given are 0."""
-    return CommandLong(*to, number, confirmation, *params, *(0.0,) * (7 - len(params)))
+    return mav.CommandLong(*to, number, confirmation, *params, *(0.0,) * (7 - len(params)))
 
 
 def configure(
     system: float, component: float, system2: float = -1, component2: float = -1, *,
-    device_id: int = 0, to: Address = OURS, confirmation: int = 0,
-) -> CommandLong:
+    device_id: int = 0, to: mav.Address = OURS, confirmation: int = 0,
+) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE."""
     return long(GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, system, component, system2, component2,
                 0, 0, device_id, to=to, confirmation=confirmation)
 
 
 def pitch_yaw_command(pitch: float, yaw: float, pitch_rate: float = NAN, yaw_rate: float = NAN,
-                      flags: int = 0, device_id: int = 0) -> CommandLong:
+                      flags: int = 0, device_id: int = 0) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, deg and deg/s."""
     return long(GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, pitch, yaw, pitch_rate, yaw_rate, flags,
                 0, device_id)
@@ -223,21 +217,22 @@ def pitch_yaw_command(pitch: float, yaw: float, pitch_rate: float = NAN, yaw_rat
 
 def pitch_yaw(pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN,
               yaw_rate: float = NAN, flags: int = 0, device_id: int = 0,
-              to: Address = OURS) -> GimbalManagerSetPitchyaw:
+              to: mav.Address = OURS) -> GimbalManagerSetPitchyaw:
     """Return GIMBAL_MANAGER_SET_PITCHYAW, rad and rad/s."""
     return GimbalManagerSetPitchyaw(*to, flags, device_id, pitch, yaw, pitch_rate, yaw_rate)
 
 
-def request(message: type[Message], to: Address = OURS) -> CommandLong:
+def request(message: type[mav.Message], to: mav.Address = OURS) -> mav.CommandLong:
     """Return a request for a message."""
-    return long(MavCmd.REQUEST_MESSAGE, message.id, to=to)
+    return long(mav.MavCmd.REQUEST_MESSAGE, message.id, to=to)
 
 
 def region(latitude: float, longitude: float, altitude: float, *, frame: int = 0,
-           device_id: int = 0) -> CommandInt:
+           device_id: int = 0) -> mav.CommandInt:
     """Return MAV_CMD_DO_SET_ROI_LOCATION, deg and m."""
-    return CommandInt(*OURS, frame, GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, device_id, 0.0, 0.0,
-                      0.0, round(latitude * 1e7), round(longitude * 1e7), altitude)
+    return mav.CommandInt(
+        *OURS, frame, GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, device_id, 0.0, 0.0, 0.0,
+        round(latitude * 1e7), round(longitude * 1e7), altitude)
 
 
 def position(latitude: float, longitude: float, altitude: float, *,

@@ -26,33 +26,22 @@ from illuminator_ros.gimbal import messages as gm
 from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.events import GimbalEvent, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    heartbeat,
-    MAV_AUTOPILOT_ARDUPILOTMEGA,
-    MavCmd,
-    MavResult,
-    Message,
-)
 from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.request import Result
 
-OURS, AUTOPILOT, DEVICE, OTHER = Address(1, 194), Address(1, 1), Address(1, 154), Address(1, 195)
+OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (194, 1, 154, 195))
 NAN = math.nan
 ALL = gm.Capabilities(sum(gm.Capabilities))
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 E = TypeVar('E', bound=GimbalEvent)
-M = TypeVar('M', bound=Message)
+M = TypeVar('M', bound=mav.Message)
 
 
 @dataclass
@@ -69,10 +58,10 @@ class FakeManager:
     :ivar received: the setpoints that came.
     """
 
-    address: Address = AUTOPILOT
+    address: mav.Address = AUTOPILOT
     device_id: int = 154
     capabilities: int = ALL
-    autopilot: int = MAV_AUTOPILOT_ARDUPILOTMEGA + 9
+    autopilot: int = mav.MAV_AUTOPILOT_ARDUPILOTMEGA + 9
     results: dict[int, int] = field(default_factory=dict)
     announces: bool = True
     reports: bool = True
@@ -81,8 +70,8 @@ class FakeManager:
     answers: bool = True
     alive: bool = True
     device_alive: bool = True
-    primary: Address = Address(0, 0)
-    secondary: Address = Address(0, 0)
+    primary: mav.Address = mav.Address(0, 0)
+    secondary: mav.Address = mav.Address(0, 0)
     flags: int = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK | MountFlags.YAW_IN_VEHICLE_FRAME
     q: tuple[float, float, float, float] = LEVEL
     rates: tuple[float, float, float] = (NAN, NAN, NAN)
@@ -90,12 +79,12 @@ class FakeManager:
     failure_flags: int = 0
     attitude_number: int | None = None
     received: list[gm.GimbalManagerSetAttitude] = field(default_factory=list)
-    commands: list[CommandLong | CommandInt] = field(default_factory=list)
+    commands: list[mav.CommandLong | mav.CommandInt] = field(default_factory=list)
 
     @property
-    def device(self) -> Address:
+    def device(self) -> mav.Address:
         number = self.device_id in gm.NON_MAVLINK_IDS
-        return self.address if number else Address(self.address.system, self.device_id)
+        return self.address if number else mav.Address(self.address.system, self.device_id)
 
     def information(self) -> gm.GimbalManagerInformation:
         return gm.GimbalManagerInformation(
@@ -111,29 +100,31 @@ class FakeManager:
             0, 0, 0, self.flags, self.q, *self.rates, self.failure_flags, self.delta_yaw, NAN,
             number if self.attitude_number is None else self.attitude_number)
 
-    def sent_each(self, tenth: int) -> list[tuple[Address, Message]]:
+    def sent_each(self, tenth: int) -> list[tuple[mav.Address, mav.Message]]:
         """Return what it sends in a tenth of a second: heartbeats 1 Hz, statuses 5 Hz."""
-        sent: list[tuple[Address, Message]] = []
+        sent: list[tuple[mav.Address, mav.Message]] = []
         if self.alive and tenth % 10 == 0:
-            sent.append((self.address, Heartbeat(2, self.autopilot, 0, 0, 4, 3)))
+            sent.append((self.address, mav.Heartbeat(2, self.autopilot, 0, 0, 4, 3)))
         if self.alive and self.reports and self.streams and tenth % 2 == 0:
             sent.append((self.address, self.status()))
         if self.device_alive:
             if tenth % 10 == 5 and self.device != self.address:
-                sent.append((self.device, heartbeat(gm.MAV_TYPE_GIMBAL)))
+                sent.append((self.device, mav.heartbeat(gm.MAV_TYPE_GIMBAL)))
             if tenth % 2 == 1:
                 sent.append((self.device, self.attitude()))
         return sent
 
-    def take(self, source: Address, message: Message) -> list[tuple[Address, Message]]:
+    def take(
+        self, source: mav.Address, message: mav.Message,
+    ) -> list[tuple[mav.Address, mav.Message]]:
         """Return the answers to a message."""
         if not self.alive or getattr(message, 'target_system', None) is None:
             return []
-        target = Address(message.target_system, message.target_component)  # type: ignore
+        target = mav.Address(message.target_system, message.target_component)  # type: ignore
         if (isinstance(message, gm.GimbalManagerSetAttitude) and target == self.address
                 and message.gimbal_device_id == self.device_id):
             self.received.append(message)
-        if not isinstance(message, CommandLong | CommandInt) or (
+        if not isinstance(message, mav.CommandLong | mav.CommandInt) or (
                 target not in (self.address, self.device)):
             return []
         device_id = message.param1 if message.command in (195, 197) else getattr(
@@ -143,20 +134,20 @@ class FakeManager:
         self.commands.append(message)
         if not self.answers:
             return []
-        result = self.results.get(message.command, MavResult.ACCEPTED)
-        sent: list[tuple[Address, Message]] = [
-            (target, CommandAck(message.command, result, 0, 0, *source))]
-        if result == MavResult.ACCEPTED:
+        result = self.results.get(message.command, mav.MavResult.ACCEPTED)
+        sent: list[tuple[mav.Address, mav.Message]] = [
+            (target, mav.CommandAck(message.command, result, 0, 0, *source))]
+        if result == mav.MavResult.ACCEPTED:
             sent += self._execute(message, target)
         return sent
 
     def _execute(
-        self, message: CommandLong | CommandInt, target: Address,
-    ) -> list[tuple[Address, Message]]:
+        self, message: mav.CommandLong | mav.CommandInt, target: mav.Address,
+    ) -> list[tuple[mav.Address, mav.Message]]:
         command, p1, p2, p3, p4 = (message.command, message.param1, message.param2,
                                    message.param3, message.param4)
-        if command == MavCmd.REQUEST_MESSAGE:
-            made: dict[tuple[int, Address], Message | None] = {
+        if command == mav.MavCmd.REQUEST_MESSAGE:
+            made: dict[tuple[int, mav.Address], mav.Message | None] = {
                 (280, self.address): self.information() if self.announces else None,
                 (281, self.address): self.status() if self.reports else None,
                 (283, self.device): device_information()}
@@ -166,9 +157,9 @@ class FakeManager:
             old = (*self.primary, *self.secondary)
             new = [was if value == -1 else 0 if value == -3 else int(value)
                    for was, value in zip(old, (p1, p2, p3, p4), strict=True)]
-            self.primary, self.secondary = Address(*new[:2]), Address(*new[2:])
+            self.primary, self.secondary = mav.Address(*new[:2]), mav.Address(*new[2:])
         if self.applies and command == gm.GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
-            assert isinstance(message, CommandLong)
+            assert isinstance(message, mav.CommandLong)
             self.flags = int(message.param5)
         return []
 
@@ -197,7 +188,7 @@ class Rig:
         self.component = Component(self.commands, [self.client])
         self.events: list[GimbalEvent] = []
         self.results: list[Result] = []
-        self.sent: list[tuple[float, Message]] = []
+        self.sent: list[tuple[float, mav.Message]] = []
         self.now = 100.0
         self._tenth = 0
         self.client.events.subscribe(self.events.append)
@@ -220,7 +211,7 @@ class Rig:
         """Return the messages of a kind that the client has sent."""
         return [message for _, message in self.sent if isinstance(message, kind)]
 
-    def receive(self, source: Address, message: Message) -> None:
+    def receive(self, source: mav.Address, message: mav.Message) -> None:
         self.component.receive(source, message, self.now)
 
     def run(self, seconds: float) -> Rig:
@@ -249,7 +240,7 @@ class Rig:
 class GimbalEndpoint(Endpoint):
     """Fake managers as the endpoint of a link."""
 
-    messages = (CommandLong, CommandInt, gm.GimbalManagerSetAttitude)
+    messages = (mav.CommandLong, mav.CommandInt, gm.GimbalManagerSetAttitude)
     sends = (gm.GimbalManagerStatus,)
 
     def __init__(self, managers: Sequence[FakeManager]) -> None:
@@ -260,7 +251,7 @@ class GimbalEndpoint(Endpoint):
     def link_opened(self, now: float) -> None:
         self._due = now
 
-    def receive(self, source: Address, message: Message, now: float) -> None:
+    def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         for manager in self.managers:
             self.outgoing += manager.take(source, message)
 

@@ -21,18 +21,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.events import (
-    AnyLightEvent,
-    Cause,
-    ConfigurationChanged,
-    ConfigurationRestored,
-    LightConnected,
-    LightIdentified,
-    LightLost,
-    LightRestarted,
-    SetpointFailed,
-    StatusReceived,
-)
+from illuminator_ros.illuminator import events as light_events
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.request import Result
@@ -50,32 +39,32 @@ class Recorder:
     events: list[str] = field(default_factory=list)
     statuses: list[Status] = field(default_factory=list)
     identities: list[Identity] = field(default_factory=list)
-    changes: list[tuple[Cause, dict[str, Any]]] = field(default_factory=list)
+    changes: list[tuple[light_events.Cause, dict[str, Any]]] = field(default_factory=list)
     restorations: list[tuple[bool, str]] = field(default_factory=list)
     changed_at: list[float] = field(default_factory=list)
     failed_setpoints: list[str] = field(default_factory=list)
     failed_at: list[float] = field(default_factory=list)
-    others: list[AnyLightEvent] = field(default_factory=list)
+    others: list[light_events.AnyLightEvent] = field(default_factory=list)
 
-    def __call__(self, event: AnyLightEvent) -> None:
+    def __call__(self, event: light_events.AnyLightEvent) -> None:
         match event:
-            case LightConnected():
+            case light_events.LightConnected():
                 self.events.append('connected')
-            case LightLost():
+            case light_events.LightLost():
                 self.events.append(f'lost: {event.reason}')
-            case LightRestarted():
+            case light_events.LightRestarted():
                 self.events.append('restarted')
-            case LightIdentified():
+            case light_events.LightIdentified():
                 self.identities.append(event.identity)
-            case StatusReceived():
+            case light_events.StatusReceived():
                 self.statuses.append(event.status)
-            case ConfigurationChanged():
+            case light_events.ConfigurationChanged():
                 self.changed_at.append(self.clock())
                 self.changes.append((event.cause, {
                     name: getattr(event.configuration, name) for name in event.names}))
-            case ConfigurationRestored():
+            case light_events.ConfigurationRestored():
                 self.restorations.append((event.success, event.message))
-            case SetpointFailed():
+            case light_events.SetpointFailed():
                 self.failed_at.append(self.clock())
                 self.failed_setpoints.append(event.message)
             case _:

@@ -22,15 +22,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from rcl_interfaces import srv
 from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    GetParameterTypes,
-    ListParameters,
-    SetParameters,
-    SetParametersAtomically,
-)
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
@@ -111,10 +104,10 @@ class Ros(SpunNode):
         Discovery on our side does not prove that. Our entities are announced in order, so a node
         that answers a client knows every entity created before it.
         """
-        client = self.node.create_client(GetParameters, f'{node}/get_parameters')
+        client = self.node.create_client(srv.GetParameters, f'{node}/get_parameters')
         eventually(client.service_is_ready)
         # The first questions may get lost: they may come before it is known where from.
-        while not Call(client.call_async(GetParameters.Request())).answers_within(0.5):
+        while not Call(client.call_async(srv.GetParameters.Request())).answers_within(0.5):
             pass
         self.node.destroy_client(client)
 
@@ -200,22 +193,22 @@ class Parameters:
 
     def get(self, *names: str) -> list[Any]:
         """Return values, None where not set."""
-        response = self.start(GetParameters, 'get_parameters', names=names).result()
+        response = self.start(srv.GetParameters, 'get_parameters', names=names).result()
         return [parameter_value_to_python(value) for value in response.values]
 
     def types(self, *names: str) -> list[int]:
         """Return the types that get_parameter_types tells."""
-        call = self.start(GetParameterTypes, 'get_parameter_types', names=names)
+        call = self.start(srv.GetParameterTypes, 'get_parameter_types', names=names)
         return list(call.result().types)
 
     def describe(self, *names: str) -> list[Any]:
         """Return descriptors."""
-        call = self.start(DescribeParameters, 'describe_parameters', names=names)
+        call = self.start(srv.DescribeParameters, 'describe_parameters', names=names)
         return list(call.result().descriptors)
 
     def names(self) -> list[str]:
         """Return the names of all parameters."""
-        return list(self.start(ListParameters, 'list_parameters').result().result.names)
+        return list(self.start(srv.ListParameters, 'list_parameters').result().result.names)
 
     def set(self, **values: Any) -> list[Any]:  # noqa: A003
         """Set parameters with one call of set_parameters; return the results."""
@@ -223,8 +216,8 @@ class Parameters:
 
     def start_set(self, *, atomically: bool = False, **values: Any) -> Call:
         """Begin to set parameters."""
-        type_, service = ((SetParametersAtomically, 'set_parameters_atomically')
-                          if atomically else (SetParameters, 'set_parameters'))
+        type_, service = ((srv.SetParametersAtomically, 'set_parameters_atomically')
+                          if atomically else (srv.SetParameters, 'set_parameters'))
         return self.start(type_, service, parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()])
 

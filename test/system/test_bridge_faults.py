@@ -24,28 +24,21 @@ from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetParameters, SetLoggerLevels
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool, Trigger
+from support import ros
 from support.light import Address, eventually, ServedLight
 from support.processes import ended, Program, python
 from support.recording import Call
-from support.ros import (
-    bridge_arguments,
-    Parameters,
-    Ros,
-    running_bridge,
-    start_bridge,
-    STREAM,
-)
 from support.slow import CLOCK, pass_time_until
 
 BRIDGE = 'illuminator_ros.bridge'
 
 
 def test_shutdown_covers_lights_that_have_no_node_yet_and_names_each(
-    own_ros: Ros, port: int,
+    own_ros: ros.Ros, port: int,
 ) -> None:
     count = 30
     lights = [text for number in range(1, count + 1) for text in ('--light', f'1/{number}')]
-    with (ended(start_bridge(own_ros.domain, port, off_on_shutdown=True)) as bridge,
+    with (ended(ros.start_bridge(own_ros.domain, port, off_on_shutdown=True)) as bridge,
           ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}', *lights))):
         bridge.wait_for('light 1/1 connected')
         eventually(lambda: f'{count} of {count} on' in own_ros.call(
@@ -57,24 +50,24 @@ def test_shutdown_covers_lights_that_have_no_node_yet_and_names_each(
 
 
 @pytest.fixture
-def served(own_ros: Ros, port: int) -> Iterator[tuple[Program, ServedLight]]:
+def served(own_ros: ros.Ros, port: int) -> Iterator[tuple[Program, ServedLight]]:
     """Run a bridge with a light."""
-    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
-        Parameters(own_ros).wait(brightness=100.0)
+    with ros.running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        ros.Parameters(own_ros).wait(brightness=100.0)
         yield bridge, light
 
 
 @pytest.fixture
-def in_real_time(own_ros: Ros, port: int) -> Iterator[Program]:
+def in_real_time(own_ros: ros.Ros, port: int) -> Iterator[Program]:
     """Run a bridge with a simulated light, both by the clock of the machine."""
-    with (ended(start_bridge(own_ros.domain, port)) as bridge,
+    with (ended(ros.start_bridge(own_ros.domain, port)) as bridge,
           ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}'))):
         bridge.wait_for('light 1/243 connected')
         yield bridge
 
 
 def test_refreshes_beyond_the_limit_are_refused_at_once(
-    own_ros: Ros, in_real_time: Program,
+    own_ros: ros.Ros, in_real_time: Program,
 ) -> None:
     client = own_ros.node.create_client(
         Trigger, '/illuminator/refresh', qos_profile=QoSProfile(depth=500))
@@ -92,7 +85,7 @@ def test_refreshes_beyond_the_limit_are_refused_at_once(
         levels=[LoggerLevel(name=f'n{number}', level=10) for number in range(50_000)])),
 ])
 def test_long_list_of_names_gets_an_empty_answer(
-    own_ros: Ros, served: tuple[Program, ServedLight], type_: type, service: str,
+    own_ros: ros.Ros, served: tuple[Program, ServedLight], type_: type, service: str,
     request_: object,
 ) -> None:
     answer = own_ros.call(type_, f'/illuminator/{service}', request_)
@@ -102,15 +95,15 @@ def test_long_list_of_names_gets_an_empty_answer(
 
 
 def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it_goes(
-    own_ros: Ros, port: int,
+    own_ros: ros.Ros, port: int,
 ) -> None:
     came, went = (f'{text} /illuminator' for text in (
         'another node is called', 'no other node is called'))
-    with running_bridge(own_ros.domain, port) as bridge:
-        with ended(start_bridge(own_ros.domain, port + 1)):
+    with ros.running_bridge(own_ros.domain, port) as bridge:
+        with ended(ros.start_bridge(own_ros.domain, port + 1)):
             pass_time_until(lambda: bridge.count(came), step=5.0)
             for _ in range(3):
-                diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+                diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', ros.STREAM)
                 CLOCK.forward(5.0)
                 # The names are checked in the same turn.
                 diagnostics.wait(lambda array: str(port) in array.status[0].hardware_id)
@@ -168,8 +161,8 @@ sys.exit(main())
 """
 
 
-def test_thread_that_cannot_be_started_is_tried_again(own_ros: Ros, port: int) -> None:
-    program = Program(sys.executable, '-c', NO_THREADS, *bridge_arguments(port), env={
+def test_thread_that_cannot_be_started_is_tried_again(own_ros: ros.Ros, port: int) -> None:
+    program = Program(sys.executable, '-c', NO_THREADS, *ros.bridge_arguments(port), env={
         'ROS_DOMAIN_ID': str(own_ros.domain)})
     with ended(program), ended(python(
             'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')):
@@ -178,8 +171,8 @@ def test_thread_that_cannot_be_started_is_tried_again(own_ros: Ros, port: int) -
         assert own_ros.enable().success
 
 
-def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: Ros, port: int) -> None:
-    with (running_bridge(own_ros.domain, port, target_component=243) as bridge,
+def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: ros.Ros, port: int) -> None:
+    with (ros.running_bridge(own_ros.domain, port, target_component=243) as bridge,
           ServedLight(port), ServedLight(port, source=Address(1, 244)) as further):
         bridge.wait_for('light 1/244 is served by /illuminator_1_244')
         eventually(lambda: 'illuminator_1_244' in own_ros.node.get_node_names())

@@ -28,16 +28,8 @@ from illuminator_ros.mavlink.connector import FIRST_PAUSE
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
 from illuminator_ros.payload import request
 import pytest
+from support import live_link
 from support.frames import heartbeat_frame
-from support.live_link import (
-    Bridge,
-    Jump,
-    Lights,
-    LiveLink,
-    resources,
-    Run,
-    wait_for_resources,
-)
 from support.open_channel import bound_socket, listening_socket
 from support.ports import free_port
 from support.ptys import PtyDevice
@@ -112,10 +104,10 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
 
 
 def test_openings_and_losses_are_reported_once_each_with_reason_and_time(
-        run: Run, server: Server, pauses: Log[float]) -> None:
-    clock = Jump()
+        run: live_link.Run, server: Server, pauses: Log[float]) -> None:
+    clock = live_link.Jump()
     times = [clock()]
-    link = run(LiveLink(server.url, clock=clock))
+    link = run(live_link.LiveLink(server.url, clock=clock))
     # Further tries are not reported, before the first opening and after a loss.
     pauses.wait_for(lambda one: True, count=4)
     for change, wait, count in ((server.come, link.wait_open, 1), (server.go, link.wait_lost, 2),
@@ -136,9 +128,9 @@ def test_openings_and_losses_are_reported_once_each_with_reason_and_time(
 
 
 def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sends(
-        run: Run, server: Server, pauses: Log[float], _endless_probation: None) -> None:
+        run: live_link.Run, server: Server, pauses: Log[float], _endless_probation: None) -> None:
     server.listen()
-    link = run(LiveLink(server.url))
+    link = run(live_link.LiveLink(server.url))
     for _ in range(5):
         server.come(b'')
         server.drop()
@@ -151,11 +143,11 @@ def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sen
 
 @pytest.mark.parametrize(('probation', 'pause'), [(0.0, 0.0), (3600.0, FIRST_PAUSE)])
 def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_after_a_pause(
-        run: Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch,
+        run: live_link.Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch,
         probation: float, pause: float) -> None:
     monkeypatch.setattr(link_module, 'PROBATION', probation)
     server.listen()
-    link = run(LiveLink(server.url))
+    link = run(live_link.LiveLink(server.url))
     for count in (1, 2, 3):
         server.come()
         link.endpoint.wait_heard(count)
@@ -165,11 +157,11 @@ def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_aft
     assert [pauses[i] for i in range(3)] == [0.0, pause, pause]
 
 
-def test_port_in_use_is_opened_once_it_is_free(run: Run) -> None:
+def test_port_in_use_is_opened_once_it_is_free(run: live_link.Run) -> None:
     with contextlib.ExitStack() as stack:
         taken = stack.enter_context(bound_socket())
         port = taken.getsockname()[1]
-        link = run(LiveLink(f'udpin://127.0.0.1:{port}'))
+        link = run(live_link.LiveLink(f'udpin://127.0.0.1:{port}'))
         link.wait_lost()
         assert (link.state().is_open, link.state().reason, link.state().openings) == (
             False, f'cannot listen on 127.0.0.1:{port}: Address already in use', 0)
@@ -180,18 +172,18 @@ def test_port_in_use_is_opened_once_it_is_free(run: Run) -> None:
 
 # Leaks
 
-def cycle(link: LiveLink, come: Callable[[], None], go: Callable[[], None]) -> None:
+def cycle(link: live_link.LiveLink, come: Callable[[], None], go: Callable[[], None]) -> None:
     """Let the other side come and go, and check that no thread or descriptor is left of it."""
     come()
     link.endpoint.wait_heard()
-    before = resources()
+    before = live_link.resources()
     for count in range(1, CYCLES + 1):
         go()
         link.wait_lost(count)
         come()
         link.endpoint.wait_heard(count + 1)
     link.wait_open(CYCLES + 1)
-    wait_for_resources(*before)
+    live_link.wait_for_resources(*before)
     assert link.history() == [True] + CYCLES * [False, True]
 
 
@@ -202,18 +194,18 @@ def _many_events(monkeypatch: pytest.MonkeyPatch, pauses: Log[float]) -> None:
 
 
 def test_200_restarts_of_a_tcp_server_leak_nothing(
-        run: Run, server: Server, _many_events: None) -> None:
+        run: live_link.Run, server: Server, _many_events: None) -> None:
     server.listen()
-    cycle(run(LiveLink(server.url)), server.come, server.go)
+    cycle(run(live_link.LiveLink(server.url)), server.come, server.go)
 
 
-def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: Run) -> None:
-    port, clock = free_port(socket.SOCK_STREAM), Jump()
-    udp, tcp = (run(LiveLink(f'{scheme}://127.0.0.1:{port}', clock=clock))
+def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: live_link.Run) -> None:
+    port, clock = free_port(socket.SOCK_STREAM), live_link.Jump()
+    udp, tcp = (run(live_link.LiveLink(f'{scheme}://127.0.0.1:{port}', clock=clock))
                 for scheme in ('udpin', 'tcpin'))
     udp.wait_open()
     tcp.wait_open()
-    before = resources()
+    before = live_link.resources()
     for count in range(1, CYCLES + 1):
         with socket.create_connection(('127.0.0.1', port)) as client, bound_socket() as light:
             client.sendall(heartbeat_frame())
@@ -223,7 +215,7 @@ def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: Run) -> Non
             # It is greeted as a new peer, however many there were before.
             assert light.recv(300)
         clock.ahead += PEER_EXPIRY / MAX_PEERS + 0.1
-    wait_for_resources(*before)
+    live_link.wait_for_resources(*before)
     clock.ahead += PEER_EXPIRY + 1
     assert [(link.history(), link.state().peers) for link in (udp, tcp)] == [([True], 0)] * 2
 
@@ -237,13 +229,13 @@ SILENCE = 30.0
 class _Lights:
     """A light over TCP, or over UDP from another port each time."""
 
-    def __init__(self, url: str, lights_url: str, clock: Jump) -> None:
+    def __init__(self, url: str, lights_url: str, clock: live_link.Jump) -> None:
         self.url = url
         self._lights_url, self._clock = lights_url, clock
-        self._lights: Lights | None = None
+        self._lights: live_link.Lights | None = None
 
     def come(self) -> None:
-        self._lights = Lights(self._lights_url, clock=self._clock)
+        self._lights = live_link.Lights(self._lights_url, clock=self._clock)
         self._lights.wait_open()
 
     def go(self) -> None:
@@ -253,7 +245,7 @@ class _Lights:
 
 class _SerialLight:
 
-    def __init__(self, device: PtyDevice, clock: Jump) -> None:
+    def __init__(self, device: PtyDevice, clock: live_link.Jump) -> None:
         self._device, self._clock = device, clock
         device.pull_out()
         self.url = f'serial://{device.path}:57600'
@@ -271,19 +263,19 @@ class _SerialLight:
 
 @pytest.mark.parametrize('kind', ['tcp', 'udp', 'serial'])
 def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_each(
-        request_: pytest.FixtureRequest, run: Run, monkeypatch: pytest.MonkeyPatch,
+        request_: pytest.FixtureRequest, run: live_link.Run, monkeypatch: pytest.MonkeyPatch,
         kind: str) -> None:
     # No change fails because the machine stood still behind its acknowledgement.
     monkeypatch.setattr(request, 'CONFIRMATION_TIMEOUT', PATIENCE)
     monkeypatch.setattr(component, 'HEARTBEAT_INTERVAL', 0.05)
-    clock, port = Jump(), free_port(socket.SOCK_STREAM)
+    clock, port = live_link.Jump(), free_port(socket.SOCK_STREAM)
     other: _SerialLight | _Lights
     if kind == 'serial':
         other = _SerialLight(request_.getfixturevalue('device'), clock)
     else:
         ours, theirs = {'tcp': ('tcp', 'tcpin'), 'udp': ('udpin', 'udpout')}[kind]
         other = _Lights(f'{ours}://127.0.0.1:{port}', f'{theirs}://127.0.0.1:{port}', clock)
-    bridge = run(Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
+    bridge = run(live_link.Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
     for count in (1, 2, 3):
         other.come()
         light = bridge.wait_connected(count)

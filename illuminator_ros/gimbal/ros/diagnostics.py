@@ -24,19 +24,8 @@ from ..events import GimbalKey, GimbalSnapshot
 from ..messages import ErrorFlags, flag_names
 from ...mavlink.command_sender import format_seconds
 from ...payload.mount_attitude import AXES, MountFlags
+from ...ros import diagnostics
 from ...ros.command_sources import holder_values
-from ...ros.diagnostics import (
-    ERROR,
-    Finding,
-    link_findings,
-    link_report,
-    LinkSnapshot,
-    OK,
-    Report,
-    Value,
-    WARN,
-    why_nothing_is_heard,
-)
 
 # s of silence that are reported: statuses and attitudes come about five times a second.
 SILENCE = 2.0
@@ -45,7 +34,7 @@ _CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags
                | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER)
 
 
-def why_no_gimbal(link: LinkSnapshot, heard: Sequence[GimbalKey], known: str) -> str:
+def why_no_gimbal(link: diagnostics.LinkSnapshot, heard: Sequence[GimbalKey], known: str) -> str:
     """
     Return why a node has no gimbal, for people.
 
@@ -59,13 +48,13 @@ def why_no_gimbal(link: LinkSnapshot, heard: Sequence[GimbalKey], known: str) ->
     if heard:
         return f'gimbals {", ".join(map(str, heard))} are announced, none is connected or selected'
     return ('no component announces a gimbal: '
-            f'{why_nothing_is_heard(link, "a gimbal manager")}')
+            f'{diagnostics.why_nothing_is_heard(link, "a gimbal manager")}')
 
 
 def reports(
-    link: LinkSnapshot, *, gimbal: GimbalSnapshot | None, heard: Sequence[GimbalKey],
+    link: diagnostics.LinkSnapshot, *, gimbal: GimbalSnapshot | None, heard: Sequence[GimbalKey],
     known: str, limit_reached: bool, interval: float, started: float,
-) -> list[Report]:
+) -> list[diagnostics.Report]:
     """
     Return the reports of a node.
 
@@ -75,43 +64,46 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     """
     manager = gimbal.managers[0] if gimbal else None
-    findings = link_findings(
+    findings = diagnostics.link_findings(
         link, manager, what='gimbal', absence=why_no_gimbal(link, heard, known),
         started=started)
     if limit_reached:
-        findings.append((WARN, f'more than {len(heard)} gimbals, some ignored'))
-    made = [link_report(link, manager, findings, {'gimbals': len(heard)})]
+        findings.append((diagnostics.WARN, f'more than {len(heard)} gimbals, some ignored'))
+    made = [diagnostics.link_report(link, manager, findings, {'gimbals': len(heard)})]
     if gimbal is not None:
         fine = 'in control' if gimbal.in_control else 'connected'
         hardware_id = (f'{gimbal.identity.uid:x}' if gimbal.identity and gimbal.identity.uid else
                        f'mavlink:{gimbal.key.address.system}/{gimbal.key.device_id}')
-        made.append(Report(
+        made.append(diagnostics.Report(
             'device', hardware_id, device_findings(gimbal, link.taken_at, interval), fine,
             lambda: _values(gimbal, link.taken_at)))
     return made
 
 
-def device_findings(gimbal: GimbalSnapshot, now: float, interval: float) -> list[Finding]:
+def device_findings(
+    gimbal: GimbalSnapshot, now: float, interval: float,
+) -> list[diagnostics.Finding]:
     """Return the findings on a gimbal."""
     if gimbal.unreachable:
-        return [(ERROR, gimbal.unreachable)]
-    findings: list[Finding] = [
-        (WARN if flag in _CONDITIONS else ERROR, name)
+        return [(diagnostics.ERROR, gimbal.unreachable)]
+    findings: list[diagnostics.Finding] = [
+        (diagnostics.WARN if flag in _CONDITIONS else diagnostics.ERROR, name)
         for flag in _single(gimbal.errors) for name in flag_names(flag)]
     if others := gimbal.managers[1:]:
-        findings.append((WARN, f'managers {", ".join(map(str, others))} announce the gimbal too: '
-                               f'only {gimbal.managers[0]} is used'))
+        findings.append((
+            diagnostics.WARN, f'managers {", ".join(map(str, others))} announce the gimbal too: '
+            f'only {gimbal.managers[0]} is used'))
     for name, at, limit in (
             ('GIMBAL_DEVICE_ATTITUDE_STATUS', gimbal.attitude_at, max(SILENCE, 3 * interval)),
             ('GIMBAL_MANAGER_STATUS', gimbal.status_at, SILENCE)):
         if now - at > limit:
             since = f' for {format_seconds(now - at)}' if math.isfinite(at) else ''
-            findings.append((WARN, f'no {name}{since}'))
+            findings.append((diagnostics.WARN, f'no {name}{since}'))
     if gimbal.attitude_problem:
-        findings.append((WARN, f'attitude unknown: {gimbal.attitude_problem}'))
+        findings.append((diagnostics.WARN, f'attitude unknown: {gimbal.attitude_problem}'))
     if not gimbal.enforces_control:
-        findings.append((OK, 'ArduPilot records who has control and obeys others too: exclusive '
-                             'control is not guaranteed'))
+        findings.append((diagnostics.OK, 'ArduPilot records who has control and obeys others '
+                                         'too: exclusive control is not guaranteed'))
     return findings
 
 
@@ -126,8 +118,8 @@ def controller(control: Control | None) -> str:
     return 'unknown' if control is None else str(control)
 
 
-def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, Value]:
-    values: dict[str, Value] = {
+def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
+    values: dict[str, diagnostics.Value] = {
         'address': str(gimbal.key.address),
         'gimbal_device_id': gimbal.key.device_id,
         'manager': str(gimbal.managers[0]),

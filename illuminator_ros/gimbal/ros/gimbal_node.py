@@ -26,46 +26,21 @@ from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool, Trigger
 
-from .conversions import (
-    Frames,
-    quaternion_message,
-    read_place,
-    read_rates,
-    vector_message,
-)
+from . import conversions
 from .diagnostics import controller, reports, why_no_gimbal
+from .. import events
 from ..client import GimbalClient
 from ..commands import Control
-from ..events import (
-    AttitudeReceived,
-    AutomaticTakeFailed,
-    ControlChanged,
-    GimbalConnected,
-    GimbalEvent,
-    GimbalHeld,
-    GimbalKey,
-    GimbalLost,
-    ManagerChanged,
-    SecondManager,
-)
 from ..gimbal import Gimbal, GimbalSettings
 from ..messages import ErrorFlags, flag_names
 from ...payload import request
 from ...payload.command_sources import DEFAULT, describe
 from ...payload.mount_attitude import MountFlags
 from ...payload.rotation import Vector
+from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
-from ...ros.node import (
-    Answer,
-    AnyCommand,
-    CommandTopic,
-    NodeInterface,
-    Publication,
-    RequestService,
-    STREAM_QOS,
-)
 from ...ros.parameter_services import ParameterServices
 from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
@@ -73,13 +48,13 @@ from ...ros.throttled_log import NodeLog
 T = TypeVar('T')
 
 PUBLICATIONS = (
-    Publication('connected', Bool),
-    Publication('attitude', QuaternionStamped, STREAM_QOS),
-    Publication('angular_velocity', Vector3Stamped, STREAM_QOS),
-    Publication('angles', Vector3Stamped, STREAM_QOS),
-    Publication('yaw_lock', Bool),
-    Publication('in_control', Bool),
-    Publication('controller', String),
+    ros_node.Publication('connected', Bool),
+    ros_node.Publication('attitude', QuaternionStamped, ros_node.STREAM_QOS),
+    ros_node.Publication('angular_velocity', Vector3Stamped, ros_node.STREAM_QOS),
+    ros_node.Publication('angles', Vector3Stamped, ros_node.STREAM_QOS),
+    ros_node.Publication('yaw_lock', Bool),
+    ros_node.Publication('in_control', Bool),
+    ros_node.Publication('controller', String),
 )
 # Requests without an argument, by service.
 REQUESTS: dict[str, Callable[[Gimbal, float, request.Done], None]] = {
@@ -103,26 +78,26 @@ class GimbalNode:
         settings: GimbalSettings, why_none: Callable[[], str],
     ) -> None:
         self.full_name = node.get_fully_qualified_name()
-        self.key: GimbalKey | None = None
+        self.key: events.GimbalKey | None = None
         self._host = host
         self._log = log
         self._client = client
         self._settings = settings
         self._why_none = why_none
-        self._frames = Frames.of(host.values)
+        self._frames = conversions.Frames.of(host.values)
         self._clock = node.get_clock()
         self._started = host.link.clock()
         self._yaw_lock: bool | None = None
         self._errors = ErrorFlags(0)
         self._separation: float = host.values['geoid_separation']
         sources = settings.sources
-        source_topic = [Publication('source', String)] if sources else []
-        self._interface = NodeInterface(
+        source_topic = [ros_node.Publication('source', String)] if sources else []
+        self._interface = ros_node.NodeInterface(
             node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
             services=(
-                *(RequestService(name, Trigger, functools.partial(self._request, name))
+                *(ros_node.RequestService(name, Trigger, functools.partial(self._request, name))
                   for name in REQUESTS),
-                RequestService('set_yaw_lock', SetBool, self._set_yaw_lock),
+                ros_node.RequestService('set_yaw_lock', SetBool, self._set_yaw_lock),
                 *release_services(sources, self._release)),
             commands=(topic for way in prefixes(sources).items()
                       for topic in self._command_topics(*way)))
@@ -133,7 +108,7 @@ class GimbalNode:
         self._publish_control(None, False)
         self.source = DiagnosticsSource(node.get_name(), self.full_name, self._look)
 
-    def bind(self, key: GimbalKey, now: float) -> None:
+    def bind(self, key: events.GimbalKey, now: float) -> None:
         """Serve a gimbal from now on, and publish what is known of it."""
         self.key = key
         self._host.frame_log.assign(key.address, self._log)
@@ -144,7 +119,7 @@ class GimbalNode:
             if snapshot.holder is not None:
                 self._interface.publish('source', snapshot.holder)
             for other in snapshot.managers[1:]:
-                self.take(SecondManager(key, snapshot.managers[0], other))
+                self.take(events.SecondManager(key, snapshot.managers[0], other))
 
     def release(self) -> None:
         """Serve no gimbal: it was forgotten."""
@@ -163,35 +138,35 @@ class GimbalNode:
 
     # Events
 
-    def take(self, event: GimbalEvent) -> None:
+    def take(self, event: events.GimbalEvent) -> None:
         """Publish an event of the gimbal."""
-        if isinstance(event, AttitudeReceived):
+        if isinstance(event, events.AttitudeReceived):
             self._publish_attitude(event)
             return
         name = f'gimbal {event.key}'
-        if isinstance(event, GimbalConnected):
+        if isinstance(event, events.GimbalConnected):
             self._log.info(f'{name} connected, manager {event.manager}', 'connection')
             self._interface.publish('connected', True)
-        elif isinstance(event, GimbalLost):
+        elif isinstance(event, events.GimbalLost):
             self._log.warning(f'{name} lost: {event.reason}', 'connection')
             self._interface.publish('connected', False)
-        elif isinstance(event, ControlChanged):
+        elif isinstance(event, events.ControlChanged):
             self._control_changed(name, event)
-        elif isinstance(event, GimbalHeld):
+        elif isinstance(event, events.GimbalHeld):
             self._log.info(f'{name} {describe(event.change)}', 'holder')
             self._interface.publish('source', event.change.after or '')
-        elif isinstance(event, SecondManager):
+        elif isinstance(event, events.SecondManager):
             self._log.warning(
                 f'manager {event.other} announces {name} too: only {event.manager} is used, but '
                 'both may move it; disable one', 'manager')
-        elif isinstance(event, ManagerChanged):
+        elif isinstance(event, events.ManagerChanged):
             self._log.warning(f'{name} is used through manager {event.after} from now on: '
                               f'{event.before} is lost', 'manager')
-        elif isinstance(event, AutomaticTakeFailed):
+        elif isinstance(event, events.AutomaticTakeFailed):
             self._log.warning(f'auto_take_control: {event.message}', 'control')
         self._host.check_diagnostics()
 
-    def _control_changed(self, name: str, event: ControlChanged) -> None:
+    def _control_changed(self, name: str, event: events.ControlChanged) -> None:
         if event.was_lost:
             self._log.warning(f'control of {name} lost: {event.after}; setpoints have stopped, '
                               '~/take_control takes it back', 'control')
@@ -203,15 +178,15 @@ class GimbalNode:
         self._interface.publish('in_control', ours)
         self._interface.publish('controller', controller(control))
 
-    def _publish_attitude(self, event: AttitudeReceived) -> None:
+    def _publish_attitude(self, event: events.AttitudeReceived) -> None:
         publish, attitude = self._interface.publish, event.attitude
         if attitude is not None:
             header = Header(stamp=self._clock.now().to_msg(),
                             frame_id=self._frames.name(attitude.frame))
-            publish('attitude', quaternion_message(header, attitude.rotation))
-            publish('angles', vector_message(header, attitude.rotation.euler()))
+            publish('attitude', conversions.quaternion_message(header, attitude.rotation))
+            publish('angles', conversions.vector_message(header, attitude.rotation.euler()))
             if attitude.rates is not None:
-                publish('angular_velocity', vector_message(header, attitude.rates))
+                publish('angular_velocity', conversions.vector_message(header, attitude.rates))
         lock = bool(event.flags & MountFlags.YAW_LOCK)
         if lock is not self._yaw_lock:
             self._yaw_lock = lock
@@ -224,13 +199,13 @@ class GimbalNode:
 
     # Requests
 
-    def _release(self, source: str, now: float, answer: Answer) -> None:
+    def _release(self, source: str, now: float, answer: ros_node.Answer) -> None:
         if gimbal := self._gimbal():
             answer(True, f'held by {gimbal.release(source, now) or "no source"}')
         else:
             answer(False, self.absence(now))
 
-    def _claimed(self, name: str, now: float, answer: Answer) -> Gimbal | None:
+    def _claimed(self, name: str, now: float, answer: ros_node.Answer) -> Gimbal | None:
         """Return the gimbal for a request of the plain interface; answer a refused one."""
         gimbal = self._gimbal()
         refusal = self.absence(now) if gimbal is None else _refusal(gimbal, name, now)
@@ -238,29 +213,31 @@ class GimbalNode:
             answer(False, refusal)
         return None if refusal else gimbal
 
-    def _request(self, name: str, message: Trigger.Request, now: float, answer: Answer) -> None:
+    def _request(
+        self, name: str, message: Trigger.Request, now: float, answer: ros_node.Answer,
+    ) -> None:
         if gimbal := self._claimed(name, now, answer):
             REQUESTS[name](gimbal, now, lambda result, now: answer(
                 result.success, result.message))
 
-    def _set_yaw_lock(self, message: SetBool.Request, now: float, answer: Answer) -> None:
+    def _set_yaw_lock(self, message: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
         if gimbal := self._claimed('set_yaw_lock', now, answer):
             gimbal.set_yaw_lock(message.data, now, lambda result, now: answer(
                 result.success, result.message))
 
     # Setpoints
 
-    def _command_topics(self, source: str, prefix: str) -> tuple[AnyCommand, ...]:
+    def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommand, ...]:
         def topic(
             name: str, type_: type[object], send: Callable[[Gimbal, T, float], str],
             read: Callable[[Any], T],
-        ) -> CommandTopic[T]:
+        ) -> ros_node.CommandTopic[T]:
             def take(value: T, now: float) -> None:
                 gimbal = self._gimbal()
                 self._refused(f'{prefix}{name}', self.absence(now) if gimbal is None else
                               gimbal.claim(source, now) or send(gimbal, value, now))
 
-            return CommandTopic(f'{prefix}{name}', type_, take, read)
+            return ros_node.CommandTopic(f'{prefix}{name}', type_, take, read)
 
         def point(gimbal: Gimbal, place: Vector, now: float) -> str:
             pointing.offer(place, now)
@@ -274,9 +251,9 @@ class GimbalNode:
             topic('cmd/angles', Vector3Stamped,
                   lambda gimbal, value, now: gimbal.set_angles(*value, now),
                   self._frames.read_angles),
-            topic('cmd/rate', Vector3Stamped, Gimbal.set_rates, read_rates),
+            topic('cmd/rate', Vector3Stamped, Gimbal.set_rates, conversions.read_rates),
             topic('cmd/roi', NavSatFix, point,
-                  lambda message: read_place(message, self._separation)))
+                  lambda message: conversions.read_place(message, self._separation)))
 
     def _point(
         self, source: str, topic: str, place: Vector, now: float, ended: Callable[[float], None],
