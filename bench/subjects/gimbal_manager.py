@@ -75,9 +75,23 @@ class Line:
         """Return the messages of the next datagram, none after the time."""
         self.socket.settimeout(max(timeout, 1e-4))
         try:
-            data = self.socket.recv(65536)
+            return self._messages(self.socket.recv(65536))
         except TimeoutError:
             return []
+
+    def arrival(self, wanted: type[mav.Message]) -> float:
+        """
+        Wait for a message, and return when its datagram came, before that was decoded.
+
+        :raises TimeoutError: if no datagram comes.
+        """
+        self.socket.settimeout(5.0)
+        while True:
+            data, now = self.socket.recv(65536), time.perf_counter()
+            if any(isinstance(message, wanted) for message in self._messages(data)):
+                return now
+
+    def _messages(self, data: bytes) -> list[Any]:
         return [mav.decode_payload(CLASSES[frame.message_id], frame.payload)
                 for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
 
@@ -142,16 +156,12 @@ def _setpoints(bench: Bench) -> Row:
                     device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
                     players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
                     time.sleep(0.01)
-                message = setpoint(PLAYERS[0], pitch=0.3 * math.sin(number))
+                data = players.frame(PLAYERS[0], setpoint(
+                    PLAYERS[0], pitch=0.3 * math.sin(number)))
                 device.drain()
                 began = time.perf_counter()
-                players.send(PLAYERS[0], message, port)
-                while not any(isinstance(got, GimbalDeviceSetAttitude)
-                              for got in device.receive(1.0)):
-                    if time.perf_counter() > began + 5.0:
-                        raise RuntimeError('the device gets no setpoint')
-                took['manager'].append((time.perf_counter() - began) * 1e3)
-                data = players.frame(PLAYERS[0], message)
+                players.socket.sendto(data, ('127.0.0.1', port))
+                took['manager'].append((device.arrival(GimbalDeviceSetAttitude) - began) * 1e3)
                 began = time.perf_counter()
                 players.socket.sendto(data, ('127.0.0.1', forward))
                 far.socket.recv(2048)
