@@ -35,6 +35,8 @@ import yaml  # noqa: E402
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / 'doc' / 'gimbal.md').read_text()
 POLICY = ET.parse(ROOT / 'config' / 'sros2' / 'gimbal.policy.xml').getroot()
+SOURCES = yaml.safe_load((ROOT / 'config' / 'gimbal_sources.yaml').read_text())[
+    '/**']['ros__parameters']['sources']
 INTERNAL = {'~/get_logger_levels', '~/set_logger_levels', '~/get_type_description'}
 
 
@@ -107,8 +109,11 @@ def permitted(node: str, element: str, action: str) -> set[str]:
 
 
 def test_policy_permits_the_interface_of_the_page() -> None:
-    published, accepted = set(column('published')) - {'/diagnostics'}, set(column('accepted'))
-    topics = {name for name in accepted if name.startswith('~/cmd/')}
+    published = {*column('published'), '~/source'} - {'/diagnostics'}
+    of_a_source = ', '.join(row[0] for row in table(PAGE, 'of a source')).replace('`', '')
+    accepted = {*column('accepted'), '~/default/release'}.union(*(
+        of_a_source.replace('NAME', name).split(', ') for name in SOURCES if name != 'default'))
+    topics = {name for name in accepted if '/cmd/' in name}
     parameters = {f'~/{name}' for name in (
         'describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
         'set_parameters', 'set_parameters_atomically')}

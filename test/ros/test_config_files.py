@@ -14,6 +14,7 @@
 
 """The files in config/ name the topics, types and services that a real bridge has."""
 
+import contextlib
 from importlib import import_module
 import json
 from pathlib import Path
@@ -24,21 +25,26 @@ import xml.etree.ElementTree as ET
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from support.embedded import refusal
+from support.gimbals import FakeManager, served_gimbals
 from support.graph import Interface, interface
 from support.light import Address, eventually, ServedLight
-from support.ros import Ros, running_bridge, STREAM
+from support.ports import free_port
+from support.processes import ended, python
+from support.ros import bridge_arguments, Ros, running_bridge, STREAM
 import yaml
 
 CONFIG = Path(__file__).parents[2] / 'config'
-AGGREGATOR = yaml.safe_load(
-    (CONFIG / 'diagnostics_aggregator.yaml').read_text())['/**']['ros__parameters']['lights']
+ANALYZERS = yaml.safe_load(
+    (CONFIG / 'diagnostics_aggregator.yaml').read_text())['/**']['ros__parameters']
 JOYSTICK = yaml.safe_load((CONFIG / 'joystick.yaml').read_text())['/**']['ros__parameters']
 FOXGLOVE = json.loads((CONFIG / 'foxglove_layout.json').read_text())
 PLOTJUGGLER = ET.parse(CONFIG / 'plotjuggler_layout.xml').getroot()
 CURVES = [curve.attrib['name'] for curve in PLOTJUGGLER.iter('curve')]
 PLOTS = [series['value'] for panel in FOXGLOVE['configById'].values()
          for series in panel.get('paths', [])]
-POLICY = ET.parse(CONFIG / 'sros2' / 'illuminator.policy.xml').getroot()
+POLICY, GIMBAL_POLICY = (
+    ET.parse(CONFIG / 'sros2' / f'{name}.policy.xml').getroot()
+    for name in ('illuminator', 'gimbal'))
 # The rules of a policy, and the part of a node's interface that each names.
 RULES = {('topic', 'publish'): 'publishers', ('topic', 'subscribe'): 'subscriptions',
          ('service', 'reply'): 'services', ('service', 'request'): 'clients'}
@@ -68,10 +74,11 @@ def field_type(message: str, path: list[str]) -> str:
 
 
 def test_foxglove_layout_plots_published_fields(offered: Interface) -> None:
-    for path in PLOTS:
+    paths = [path for path in PLOTS if path.startswith('/illuminator/')]
+    for path in paths:
         topic, *fields = path.split('.')
         assert field_type(offered.publishers[topic], fields) in NUMBERS | {'string'}, path
-    assert {path.split('.')[0].removeprefix('/illuminator/') for path in PLOTS} >= {*SHOWN, 'mode'}
+    assert {path.split('.')[0].removeprefix('/illuminator/') for path in paths} >= {*SHOWN, 'mode'}
     for panel in FOXGLOVE['configById'].values():
         for topic in filter(None, [*panel.get('topics', {}), panel.get('topicToRender')]):
             assert topic in offered.publishers
@@ -114,9 +121,11 @@ def test_joystick_commands_are_topics_of_the_bridge_and_the_axis_covers_0_to_100
     assert [len(JOYSTICK[name]['deadman_buttons']) for name in values] == [2, 1]
 
 
-def permitted(node: str, element: str, action: str) -> list[str]:
-    """Return the names in full of what the policy lets a node do."""
-    [profile] = [one for one in POLICY.iter('profile') if one.attrib['node'] == node]
+def permitted(
+    node: str, element: str, action: str, policy: ET.Element = POLICY,
+) -> list[str]:
+    """Return the names in full of what a policy lets a node do."""
+    [profile] = [one for one in policy.iter('profile') if one.attrib['node'] == node]
     rules = [rule for rule in profile if action in rule.attrib]
     assert all(rule.attrib == {action: 'ALLOW'} for rule in rules)
     names = [str(name.text) for rule in rules for name in rule.iter(element)]
@@ -162,15 +171,16 @@ def test_example_of_sources_has_parameters_that_the_bridge_accepts(own_ros: Ros)
     assert refusal(own_ros.context, **given) == ''
 
 
-def test_aggregator_takes_all_statuses_of_all_lights_and_no_others(
+def groups(status: str) -> list[str]:
+    """Return the groups of the aggregator that take a status."""
+    # As GenericAnalyzer::match does with the names as they are published.
+    return [name for name, one in ANALYZERS.items()
+            if any(re.fullmatch(pattern, status) for pattern in one['regex'])]
+
+
+def test_aggregator_takes_each_status_of_all_lights_and_no_others(
     own_ros: Ros, port: int,
 ) -> None:
-    def matches(name: str) -> bool:
-        # As GenericAnalyzer::match does with the names as they are published.
-        return (any(re.fullmatch(pattern, name) for pattern in AGGREGATOR.get('regex', []))
-                or any(map(name.startswith, AGGREGATOR.get('startswith', [])))
-                or any(part in name for part in AGGREGATOR.get('contains', [])))
-
     nodes = ('illuminator', 'illuminator_1_244')
     names = {f'{node}: {part}' for node in nodes for part in ('link', 'lamp')}
     with (running_bridge(own_ros.domain, port, diagnostics_period=0.1, target_component=243),
@@ -179,10 +189,51 @@ def test_aggregator_takes_all_statuses_of_all_lights_and_no_others(
         eventually(lambda: names <= {status.name for array in list(recorder.messages)
                                      for status in array.status})
 
-    assert AGGREGATOR['type'] == 'diagnostic_aggregator/GenericAnalyzer'
-    assert all(map(matches, names))
-    assert set(AGGREGATOR['expected']) <= names
-    assert not any(map(matches, (
+    assert all(groups(name) == ['lights'] for name in names)
+    assert set(ANALYZERS['lights']['expected']) <= names
+    assert not any(map(groups, (
         'illuminator_driver: link', 'illuminator: battery', 'my illuminator: lamp')))
-    # A status of the default period, 1 s, is not stale between two.
-    assert AGGREGATOR['timeout'] > 3.0
+    for analyzer in ANALYZERS.values():
+        assert analyzer['type'] == 'diagnostic_aggregator/GenericAnalyzer'
+        # A status of the default period, 1 s, is not stale between two.
+        assert analyzer['timeout'] > 3.0
+
+
+def test_layout_aggregator_and_policy_know_the_names_of_gimbals_and_the_camera(
+    own_ros: Ros, port: int,
+) -> None:
+    wanted = {
+        'gimbals': {'gimbal: link', 'gimbal: device', 'gimbal_1_155: device',
+                    'gimbal_manager: link', 'gimbal_manager: device', 'gimbal_manager: manager'},
+        'cameras': {'rededge: link', 'rededge: camera'}}
+    with contextlib.ExitStack() as stack:
+        for name, parameters in (
+                ('gimbal', {'sources': '[safety, operator, autonomy]'}), ('rededge', {}),
+                ('gimbal_manager', {'gimbal_device_id': 1})):
+            stack.enter_context(ended(python(
+                f'illuminator_ros.{"rededge" if name == "rededge" else "gimbal"}',
+                *bridge_arguments(
+                    port if name == 'gimbal' else free_port(), '-r', f'__node:={name}',
+                    diagnostics_period=0.1, payloads=f'[{name}]', **parameters),
+                env={'ROS_DOMAIN_ID': str(own_ros.domain)})))
+        stack.enter_context(served_gimbals(port, FakeManager(), FakeManager(device_id=155)))
+        recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        eventually(lambda: set().union(*wanted.values()) <= {
+            status.name for array in list(recorder.messages) for status in array.status})
+        topics = {
+            topic: types[0] for topic, types in own_ros.node.get_topic_names_and_types()}
+        offered = interface(own_ros, 'gimbal', [
+            '/diagnostics', '/gimbal/autonomy/cmd/roi', '/gimbal/autonomy/release'])
+
+    for rule, part in RULES.items():
+        assert sorted(permitted('gimbal', *rule, GIMBAL_POLICY)) == sorted(
+            getattr(offered, part))
+    names = {status.name for array in recorder.messages for status in array.status}
+    assert {group: {name for name in names if groups(name) == [group]} & wanted[group]
+            for group in wanted} == wanted
+    assert all(map(groups, names))
+    others = [path for path in PLOTS if not path.startswith('/illuminator/')]
+    assert {path.split('/')[1] for path in others} == {'gimbal', 'rededge'}
+    for path in others:
+        topic, *fields = path.split('.')
+        assert field_type(topics[topic], fields) in NUMBERS | {'string'}, path
