@@ -67,10 +67,10 @@ def rejecting(
 
 def test_checks_that_need_consent_are_skipped_without_it() -> None:
     run = Run(consent=False).finish()
-    assert {one.requirement.name for one in run.suite.results
+    assert {one.requirement.name for one in run.runner.results
             if 'not agreed to; see --yes' in one.detail
             } == {one.name for one in REQUIREMENTS if one.needs_consent}
-    assert run.suite.passed
+    assert run.runner.passed
 
 
 @all_lights

@@ -119,7 +119,7 @@ def test_properties_out_of_order_fail_their_requirement(name: str) -> None:
 def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile: str) -> None:
     run = Run(properties({'profile': profile}, PROFILES[profile].properties.address)).finish()
     assert run.failed == DEVIATIONS[profile]
-    assert run.suite.restored == 'the light is as it was'
+    assert run.runner.restored == 'the light is as it was'
 
 
 def test_every_fault_is_seeded_and_every_requirement_can_fail() -> None:
@@ -137,7 +137,7 @@ def test_a_status_with_nan_fails_status_content() -> None:
 def test_a_hot_light_without_faults_meets_every_requirement() -> None:
     run = Run(IlluminatorProperties(time_scale=120.0)).finish()
     assert run.names(Verdict.PASS) == {one.name for one in REQUIREMENTS}
-    assert run.suite.passed
+    assert run.runner.passed
 
 
 def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped() -> None:

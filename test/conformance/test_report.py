@@ -36,12 +36,12 @@ def run() -> Run:
 @pytest.fixture(scope='module')
 def report(run: Run) -> Report:
     return Report('illuminator', 'light', 'udpin://127.0.0.1:1', 'light 1/243: x&<y>',
-                  tuple(run.suite.results), run.suite.restored, 12.5, run.suite.passed)
+                  tuple(run.runner.results), run.runner.restored, 12.5, run.runner.passed)
 
 
 def shown(run: Run) -> list[str]:
     table = Table()
-    return [line for one in run.suite.results for line in table.add(one)] + table.end()
+    return [line for one in run.runner.results for line in table.add(one)] + table.end()
 
 
 def test_the_json_report_has_every_requirement_with_its_messages(report: Report) -> None:
@@ -91,7 +91,7 @@ def test_requirements_that_were_not_reached_share_one_line() -> None:
     assert absent[-1] == 'SKIPPED 47 requirements: no light was found'
 
     interrupted = Run(consent=False)
-    interrupted.link.run_until(lambda: len(interrupted.suite.results) == 10, within=100.0)
+    interrupted.link.run_until(lambda: len(interrupted.runner.results) == 10, within=100.0)
     interrupted.interrupt()
     assert shown(interrupted.finish())[-1] == 'SKIPPED 38 requirements: interrupted'
 

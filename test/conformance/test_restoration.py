@@ -48,21 +48,21 @@ def is_restored(run: Run) -> bool:
 def test_switch_and_configuration_are_restored(faults: tuple[str, ...]) -> None:
     run = used(*faults).finish()
     assert is_restored(run)
-    assert run.suite.restored == 'the light is as it was'
+    assert run.runner.restored == 'the light is as it was'
 
 
 @pytest.mark.parametrize('after', [0.0, *(0.5 + 0.7 * step for step in range(52))])
 def test_an_interrupted_run_restores_the_light_and_checks_nothing_more(after: float) -> None:
     run = used()
     run.link.run(after)
-    checked = len(run.suite.results)
+    checked = len(run.runner.results)
     interrupted = run.link.now
     run.interrupt()
     run.finish()
     assert is_restored(run)
-    assert len(run.suite.results) == len(REQUIREMENTS)
-    assert {one.detail for one in run.suite.results[checked + 1:]} <= {'interrupted'}
-    assert not run.suite.passed
+    assert len(run.runner.results) == len(REQUIREMENTS)
+    assert {one.detail for one in run.runner.results[checked + 1:]} <= {'interrupted'}
+    assert not run.runner.passed
     assert run.link.now < interrupted + 5.0
 
 
@@ -91,9 +91,9 @@ def test_a_light_that_cannot_be_restored_is_reported_with_its_former_state() -> 
     run.link.run(20.0)
     run.fault('refuse')
     run.finish()
-    assert run.suite.restored.startswith('THE LIGHT IS NOT AS IT WAS (')
-    assert 'it was on, mode external_sync, brightness 60 %' in run.suite.restored
-    assert not run.suite.passed
+    assert run.runner.restored.startswith('THE LIGHT IS NOT AS IT WAS (')
+    assert 'it was on, mode external_sync, brightness 60 %' in run.runner.restored
+    assert not run.runner.passed
 
 
 def test_a_light_that_reports_no_status_is_not_changed() -> None:

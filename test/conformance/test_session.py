@@ -28,7 +28,8 @@ from illuminator_ros.illuminator.simulated_properties import (
 from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
 from illuminator_ros.payload.checks.session import MAX_ENTRIES
 import pytest
-from support.conformance_run import Run, TESTER
+from support.checks_run import TESTER
+from support.conformance_run import Run
 
 FIRST, SECOND = (IlluminatorProperties(address=Address(1, n)) for n in (243, 244))
 BAD = IlluminatorProperties(address=SECOND.address, behaviour=FAULTS.add(
@@ -71,7 +72,7 @@ def test_without_the_light_heartbeat_fails_and_names_the_components_that_were_he
     assert run.failed == {'heartbeat'}
     assert run.result('heartbeat').detail == text
     assert run.result('on').detail == 'no light was found'
-    assert not run.suite.passed
+    assert not run.runner.passed
 
 
 def test_a_flood_from_the_light_takes_a_bounded_memory() -> None:

@@ -29,9 +29,10 @@ from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
-from illuminator_ros.payload.simulated import SimulatedType
+from illuminator_ros.payload.simulated import Description, SimulatedComponents, SimulatedType
 import pytest
-from support.gimbal_checks import GimbalRun
+from support.checks_run import ChecksRun
+from support.virtual_link import START
 
 KINDS: dict[str, tuple[PayloadChecks[Any], SimulatedType[Any]]] = {
     'gimbal': (device.CHECKS, simulated_device.SIMULATED),
@@ -106,10 +107,18 @@ PROFILES: dict[str, set[str]] = {
 }
 
 
-def run(kind: str, *faults: str, **settings: Any) -> GimbalRun:
+def run(
+    kind: str, *faults: str, consent: bool = True, only: tuple[str, ...] = (), **settings: Any,
+) -> ChecksRun:
+    checks, simulated = KINDS[kind]
     if kind == 'gimbal_manager':
         settings = {'heading': 40.0, **settings}
-    return GimbalRun(*KINDS[kind], *faults, **settings)
+    address = simulated.address(settings)
+    device = simulated.make(settings, address, False)
+    for fault in faults:
+        device.behave(device.faults.add(device.behaviour, fault), START - 100.0)
+    devices = SimulatedComponents([Description(address, device)], START - 100.0)
+    return ChecksRun(checks, devices, consent=consent, only=only)
 
 
 @pytest.mark.parametrize(('kind', 'fault'), [
@@ -142,8 +151,8 @@ def test_a_profile_fails_exactly_its_known_deviations(profile: str) -> None:
 
 # Deviations that no fault of the simulator has
 
-def _changed(cls: type[Any], **fields: Any) -> Callable[[GimbalRun], None]:
-    def seed(one: GimbalRun) -> None:
+def _changed(cls: type[Any], **fields: Any) -> Callable[[ChecksRun], None]:
+    def seed(one: ChecksRun) -> None:
         original = one.device.message
 
         def message(message_id: int, now: float) -> Any:
@@ -153,7 +162,7 @@ def _changed(cls: type[Any], **fields: Any) -> Callable[[GimbalRun], None]:
     return seed
 
 
-def _moves_when_unset(one: GimbalRun) -> None:
+def _moves_when_unset(one: ChecksRun) -> None:
     mount = one.device.mount
     original = mount.set
 
@@ -164,7 +173,7 @@ def _moves_when_unset(one: GimbalRun) -> None:
     mount.set = moved
 
 
-def _forgets_at_minus_1(one: GimbalRun) -> None:
+def _forgets_at_minus_1(one: ChecksRun) -> None:
     original = one.device.execute
 
     def execute(source: Address, command: Any, now: float) -> Any:
@@ -175,8 +184,8 @@ def _forgets_at_minus_1(one: GimbalRun) -> None:
     one.device.execute = execute
 
 
-def _silent_at(param: float) -> Callable[[GimbalRun], None]:
-    def seed(one: GimbalRun) -> None:
+def _silent_at(param: float) -> Callable[[ChecksRun], None]:
+    def seed(one: ChecksRun) -> None:
         original = one.device.receive
         one.device.receive = lambda source, message, now: () if getattr(
             message, 'gimbal_device_id', None) == param else original(source, message, now)

@@ -17,15 +17,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.requirement import Conditions, Verdict
-from illuminator_ros.payload.checks.runner import absence, CheckRunner
+from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.checks import CHECKS, REQUIREMENTS
 from illuminator_ros.rededge.simulated import FAULTS, Place, SimulatedRedEdge
 import pytest
-from support.virtual_link import START, VirtualLink
+from support.checks_run import ChecksRun
+from support.virtual_link import START
 
 UTC = 1.7e9
 CAMERA = Address(255, 100)
@@ -62,64 +63,40 @@ RANDOM = {'drop': 'heartbeat-rate', 'duplicate': 'ping-once', 'delay': 'ping',
           'corrupt': 'checksums', 'reboot': 'capture-index'}
 
 
-class Run:
+def run(
+    fault: str = '', *, address: Address = CAMERA, others: Iterable[int] = (), version: int = 1,
+    seed: int = 0, **options: Any,
+) -> ChecksRun:
     """
-    A session and a check runner, a camera, and the line between them.
+    Check a camera.
 
-    :param target: of the session.
     :param others: component ids of further cameras.
-    :param version: of MAVLink.
     """
-
-    def __init__(
-        self, fault: str = '', *, consent: bool = True, target: Address | None = None,
-        address: Address = CAMERA, others: Iterable[int] = (), version: int = 1, seed: int = 0,
-    ) -> None:
-        self.camera = SimulatedRedEdge(address, own_gps=Place(47.0, 8.0, 400.0))
-        if fault:
-            self.camera.behave(FAULTS.add(self.camera.behaviour, fault), START)
-        cameras = SimulatedComponents([
-            Description(address, self.camera, seed=seed),
-            *(Description(one, SimulatedRedEdge(one))
-              for one in (Address(255, other) for other in others))], START)
-        self.camera.set_clock(UTC + START, START)
-        self.session = CHECKS.session(Address(255, 190), target)
-        link = VirtualLink(self.session, cameras, version)
-        self.runner = CheckRunner(CHECKS, self.session, Conditions(
-            consent, lambda: link.decoders[0].counters.crc_errors, {},
-            lambda: UTC + link.now), REQUIREMENTS)
-        self.session.runner.run(self._main())
-        link.run_until(lambda: not self.session.runner.running, within=3600.0)
-
-    async def _main(self) -> None:
-        await self.session.find(10.0, 4.5)
-        await self.runner.run('' if self.session.found else absence(self.session, CHECKS, 10.0))
-
-    def names(self, verdict: Verdict) -> set[str]:
-        return {one.requirement.name for one in self.runner.results if one.verdict is verdict}
-
-    @property
-    def failed(self) -> set[str]:
-        return self.names(Verdict.FAIL)
-
-    def detail(self, name: str) -> str:
-        return next(one.detail for one in self.runner.results if one.requirement.name == name)
+    camera = SimulatedRedEdge(address, own_gps=Place(47.0, 8.0, 400.0))
+    if fault:
+        camera.behave(FAULTS.add(camera.behaviour, fault), START)
+    camera.set_clock(UTC + START, START)
+    cameras = SimulatedComponents([
+        Description(address, camera, seed=seed),
+        *(Description(one, SimulatedRedEdge(one))
+          for one in (Address(255, other) for other in others))], START)
+    return ChecksRun(CHECKS, cameras, version=version, utc=UTC, **options).finish()
 
 
 def test_camera_without_faults_meets_every_requirement() -> None:
-    run = Run()
-    assert run.names(Verdict.PASS) == {one.name for one in REQUIREMENTS}
-    assert run.runner.restored == 'the camera is as it was, besides its new images'
+    done = run()
+    assert done.names(Verdict.PASS) == {one.name for one in REQUIREMENTS}
+    assert done.runner.restored == 'the camera is as it was, besides its new images'
 
 
 @pytest.mark.parametrize('fault', SEEDED)
 def test_fault_fails_exactly_its_requirements(fault: str) -> None:
-    assert Run(fault).failed == SEEDED[fault]
+    assert run(fault).failed == SEEDED[fault]
 
 
 @pytest.mark.parametrize('fault', RANDOM)
 def test_random_fault_fails_its_requirement(fault: str) -> None:
-    assert RANDOM[fault] in Run(fault).failed
+    assert RANDOM[fault] in run(fault).failed
 
 
 def test_every_fault_is_seeded_and_every_requirement_can_fail() -> None:
@@ -129,31 +106,32 @@ def test_every_fault_is_seeded_and_every_requirement_can_fail() -> None:
 
 
 def test_camera_that_sends_mavlink_2_fails_mavlink_1_only_re_1() -> None:
-    assert Run(version=2).failed == {'mavlink-1'}
+    assert run(version=2).failed == {'mavlink-1'}
 
 
 def test_without_consent_no_image_is_taken() -> None:
-    run = Run(consent=False)
-    assert not run.camera.images
-    assert run.names(Verdict.PASS) == WITHOUT_CONSENT
-    assert run.names(Verdict.SKIPPED) == CAPTURES | {'capture-index'}
-    assert run.runner.restored == 'nothing was changed'
-    assert 'would take images with a false position: not agreed to' in run.detail('validity')
+    done = run(consent=False)
+    assert not done.device.images
+    assert done.names(Verdict.PASS) == WITHOUT_CONSENT
+    assert done.names(Verdict.SKIPPED) == CAPTURES | {'capture-index'}
+    assert done.runner.restored == 'nothing was changed'
+    assert 'would take images with a false position: not agreed to' in (
+        done.result('validity').detail)
 
 
 def test_camera_is_one_device_whatever_its_system_id_re_8() -> None:
-    run = Run(address=Address(1, 100), target=Address(9, 100))
-    assert not run.failed
-    assert run.session.devices == run.session.heard == {Address(255, 100)}
+    done = run(address=Address(1, 100), target=Address(9, 100))
+    assert not done.failed
+    assert done.session.devices == done.session.heard == {Address(255, 100)}
 
 
 def test_component_other_than_100_is_not_a_camera_re_7() -> None:
-    run = Run(others=[101])
-    assert not run.failed
-    assert run.session.devices == {Address(255, 100)}
-    absent = Run(address=Address(255, 101))
+    done = run(others=[101])
+    assert not done.failed
+    assert done.session.devices == {Address(255, 100)}
+    absent = run(address=Address(255, 101))
     assert absent.failed == {'heartbeat'}
-    assert absent.detail('heartbeat').startswith(
+    assert absent.result('heartbeat').detail.startswith(
         'no camera was heard within 10 s, that is, no HEARTBEAT from component 100')
 
 
@@ -169,4 +147,4 @@ def test_component_other_than_100_is_not_a_camera_re_7() -> None:
     ('extension', 'lengths', 'CAMERA_FEEDBACK with 47 bytes'),
 ])
 def test_finding_names_the_deviation(fault: str, name: str, detail: str) -> None:
-    assert detail in Run(fault).detail(name)
+    assert detail in run(fault).result(name).detail

@@ -16,65 +16,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-import contextlib
 from dataclasses import replace
 from typing import Any
 
-from illuminator_ros.cli.conformance.run import LISTEN_TIME
-from illuminator_ros.illuminator.checks.requirements import CHECKS, REQUIREMENTS
+from illuminator_ros.illuminator.checks.requirements import CHECKS
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
-from illuminator_ros.payload.checks.requirement import Conditions, Requirement, Result, Verdict
-from illuminator_ros.payload.checks.runner import absence, CheckRunner
-from illuminator_ros.payload.checks.session import Interrupted
+from support.checks_run import ChecksRun
 from support.simulated_lights import simulated_lights
-from support.virtual_link import START, VirtualLink
+from support.virtual_link import START
 
-TESTER = Address(255, 190)
-FIND_TIMEOUT = 10.0
 # s for which the lights have been on when a run begins.
 UPTIME = 100.0
 
 
-class Run:
+class Run(ChecksRun):
     """
-    A session and a suite, a light, and the line between them.
+    The run for a light.
 
     :param lights: the first is checked; default properties if there is none.
     :param faults: of the first light.
-    :param only: names of requirements, all if empty.
-    :param heat: s at 100 %.
+    :param options: of :class:`ChecksRun`; ``heat``, s at 100 %.
     """
 
     def __init__(
-        self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (),
-        only: tuple[str, ...] = (), target: Address | None = None, consent: bool = True,
-        heat: float = 5.0, requirements: Sequence[Requirement[Any]] = REQUIREMENTS,
+        self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (), **options: Any,
     ) -> None:
         first, *others = lights or [IlluminatorProperties()]
         for fault in faults:
             first = replace(first, behaviour=FAULTS.add(first.behaviour, fault))
         self.lights = simulated_lights([first, *others], START - UPTIME)
         self.light = self.lights.components[0]
-        self.session = CHECKS.session(TESTER, target)
-        self.link = VirtualLink(self.session, self.lights)
-        self.suite = CheckRunner(
-            CHECKS, self.session, Conditions(
-                consent, lambda: self.link.decoders[0].counters.crc_errors, {'heat': heat}),
-            [one for one in requirements if not only or one.name in only])
-        self.session.runner.run(self._main())
-
-    async def _main(self) -> None:
-        missing = ''
-        with contextlib.suppress(Interrupted):
-            await self.session.find(FIND_TIMEOUT, LISTEN_TIME)
-            if self.session.found is None:
-                missing = absence(self.session, CHECKS, FIND_TIMEOUT)
-        await self.suite.run(missing)
+        super().__init__(CHECKS, self.lights, **options)
 
     @property
     def lamp(self) -> SimulatedIlluminator:
@@ -112,22 +88,3 @@ class Run:
                 seen.append(self.lamp.configuration)
         self.light.apply = noted  # type: ignore[method-assign]
         return seen
-
-    def finish(self) -> Run:
-        """Let the run end."""
-        self.link.run_until(lambda: not self.session.runner.running, within=3600.0)
-        return self
-
-    def names(self, verdict: Verdict) -> set[str]:
-        """Return the names of the requirements with a verdict."""
-        return {one.requirement.name for one in self.suite.results if one.verdict is verdict}
-
-    @property
-    def failed(self) -> set[str]:
-        """Return the names of the requirements that the light does not meet."""
-        return self.names(Verdict.FAIL)
-
-    def result(self, name: str) -> Result:
-        """Return the result of a requirement."""
-        (result,) = [one for one in self.suite.results if one.requirement.name == name]
-        return result

@@ -1,0 +1,97 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A run of ``conformance`` against simulated devices, without links and clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import contextlib
+from typing import Any, TypeVar
+
+from illuminator_ros.cli.conformance.run import LISTEN_TIME
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.checks.requirement import (
+    Conditions,
+    PayloadChecks,
+    Requirement,
+    Result,
+    Verdict,
+)
+from illuminator_ros.payload.checks.runner import absence, CheckRunner
+from illuminator_ros.payload.checks.session import Interrupted
+from illuminator_ros.payload.simulated import SimulatedComponents
+from support.virtual_link import VirtualLink
+
+TESTER = Address(255, 190)
+FIND_TIMEOUT = 10.0
+
+R = TypeVar('R', bound='ChecksRun')
+
+
+class ChecksRun:
+    """
+    A session with its checks, simulated devices, and the line between them.
+
+    :param only: names of requirements, all if empty.
+    :param version: of MAVLink.
+    :param utc: the time at 0 of the link's clock, s since 1970.
+    """
+
+    def __init__(
+        self, checks: PayloadChecks[Any], devices: SimulatedComponents[Any], *,
+        target: Address | None = None, consent: bool = True, only: tuple[str, ...] = (),
+        requirements: Sequence[Requirement[Any]] = (), version: int = 2,
+        utc: float = 0.0, **options: float,
+    ) -> None:
+        self.checks = checks
+        self.component = devices.components[0]
+        self.device: Any = self.component.device
+        self.session = checks.session(TESTER, target)
+        self.link = VirtualLink(self.session, devices, version)
+        defaults = {one.name: one.default for one in checks.options}
+        self.runner = CheckRunner(
+            checks, self.session, Conditions(
+                consent, lambda: self.link.decoders[0].counters.crc_errors,
+                {**defaults, **options}, lambda: utc + self.link.now),
+            [one for one in requirements or checks.requirements
+             if not only or one.name in only])
+        self.session.runner.run(self._main())
+
+    async def _main(self) -> None:
+        missing = ''
+        with contextlib.suppress(Interrupted):
+            await self.session.find(FIND_TIMEOUT, LISTEN_TIME)
+            if self.session.found is None:
+                missing = absence(self.session, self.checks, FIND_TIMEOUT)
+        await self.runner.run(missing)
+
+    def finish(self: R) -> R:
+        """Let the run end."""
+        self.link.run_until(lambda: not self.session.runner.running, within=3600.0)
+        return self
+
+    def names(self, verdict: Verdict) -> set[str]:
+        """Return the names of the requirements with a verdict."""
+        return {one.requirement.name for one in self.runner.results if one.verdict is verdict}
+
+    @property
+    def failed(self) -> set[str]:
+        """Return the names of the requirements that the device does not meet."""
+        return self.names(Verdict.FAIL)
+
+    def result(self, name: str) -> Result:
+        """Return the result of a requirement."""
+        (result,) = [one for one in self.runner.results if one.requirement.name == name]
+        return result
