@@ -191,7 +191,7 @@ class Gimbal:
         self._setpoint: _Setpoint | None = None
         self._setpoints_sent = 0
         self._link_problem = ''
-        self._sources = Sources(settings.sources) if settings.sources else None
+        self._sources = Sources(settings.sources)
 
     # Liveness
 
@@ -427,19 +427,17 @@ class Gimbal:
 
     def claim(self, source: str, now: float) -> str:
         """Take a request of a source; return why it may not command the gimbal, '' if it may."""
-        if self._sources is not None:
-            self._change_holder(self._sources.poll(now), now)
-            self._change_holder(self._sources.claim(source, now), now)
+        self._change_holder(self._sources.poll(now), now)
+        self._change_holder(self._sources.claim(source, now), now)
         return self.refusal(source)
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the gimbal, for people; '' if it may."""
-        return self._sources.refusal(source) if self._sources is not None else ''
+        return self._sources.refusal(source)
 
     def refusal_of_claim(self, source: str) -> str:
         """Return why a claim of a source would be refused, '' if it would not."""
-        may = self._sources is None or self._sources.may_hold(source)
-        return '' if may else self.refusal(source)
+        return '' if self._sources.may_hold(source) else self.refusal(source)
 
     def release(self, source: str, now: float) -> str:
         """
@@ -447,8 +445,6 @@ class Gimbal:
 
         :return: the source that holds it now, '' if none does.
         """
-        if self._sources is None:
-            return ''
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.release(source, now), now)
         return self._sources.holder or ''
@@ -629,8 +625,7 @@ class Gimbal:
     def poll(self, now: float) -> None:
         """Do everything that is due."""
         self._check(now)
-        if self._sources is not None:
-            self._change_holder(self._sources.poll(now), now)
+        self._change_holder(self._sources.poll(now), now)
         manager = self._active
         if manager is None:
             return
@@ -679,7 +674,7 @@ class Gimbal:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         manager = self._active
-        deadlines = [self._sources.next_deadline() if self._sources is not None else math.inf]
+        deadlines = [self._sources.next_deadline()]
         if manager is None:
             return deadlines[0]
         deadlines += (queue.next_deadline() for queue in manager.queues)
@@ -708,8 +703,7 @@ class Gimbal:
             self._errors, self._control, self.in_control,
             manager.status_at if manager else -math.inf, self.enforces_control,
             self._setpoints_sent,
-            self._sources.holder or '' if self._sources else None,
-            self._sources.since if self._sources else 0.0)
+            self._sources.shown_holder, self._sources.since)
 
 
 def _request(

@@ -37,7 +37,7 @@ class Wish:
 class LightSources(Sources):
     """Decides which source holds a light, and remembers what each has asked for. No I/O."""
 
-    def __init__(self, settings: SourceSettings) -> None:
+    def __init__(self, settings: SourceSettings | None) -> None:
         super().__init__(settings)
         self._wishes: dict[str, Wish] = {}
 

@@ -144,7 +144,7 @@ class Light:
         self._automatic: _AutomaticSwitch | None = None
         self._undoing = RepeatLimit(
             configuration_manager.REPEATS, configuration_manager.REPEAT_INTERVAL)
-        self._sources = LightSources(settings.sources) if settings.sources else None
+        self._sources = LightSources(settings.sources)
         self._refreshes: list[_Refresh] = []
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
@@ -325,8 +325,7 @@ class Light:
             self._configuration.limit_exceeded,
             self._identity_query.identity, self._identity_query.is_settled(now),
             self._tracker.conflict.detected, self.unreachable(now),
-            self._sources.holder or '' if self._sources else None,
-            self._sources.since if self._sources else 0.0)
+            self._sources.shown_holder, self._sources.since)
 
     # Requests
 
@@ -356,20 +355,19 @@ class Light:
         """Note that a source has commanded the light, though its command must wait."""
         self.was_commanded = True
         self._requested_at = now
-        if self._sources and source:
+        if source:
             self._sources.renew(source, now)
 
     def is_held_by_other(self, source: str) -> bool:
         """Return whether another source holds the light, so that a request is not sent."""
-        return bool(self._sources and self._sources.holder and self._sources.refusal(source))
+        return bool(self._sources.holder and self._sources.refusal(source))
 
     def release(self, source: str, now: float) -> None:
         """Note that a source needs the light no more: the next lower one gets it."""
         self.note_request(now)
-        if self._sources:
-            self._change_holder(self._sources.poll(now), now)
-            self._change_holder(self._sources.release(source, now), now)
-            self._changed(self, now)
+        self._change_holder(self._sources.poll(now), now)
+        self._change_holder(self._sources.release(source, now), now)
+        self._changed(self, now)
 
     def _claim(
         self, source: str, now: float, *, enabled: bool | None = None,
@@ -377,8 +375,6 @@ class Light:
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
         self.note_request(now)
-        if self._sources is None:
-            return ''
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.claim(source, now), now)
         self._sources.remember(source, enabled=enabled, brightness=brightness)
@@ -386,7 +382,7 @@ class Light:
         return self._sources.refusal(source)
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        if change is None or self._sources is None:
+        if change is None:
             return
         if change.after is not None:
             self._end_requests(f'held by {change.after}', now)
@@ -396,7 +392,7 @@ class Light:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
         elif change.cause is not Cause.CLAIM:
-            self._send_wish(self._sources, now)
+            self._send_wish(now)
 
     def _end_requests(self, message: str, now: float) -> None:
         """End the requests of a source that no longer holds the light, and their resends."""
@@ -408,9 +404,9 @@ class Light:
             now, CommandStatus.CANCELLED, self.address,
             (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
 
-    def _send_wish(self, sources: LightSources, now: float) -> None:
+    def _send_wish(self, now: float) -> None:
         """Send what the source that holds the light now has asked for before."""
-        holder, wish = sources.holder, sources.wish
+        holder, wish = self._sources.holder, self._sources.wish
 
         def done(result: Result, now: float) -> None:
             if not result.success:
@@ -466,7 +462,7 @@ class Light:
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
         def finished(result: Result, now: float) -> None:
-            if result.success and self._sources:
+            if result.success:
                 self._sources.remember(source, brightness=changes.get('brightness'))
             done(result, now)
 
@@ -511,7 +507,7 @@ class Light:
     def shut_down(self, now: float, done: Done) -> None:
         """Switch the light off at once, whatever holds it: the last request to it."""
         self.cancel(now)
-        self._sources = None
+        self._sources = LightSources(None)
         if self._can_reach(now, done):
             self._switch(False, now, done, None)
 
@@ -556,8 +552,7 @@ class Light:
             self._asked_at, self._status_due = now, now + STATUS_TIMEOUT
             self._target.request_status(now)
         self._identity_query.poll(now)
-        if self._sources:
-            self._change_holder(self._sources.poll(now), now)
+        self._change_holder(self._sources.poll(now), now)
         if now >= self._silence_due:
             limit = self.settings.off_after_silence
             self._switch_automatically(_AutomaticSwitch(
@@ -624,8 +619,7 @@ class Light:
         lost = self.heard_at + self.settings.heartbeat_timeout if self.connected else math.inf
         refresh = min((one.started for one in self._refreshes), default=math.inf) + REFRESH_LIMIT
         return min(lost, self._question_due, refresh, self._silence_due, self._automatic_due,
-                   self._identity_query.next_deadline(),
-                   self._sources.next_deadline() if self._sources else math.inf,
+                   self._identity_query.next_deadline(), self._sources.next_deadline(),
                    self._switching.next_deadline(),
                    self._configuration.next_deadline(connected=self.connected))
 
