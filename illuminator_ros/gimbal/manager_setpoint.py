@@ -31,6 +31,7 @@ from .axes import HAS_AXIS, LEVEL, Range
 from .messages import (
     Capabilities,
     GimbalDeviceInformation,
+    GimbalDeviceSetAttitude,
     GimbalManagerSetAttitude,
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
@@ -164,10 +165,17 @@ class Demand:
         return (bool(self.flags & POSES) or self.attitude is not None
                 or all(map(math.isfinite, self.angles)))
 
+    @property
+    def target(self) -> Vector:
+        """Return roll, pitch and yaw of the attitude or the angles, rad; NaN where none is."""
+        return self.angles if self.attitude is None else self.attitude.euler()
+
     @classmethod
-    def from_attitude(cls, message: GimbalManagerSetAttitude) -> Demand:
+    def from_attitude(
+        cls, message: GimbalManagerSetAttitude | GimbalDeviceSetAttitude,
+    ) -> Demand:
         """
-        Read GIMBAL_MANAGER_SET_ATTITUDE.
+        Read GIMBAL_MANAGER_SET_ATTITUDE or GIMBAL_DEVICE_SET_ATTITUDE.
 
         :raises ValueError: if the quaternion is not a rotation, or see above.
         """
@@ -320,7 +328,7 @@ def stopped(setpoint: Setpoint, now: float) -> Setpoint:
 
 def nudge(demand: Demand, limit: float) -> Vector:
     """Return the offsets that a player in secondary control adds, rad, each within the limit."""
-    angles = demand.angles if demand.attitude is None else demand.attitude.euler()
+    angles = demand.target
     return _each(lambda angle: max(-limit, min(limit, angle)) if math.isfinite(angle) else 0.0,
                  angles)
 

@@ -31,6 +31,7 @@ from typing import Any
 
 from . import messages as gimbal
 from .axes import Range
+from .manager_setpoint import Demand
 from .messages import Capabilities, ErrorFlags
 from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields
 from .. import __version__
@@ -356,21 +357,12 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         now: float,
     ) -> None:
         try:
-            frame = yaw_frame(message.flags)
+            demand = Demand.from_attitude(message)
         except ValueError:
             return
-        if frame is YawFrame.EARTH and not self.mount.motion.heading_known(now):
-            return
-        angles = (math.nan,) * 3
-        if all(map(math.isfinite, message.q)):
-            try:
-                angles = Quaternion(*message.q).normalized().euler()
-            except ValueError:
-                return
-        self.mount.set(
-            message.flags, frame, angles,
-            (message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
-            self.behaviour, now)
+        if demand.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):
+            self.mount.set(message.flags, demand.frame, demand.target, demand.rates,
+                           self.behaviour, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""

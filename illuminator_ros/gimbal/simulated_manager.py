@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
-from .manager_setpoint import GeoPoint
+from .manager_setpoint import direction, GeoPoint, read_demand
 from .messages import Capabilities, GimbalCommand
 from .simulated_device import (
     COMMANDS,
@@ -42,7 +42,6 @@ from .simulated_device import (
     properties,
     SimulatedMount,
 )
-from .simulated_motion import wrapped
 from ..mavlink.messages import (
     Address,
     CommandInt,
@@ -55,16 +54,13 @@ from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
-from ..payload.rotation import Quaternion, Vector
+from ..payload.rotation import Vector
 from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
 STATUS_INTERVAL = 0.2
 # rad that secondary control may add to an angle.
 NUDGE_LIMIT = math.radians(20.0)
-# rad/s of the full rate of manual control.
-MANUAL_RATE = math.radians(30.0)
-EARTH_RADIUS = 6_371_000.0
 NO_COMPONENT = Address(0, 0)
 MAV_TYPE_QUADROTOR = 2
 MAV_AUTOPILOT_PX4 = 12
@@ -271,37 +267,27 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _may_control(self, source: Address) -> bool:
         return not self.behaviour.enforces_control or source in (self.primary, self.secondary)
 
-    def _frame(self, flags: int) -> YawFrame:
+    def _flags(self, flags: int) -> int:
+        """Return the flags of a message as the profile reads them."""
         frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
-        return yaw_frame(flags & ~frames if self.behaviour.frame_is_lock else flags)
+        return flags & ~frames if self.behaviour.frame_is_lock else flags
 
     def _of_message(self, message: Any) -> _Setpoint | None:
         """Return the setpoint of a message, None if it is ignored."""
         behaviour = self.behaviour
+        if (isinstance(message, gimbal.GimbalManagerSetPitchyaw) and not behaviour.takes_pitchyaw
+                or isinstance(message, gimbal.GimbalManagerSetManualControl)
+                and not behaviour.takes_manual):
+            return None
         try:
-            frame = self._frame(message.flags)
-            if isinstance(message, gimbal.GimbalManagerSetAttitude):
-                angles = Quaternion(*message.q).normalized().euler() if all(
-                    map(math.isfinite, message.q)) else UNSET_VECTOR
-                rates = (message.angular_velocity_x, message.angular_velocity_y,
-                         message.angular_velocity_z)
-            else:
-                angles = (0.0, message.pitch, message.yaw)
-                rates = (math.nan, message.pitch_rate, message.yaw_rate)
-                if isinstance(message, gimbal.GimbalManagerSetPitchyaw):
-                    if not behaviour.takes_pitchyaw:
-                        return None
-                elif not behaviour.takes_manual:
-                    return None
-                else:
-                    angles = self._manual(message.pitch, message.yaw)
-                    rates = (math.nan, message.pitch_rate * MANUAL_RATE,
-                             message.yaw_rate * MANUAL_RATE)
+            demand = read_demand(replace(message, flags=self._flags(message.flags)),
+                                 self.mount.motion.mechanics.ranges)
         except ValueError:
             return None
+        angles, rates = demand.target, demand.rates
         if not behaviour.angles_with_rates and all(map(math.isfinite, (*angles, *rates[1:]))):
             return None
-        return self._complete(_Setpoint(message.flags, frame, angles, rates))
+        return self._complete(_Setpoint(message.flags, demand.frame, angles, rates))
 
     def _complete(self, setpoint: _Setpoint) -> _Setpoint | None:
         """Return a setpoint as the profile reads it, None if it is ignored."""
@@ -312,12 +298,6 @@ class SimulatedManager(simulated.SimulatedDevice):
         if (math.isnan(pitch) or math.isnan(yaw)) and self.behaviour.partial_angles is not None:
             return None
         return setpoint
-
-    def _manual(self, pitch: float, yaw: float) -> Vector:
-        """Return the angles of manual control, which are shares of the ranges."""
-        mechanics = self.mount.motion.mechanics
-        return (0.0, pitch * (mechanics.pitch.high if pitch > 0 else -mechanics.pitch.low),
-                yaw * (mechanics.yaw.high if yaw > 0 else -mechanics.yaw.low))
 
     def _obey(self, source: Address, setpoint: _Setpoint, now: float) -> None:
         if self.behaviour.enforces_control and source == self.secondary != self.primary:
@@ -373,7 +353,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         try:
             # NaN and infinity cannot be converted: ValueError, OverflowError.
             bits = int(flags)
-            frame = self._frame(bits)
+            frame = yaw_frame(self._flags(bits))
         except (ValueError, OverflowError):
             return simulated.CommandReply(MavResult.DENIED)
         complete = self._complete(_Setpoint(
@@ -440,15 +420,9 @@ class SimulatedManager(simulated.SimulatedDevice):
                        UNSET_VECTOR, self.behaviour, now)
 
     def _point_at_roi(self, now: float) -> None:
-        if self._roi is None:
-            return
-        own, place = self._position, self._roi
-        north = math.radians(place.latitude - own.latitude) * EARTH_RADIUS
-        east = (wrapped(math.radians(place.longitude - own.longitude))
-                * EARTH_RADIUS * math.cos(math.radians(own.latitude)))
-        pitch = math.atan2(place.altitude - own.altitude, math.hypot(north, east))
-        self.mount.set(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH,
-                       (0.0, pitch, math.atan2(east, north)), UNSET_VECTOR, self.behaviour, now)
+        if self._roi is not None and (angles := direction(self._position, self._roi)):
+            self.mount.set(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH, (0.0, *angles),
+                           UNSET_VECTOR, self.behaviour, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
