@@ -133,9 +133,10 @@ class AttitudeReceived(GimbalEvent):
 @dataclass(frozen=True)
 class ControlChanged(GimbalEvent):
     """
-    Other components control the gimbal.
+    Other components control the gimbal, or it is not known any more who does.
 
-    :param before: None where that was not known, and ``after``.
+    :param before: as it was known last, None if it never was.
+    :param after: None where it is not known.
     :param ours: whether we have primary control.
     :param was_lost: whether we had primary control and have not released it.
     """

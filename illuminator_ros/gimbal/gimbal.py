@@ -69,9 +69,10 @@ STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
-# Commands that move a gimbal.
-_MOVES = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, GimbalCommand.DO_SET_ROI_LOCATION,
-          GimbalCommand.DO_SET_ROI_NONE)
+# Commands that move a gimbal, with the index of the param that is the gimbal device id.
+_MOVES: dict[int, int] = {
+    GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: 6, GimbalCommand.DO_SET_ROI_LOCATION: 0,
+    GimbalCommand.DO_SET_ROI_NONE: 0}
 
 
 @dataclass
@@ -140,12 +141,22 @@ class GimbalSettings:
 
 @dataclass
 class _Setpoint:
-    """The last setpoint, and when it is sent again or ends, s."""
+    """
+    The last setpoint, and when it is sent again or ends, s.
 
-    message: GimbalManagerSetAttitude
+    :param message: None for a place, which is a command.
+    """
+
+    manager: Address
+    message: GimbalManagerSetAttitude | None = None
     attitude: tuple[Quaternion, YawFrame] | None = None
     repeats: list[float] = field(default_factory=list)
     zero_at: float = math.inf
+
+    @property
+    def moves(self) -> bool:
+        """Whether the gimbal turns on with it: towards a place, or at a rate."""
+        return self.message is None or self.zero_at < math.inf
 
 
 class Gimbal:
@@ -175,7 +186,9 @@ class Gimbal:
         self._others: set[Address] = set()
         self._announced_at = self._device_heard_at = -math.inf
         self._manager_heard = self._connected = False
+        # As it is known, and as it was known last.
         self._control: Control | None = None
+        self._last_control: Control | None = None
         self._may_take = settings.auto_take_control
         self._releasing = False
         self._identity: events.DeviceIdentity | None = None
@@ -252,27 +265,27 @@ class Gimbal:
         control = (manager.control if manager and self._manager_heard
                    and now < manager.status_at + STATUS_LIMIT else None)
         if control != self._control:
-            before, self._control = self._control, control
-            self._control_changed(before, control, now)
+            self._control = control
+            self._control_changed(control, now)
 
-    def _control_changed(
-        self, before: Control | None, after: Control | None, now: float,
-    ) -> None:
-        had, us = self.in_control, self._commands.address
-        self.in_control = after is not None and after.primary == us
-        if after is None:
+    def _control_changed(self, control: Control | None, now: float) -> None:
+        before, us = self._last_control, self._commands.address
+        self.in_control = control is not None and control.primary == us
+        if control is None:
             if (setpoint := self._setpoint) is not None:
                 setpoint.repeats.clear()
                 # The zero that ends a rate is sent now, or when the manager is heard again.
-                target = setpoint.message.target_system, setpoint.message.target_component
                 if (setpoint.zero_at < math.inf and self._manager_heard
-                        and target == self._manager):
+                        and setpoint.manager == self._manager):
                     self._send_rates(STILL, now)
-        elif not self.in_control:
-            self._stop()
+        else:
+            self._last_control = control
+            if not self.in_control:
+                self._stop()
         self._emit(events.ControlChanged(
-            self.key, before, after, self.in_control,
-            was_lost=had and after is not None and not self.in_control and not self._releasing))
+            self.key, before, control, self.in_control,
+            was_lost=(before is not None and before.primary == us and control is not None
+                      and not self.in_control and not self._releasing)))
 
     def _choose(self, now: float) -> None:
         heard = [address for address, one in self._managers.items() if one.is_heard(now)]
@@ -396,7 +409,7 @@ class Gimbal:
             done(result, now)
 
         self.was_commanded = True
-        if self._setpoint is not None and self._setpoint.zero_at < math.inf:
+        if self._setpoint is not None and self._setpoint.moves:
             self._send_rates(STILL, now)
         self._stop()
         self._releasing = True
@@ -407,9 +420,6 @@ class Gimbal:
             if result.success and self._control is None:
                 result = request.Result(False, f'{result.message}; a manager without '
                                         'GIMBAL_MANAGER_STATUS does not show who has control')
-            elif not result.success and self._control and self._control.primary and (
-                    str(self._control) not in result.message):
-                result = replace(result, message=f'{result.message}; {self._control}')
             done(result, now)
 
         manager = self._active
@@ -420,8 +430,28 @@ class Gimbal:
             state = 'in control already' if take else 'not in control'
             done(request.Result(True, f'{state}: {self._control}'), now)
         else:
-            manager.requests.submit(_request(manager.target, Configure(
-                self._commands.address, self.key.device_id, take), now, ended), now)
+            change = Configure(self._commands.address, self.key.device_id, take)
+            manager.requests.submit(_request(
+                manager.target, change, now, self._explained(change.goal, ended)), now)
+
+    def _explained(self, goal: str, done: request.Done) -> request.Done:
+        """Return the end of a request, whose refusal names the goal, the manager and control."""
+        manager = self._manager
+
+        def ended(result: request.Result, now: float) -> None:
+            if result.refused:
+                primary = self._control.primary if self._control else None
+                advice = (
+                    f'{primary} has control and must release it first'
+                    if primary and not self.in_control else
+                    f'{"this node" if self.in_control else "no component"} has control: the log '
+                    'of the manager may have the reason')
+                answer = result.message.removeprefix('refused: ')
+                result = replace(
+                    result, message=f'manager {manager} refused "{goal}": {answer}; {advice}')
+            done(result, now)
+
+        return ended
 
     # Sources
 
@@ -450,14 +480,18 @@ class Gimbal:
         return self._sources.holder or ''
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """End the rate and the commands of the source before."""
+        """End the rate, the place and the commands of the source before."""
         if change is None:
             return
-        if self._setpoint is not None and self._setpoint.zero_at < math.inf:
+        if self._setpoint is not None and self._setpoint.moves:
             self._setpoint.zero_at = now
         if self._active is not None and change.before is not None:
             self._active.flag_requests.cancel(self.refusal(change.before), now)
-            self._commands.end_all(now, CommandStatus.CANCELLED, self._manager, _MOVES)
+            # The manager may have other gimbals.
+            self._commands.end_all(
+                now, CommandStatus.CANCELLED, self._manager, lambda command: (
+                    command.command in _MOVES
+                    and command.params[_MOVES[command.command]] == self.key.device_id))
         self._emit(events.GimbalHeld(self.key, change))
 
     # Requests
@@ -494,8 +528,9 @@ class Gimbal:
             done(request.Result(False, reason), now)
             return
         self._stop()
-        manager.flag_requests.submit(_request(manager.flag_target, SetFlags(
-            flags, flag, self.key.device_id, goal), now, done), now)
+        manager.flag_requests.submit(_request(
+            manager.flag_target, SetFlags(flags, flag, self.key.device_id, goal), now,
+            self._explained(goal, done)), now)
 
     def _capabilities(self) -> Capabilities | None:
         manager = self._active
@@ -520,26 +555,34 @@ class Gimbal:
         :param latitude: deg, and longitude.
         :param altitude: m above mean sea level.
         """
-        self._command(Command(
-            self._manager, GimbalCommand.DO_SET_ROI_LOCATION, (float(self.key.device_id),),
-            position=Position(MAV_FRAME_GLOBAL, latitude, longitude, altitude)), now, done)
+        if self._command(Command(
+                self._manager, GimbalCommand.DO_SET_ROI_LOCATION, (float(self.key.device_id),),
+                position=Position(MAV_FRAME_GLOBAL, latitude, longitude, altitude)),
+                f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m', now, done):
+            self._setpoint = _Setpoint(self._manager)
 
     def clear_roi(self, now: float, done: request.Done) -> None:
         """Stop pointing at a place."""
         self._command(Command(
-            self._manager, GimbalCommand.DO_SET_ROI_NONE, (float(self.key.device_id),)), now,
-            done)
+            self._manager, GimbalCommand.DO_SET_ROI_NONE, (float(self.key.device_id),)),
+            'point at no place', now, done)
 
-    def _command(self, command: Command, now: float, done: request.Done) -> None:
+    def _command(self, command: Command, goal: str, now: float, done: request.Done) -> bool:
+        """Send a command, if the gimbal can be commanded; return whether it can."""
+        explained = self._explained(goal, done)
+
         def ended(result: CommandResult, now: float) -> None:
-            done(request.Result(result.accepted, str(result)), now)
+            explained(request.Result(
+                result.accepted, str(result), refused=(
+                    result.status is CommandStatus.ANSWERED and not result.accepted)), now)
 
         self.was_commanded = True
         if reason := self.obstacle(now):
             done(request.Result(False, reason), now)
-        else:
-            self._stop()
-            self._commands.start(command, now, ended, limit=now + REQUEST_LIMIT)
+            return False
+        self._stop()
+        self._commands.start(command, now, ended, limit=now + REQUEST_LIMIT)
+        return True
 
     # Setpoints
 
@@ -559,7 +602,7 @@ class Gimbal:
             message = self._message(setpoint_flags(frame), to_mavlink(rotation, frame),
                                     UNSET_VECTOR)
             self._setpoint = _Setpoint(
-                message, (rotation, frame), [now + delay for delay in REPEATS])
+                self._manager, message, (rotation, frame), [now + delay for delay in REPEATS])
             self._send(message)
         return reason
 
@@ -603,8 +646,9 @@ class Gimbal:
     def _send_rates(self, rates: Vector, now: float) -> None:
         frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
         message = self._message(setpoint_flags(frame), UNSET_QUATERNION, flu_frd(rates))
-        self._setpoint = _Setpoint(message, zero_at=math.inf if rates == STILL else
-                                   now + self._settings.setpoint_timeout)
+        self._setpoint = _Setpoint(
+            self._manager, message, zero_at=math.inf if rates == STILL else
+            now + self._settings.setpoint_timeout)
         self._send(message)
 
     def _message(
@@ -667,7 +711,7 @@ class Gimbal:
             return
         if now >= setpoint.zero_at:
             self._send_rates(STILL, now)
-        elif setpoint.repeats and now >= setpoint.repeats[0]:
+        elif setpoint.message and setpoint.repeats and now >= setpoint.repeats[0]:
             del setpoint.repeats[0]
             self._send(setpoint.message)
 

@@ -401,8 +401,8 @@ class Light:
         self._switching.cancel(message, now)
         self._configuration.end_requests(message, now)
         self._commands.end_all(
-            now, CommandStatus.CANCELLED, self.address,
-            (MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
+            now, CommandStatus.CANCELLED, self.address, lambda command: command.command in (
+                MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
 
     def _send_wish(self, now: float) -> None:
         """Send what the source that holds the light now has asked for before."""

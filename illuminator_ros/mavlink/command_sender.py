@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import bisect
 from collections import deque
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -478,16 +478,16 @@ class CommandSender:
 
     def end_all(
         self, now: float, status: CommandStatus, target: Address | None = None,
-        commands: Container[int] | None = None,
+        ends: Callable[[Command], bool] = lambda command: True,
     ) -> None:
         """
-        End all commands that were started, to one target or to all.
+        End commands that were started, to one target or to all.
 
-        :param commands: the MAV_CMDs that end, None for all.
+        :param ends: returns whether one of them ends.
         """
         requests = [request for one in self._requests.values() for request in one
                     if (target is None or request.command.target == target)
-                    and (commands is None or request.command.command in commands)]
+                    and ends(request.command)]
         # End the sent request last, so that no waiting one is sent in its place.
         for request in reversed(requests):
             self._end(request, status, now)

@@ -178,6 +178,7 @@ class Result:
 
     :param success: whether the device accepted it and, if it sends a status, shows it.
     :param message: the outcome for people.
+    :param refused: whether the device answered with another result than ACCEPTED.
     :param permanent: whether the same request will fail again.
     :param contradicted: whether the device accepted it and then showed something else.
     :param superseded: whether the device accepted it, and a newer one was sent then.
@@ -186,6 +187,7 @@ class Result:
 
     success: bool
     message: str
+    refused: bool = False
     permanent: bool = False
     contradicted: bool = False
     superseded: bool = False
@@ -414,7 +416,7 @@ class Request(Generic[S]):
                       'earlier command', now)
         else:
             self._end(f'{"refused: " if answered else ""}{answer.describe()}', now,
-                      permanent=answered and answer.result in PERMANENT_RESULTS)
+                      refused=answered, permanent=answered and answer.result in PERMANENT_RESULTS)
 
     def _unconfirmed(self, now: float) -> None:
         name, kind = self._target.status_name, self._target.kind

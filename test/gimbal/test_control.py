@@ -39,7 +39,7 @@ from illuminator_ros.mavlink.messages import (
 from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.request import Done
 import pytest
-from support.gimbals import ALL, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
+from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
 
 CONFIGURE = GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
 NONE = Address(0, 0)
@@ -81,7 +81,8 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: Addr
 
 @pytest.mark.parametrize(('fields', 'text'), [
     ({'results': {CONFIGURE: MavResult.DENIED}},
-     'refused: MAV_RESULT_DENIED (1 try, 0 ms); primary 1/195, secondary none'),
+     'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
+     '1/195 has control and must release it first'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
     ({'reports': False}, 'a manager without GIMBAL_MANAGER_STATUS does not show'),
     ({'answers': False}, 'no acknowledgement')])
@@ -179,6 +180,20 @@ def test_control_is_not_known_while_the_manager_is_silent() -> None:
     assert 'not connected: nothing from manager 1/1' in asked(rig, Gimbal.take_control, 0.1)[1]
 
 
+@pytest.mark.parametrize(('primary', 'was_lost'), [(OURS, False), (NONE, True), (OTHER, True)])
+def test_control_after_a_silence_is_compared_with_control_before(
+        primary: Address, was_lost: bool) -> None:
+    rig = in_control()
+    rig.managers[0].alive = False
+    rig.run(4.0)
+    rig.managers[0].alive, rig.managers[0].primary = True, primary
+    rig.run(2.0)
+
+    assert rig.all_of(ControlChanged)[-1] == ControlChanged(
+        GimbalKey(DEVICE), Control(OURS), Control(primary if primary.system else None),
+        primary == OURS, was_lost)
+
+
 @pytest.mark.parametrize(('primary', 'taken'), [(NONE, True), (OTHER, False)])
 def test_control_is_taken_automatically_only_where_no_component_has_it(
         primary: Address, taken: bool) -> None:
@@ -191,8 +206,9 @@ def test_control_is_taken_automatically_only_where_no_component_has_it(
 def test_automatic_take_that_fails_is_told() -> None:
     rig = Rig(FakeManager(results={CONFIGURE: MavResult.DENIED}), auto_take_control=True).run(5.0)
 
-    assert [event.message.partition(' (')[0] for event in rig.all_of(AutomaticTakeFailed)] == [
-        'refused: MAV_RESULT_DENIED']
+    assert [event.message for event in rig.all_of(AutomaticTakeFailed)] == [
+        'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
+        'no component has control: the log of the manager may have the reason']
 
 
 def test_gm_19_ardupilot_is_not_taken_for_a_manager_that_enforces_control() -> None:
@@ -264,9 +280,30 @@ def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() ->
         195, 0, 154, 473977419, 85455938, 488.5)
     assert asked(rig, Gimbal.clear_roi)[0]
     assert commands(rig, GimbalCommand.DO_SET_ROI_NONE) == [(154, 0, 0, 0, 0, 0, 0)]
-    rig.managers[0].results[195] = MavResult.UNSUPPORTED
-    assert asked(rig, lambda gimbal, now, done: gimbal.set_roi(0, 0, 0, now, done))[1].startswith(
-        'MAV_RESULT_UNSUPPORTED')
+
+
+def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
+    gimbal.set_roi(47.0, 8.5, 500.0, now, done)
+
+
+@pytest.mark.parametrize(('ask', 'command', 'goal'), [
+    (FLAG_REQUESTS[2][0], GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 'yaw locked'),
+    (set_roi, GimbalCommand.DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),
+    (Gimbal.clear_roi, GimbalCommand.DO_SET_ROI_NONE, 'point at no place')])
+def test_refusal_names_the_request_the_manager_and_who_has_control(
+        ask: Ask, command: int, goal: str) -> None:
+    rig = in_control()
+    rig.managers[0].results[command] = MavResult.DENIED
+
+    refusal = f'manager 1/1 refused "{goal}": MAV_RESULT_DENIED (1 try, 0 ms); '
+    assert asked(rig, ask) == (
+        False, f'{refusal}this node has control: the log of the manager may have the reason')
+    # Another player takes control while the command is on its way.
+    ask(rig.gimbal, rig.now, rig.done)
+    rig.managers[0].primary = OTHER
+    rig.receive(AUTOPILOT, rig.managers[0].status())
+    rig.run(1.0)
+    assert rig.results[0].message.endswith('; 1/195 has control and must release it first')
 
 
 @pytest.mark.parametrize('ask', [

@@ -48,6 +48,7 @@ EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
 # 45 degrees down and 30 to the left of the vehicle, in ROS and in MAVLink.
 ROS_ANGLES = (0.0, math.radians(45), math.radians(30))
 TURNED = Quaternion.from_euler(*ROS_ANGLES)
+LOST = 'control of gimbal 1/154 lost: 1/195 has taken primary control'
 TRIGGERS = ('take_control', 'release_control', 'neutral', 'retract', 'clear_roi')
 
 
@@ -152,13 +153,16 @@ def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
     controller.wait_value('primary 1/195, secondary none')
     take_control(ros, gimbal)
     controller.wait_value('primary 1/194, secondary none')
-    lost = program.count('control of gimbal 1/154 lost: primary 1/195')
+    lost = program.count(LOST)
 
     gimbal.primary, gimbal.secondary = OTHER, OURS
     controller.wait_value('primary 1/195, secondary 1/194')
 
-    program.wait_for('control of gimbal 1/154 lost: primary 1/195', count=lost + 1)
+    program.wait_for(LOST, count=lost + 1)
     ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
+    take_control(ros, gimbal)
+    gimbal.primary = NOBODY
+    program.wait_for('control of gimbal 1/154 ended: no component has primary control')
 
 
 # Services
@@ -173,7 +177,7 @@ def test_gm_16_control_is_taken_and_released_by_services(
     gimbal.results[GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE] = MavResult.DENIED
     answer = trigger(ros, 'take_control')
     assert not answer.success
-    assert answer.message.startswith('refused: MAV_RESULT_DENIED')
+    assert answer.message.startswith('manager 1/1 refused "control taken": MAV_RESULT_DENIED')
 
 
 @pytest.mark.parametrize(('name', 'flag'), [
@@ -311,8 +315,15 @@ def report(ros: Ros, wanted: str) -> DiagnosticStatus:
     return found
 
 
+def logged(program: Program, flags: str) -> str:
+    """Return the level of the line about failure flags."""
+    text = f'gimbal 1/154: failure flags: {flags}'
+    program.wait_for(text)
+    return next(line for line in program.lines if text in line).split()[0]
+
+
 def test_diagnostics_name_flags_limits_identity_and_control(
-        ros: Ros, gimbal: FakeManager) -> None:
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:
     take_control(ros, gimbal)
     status = report(ros, 'in control')
     shown = {one.key: one.value for one in status.values}
@@ -327,8 +338,10 @@ def test_diagnostics_name_flags_limits_identity_and_control(
     status = report(ros, 'motor error')
     assert status.level == DiagnosticStatus.ERROR
     assert status.message == 'motor error; unknown flags 0x100000; at pitch limit'
+    assert logged(program, 'at pitch limit, motor error') == '[WARN]'
     gimbal.failure_flags, gimbal.q = 0, (NAN,) * 4
     assert report(ros, 'attitude unknown').level == DiagnosticStatus.WARN
+    assert logged(program, 'none') == '[INFO]'
     gimbal.reports = False
     assert report(ros, 'no GIMBAL_MANAGER_STATUS for').level == DiagnosticStatus.WARN
 
@@ -407,10 +420,19 @@ def test_lost_gimbal_is_reported(own_ros: Ros) -> None:
     with bridge(own_ros, manager) as program:
         connected = own_ros.subscribe(Bool, '/gimbal/connected')
         connected.wait_value(True)
+        manager.primary = OTHER
+        program.wait_for('control of gimbal 1/154: primary 1/195')
         manager.alive = manager.device_alive = False
         connected.wait_value(False)
         program.wait_for('gimbal 1/154 lost: nothing from')
         assert report(own_ros, 'nothing from').level == DiagnosticStatus.ERROR
+
+        controller = own_ros.subscribe(String, '/gimbal/controller')
+        controller.wait_value('unknown')
+        manager.alive = manager.device_alive = True
+        controller.wait_value('primary 1/195, secondary none')
+        # The same components are in control as before.
+        assert program.count('control of gimbal 1/154: ') == 1
 
 
 def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:

@@ -28,7 +28,7 @@ from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
-from support.gimbals import in_control, Rig
+from support.gimbals import FakeManager, in_control, OURS, Rig
 
 NAMES = ('safety', 'operator', 'default', 'autonomy')
 TIMEOUT = 2.0
@@ -119,6 +119,40 @@ def test_a_rate_ends_with_the_hold_of_its_source(end: Callable[[Rig], object]) -
     assert holder(rig) == ''
     assert [one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)] == [
         pytest.approx(-0.2), 0.0]
+
+
+@pytest.mark.parametrize('end', ENDS.values())
+def test_a_place_is_followed_no_more_after_the_hold_of_its_source(
+        end: Callable[[Rig], object]) -> None:
+    rig = shared()
+    rig.gimbal.claim('safety', rig.now)
+    rig.gimbal.set_roi(47.0, 8.0, 500.0, rig.now, rig.done)
+    rig.run(1.0)
+    assert not rig.messages(GimbalManagerSetAttitude)
+    end(rig)
+    rig.run(1.0)
+
+    # As at the end of a rate: the gimbal stops where it points.
+    assert holder(rig) == ''
+    [stop] = rig.messages(GimbalManagerSetAttitude)
+    assert (stop.angular_velocity_x, stop.angular_velocity_y, stop.angular_velocity_z) == (0, 0, 0)
+
+
+def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> None:
+    rig = Rig(*(FakeManager(device_id=number, primary=OURS) for number in (1, 2)),
+              sources=SourceSettings(NAMES, TIMEOUT)).run(4.0)
+    first, second = rig.client.gimbals.values()
+    rig.managers[0].answers = rig.managers[1].answers = False
+    for gimbal in (first, second):
+        gimbal.claim('autonomy', rig.now)
+        gimbal.clear_roi(rig.now, rig.done)
+    first.claim('safety', rig.now)
+    rig.run(0.1)
+
+    assert len(rig.results) == 1
+    rig.managers[1].answers = True
+    rig.run(2.0)
+    assert [one.success for one in rig.results] == [False, True]
 
 
 def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:

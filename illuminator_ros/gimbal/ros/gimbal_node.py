@@ -167,11 +167,14 @@ class GimbalNode:
         self._host.check_diagnostics()
 
     def _control_changed(self, name: str, event: events.ControlChanged) -> None:
-        if event.was_lost:
-            self._log.warning(f'control of {name} lost: {event.after}; setpoints have stopped, '
+        after = event.after
+        if after is not None and event.was_lost:
+            reason = (f'lost: {after.primary} has taken primary control' if after.primary else
+                      'ended: no component has primary control')
+            self._log.warning(f'control of {name} {reason}; setpoints have stopped, '
                               '~/take_control takes it back', 'control')
-        elif event.after is not None:
-            self._log.info(f'control of {name}: {event.after}', 'control')
+        elif after is not None and after != event.before:
+            self._log.info(f'control of {name}: {after}', 'control')
         self._publish_control(event.after, event.ours)
 
     def _publish_control(self, control: Control | None, ours: bool) -> None:
@@ -192,9 +195,10 @@ class GimbalNode:
             self._yaw_lock = lock
             publish('yaw_lock', lock)
         if event.errors != self._errors:
+            log = self._log.warning if event.errors & ~self._errors else self._log.info
             self._errors = event.errors
             names = ', '.join(flag_names(event.errors)) or 'none'
-            self._log.warning(f'gimbal {event.key}: failure flags: {names}', 'flags')
+            log(f'gimbal {event.key}: failure flags: {names}', 'flags')
             self._host.check_diagnostics()
 
     # Requests
