@@ -27,7 +27,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
-from .entry_point import discard_output, one_line, run_program
+from .entry_point import one_line, print_output, run_program
 from .payloads import PAYLOADS
 from .termination import Termination
 from ..payload.payload_type import PayloadType
@@ -62,14 +62,7 @@ class Executable:
 
     def show(self, text: str) -> int:
         """Print a text, and return the exit status."""
-        try:
-            print(text, end='', flush=True)
-        except OSError as error:
-            discard_output()
-            if not isinstance(error, BrokenPipeError):
-                print(f'{self.name}: standard output: {error.strerror}', file=sys.stderr)
-                return 1
-        return 0
+        return 0 if print_output(self.refuse, text, end='') else 1
 
     def refuse(self, reason: str) -> int:
         """Say in one line what is wrong with the command line, and return the exit status."""

@@ -75,6 +75,25 @@ def explained(name: str, run: Callable[[], int]) -> int:
         return 1
 
 
+def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n') -> bool:
+    """
+    Print texts, so that a reader at the other end of a pipe sees them immediately.
+
+    A reader that closes a pipe wants no more.
+
+    :param complain: takes the reason why they cannot be written, once.
+    :return: whether they were written, or are not wanted.
+    """
+    try:
+        print(*texts, sep='\n', end=end, flush=True)
+    except OSError as error:
+        discard_output()
+        if not isinstance(error, BrokenPipeError):
+            complain(f'standard output: {error.strerror}')
+            return False
+    return True
+
+
 def discard_output() -> None:
     """Discard what is still to be written to stdout, at the exit too."""
     with open(os.devnull, 'wb') as nowhere:

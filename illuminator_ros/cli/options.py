@@ -22,7 +22,7 @@ import sys
 import time
 from typing import NoReturn, TYPE_CHECKING, TypeVar
 
-from .entry_point import discard_output
+from .entry_point import print_output
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, TimestampStore
@@ -45,12 +45,7 @@ class Parser(argparse.ArgumentParser):
         if file is not sys.stdout or sys.stdout is None:
             super()._print_message(message, file)
             return
-        try:
-            print(message, end='', flush=True)
-        except OSError as error:
-            discard_output()
-            if not isinstance(error, BrokenPipeError):
-                self.exit(1, f'{self.prog}: standard output: {error.strerror}\n')
+        print_output(lambda reason: self.exit(1, f'{self.prog}: {reason}\n'), message, end='')
 
 
 def option(read: Callable[[str], T]) -> Callable[[str], T]:

@@ -315,12 +315,6 @@ class SimulatedGimbal(simulated.SimulatedDevice):
             return self.mount.information(self.behaviour, now)
         return None
 
-    def execute(
-        self, source: Address, command: simulated.AnyCommand, now: float,
-    ) -> simulated.Reply:
-        """See :meth:`SimulatedDevice.execute`: no command moves a device."""
-        return None
-
     def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
         self._expire(now)

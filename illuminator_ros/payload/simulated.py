@@ -130,13 +130,13 @@ class SimulatedDevice(ABC):
     def set_clock(self, unix_time: float, now: float) -> None:  # noqa: B027 - optional
         """Take the time of day (s, UTC), as from a GPS receiver of its own."""
 
-    @abstractmethod
     def streams(self) -> Mapping[int, float]:
         """Return the default interval (s, 0 for none) of each streamed message, by message id."""
+        return {}
 
-    @abstractmethod
     def message(self, message_id: int, now: float) -> Message | None:
         """Return a message of this moment, None if the device does not have it."""
+        return None
 
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """Take a message of one of the classes of ``messages``; return the messages to send."""
@@ -154,9 +154,9 @@ class SimulatedDevice(ABC):
         """Return when :meth:`poll` is due, s."""
         return math.inf
 
-    @abstractmethod
     def execute(self, source: Address, command: AnyCommand, now: float) -> Reply:
         """Return the reply to a command from an address, None if it is not supported."""
+        return None
 
     @abstractmethod
     def snapshot(self, now: float) -> Snapshot:

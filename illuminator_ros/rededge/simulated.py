@@ -340,20 +340,6 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         """Set the position of its own GPS receiver, None without a fix."""
         self.own_gps = place
 
-    def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
-        return {}
-
-    def message(self, message_id: int, now: float) -> Message | None:
-        """See :meth:`SimulatedDevice.message`."""
-        return None
-
-    def execute(
-        self, source: Address, command: simulated.AnyCommand, now: float,
-    ) -> simulated.Reply:
-        """See :meth:`SimulatedDevice.execute`; it has no commands."""
-        return None
-
     def sender(self, message: Message, own: Address) -> Address:
         """See :meth:`SimulatedDevice.sender`."""
         if isinstance(message, rededge.Ping):

@@ -20,6 +20,7 @@ import argparse
 from collections.abc import Sequence
 import contextlib
 import errno
+import functools
 import logging
 import os
 from pathlib import Path
@@ -32,7 +33,7 @@ import time
 from types import FrameType
 from typing import Any
 
-from ..entry_point import discard_output
+from ..entry_point import print_output
 from ..options import (
     add_mavlink_version,
     add_signing,
@@ -323,15 +324,5 @@ def _complain(text: str) -> None:
             os.write(2, f'conformance: {text}\n'.encode())
 
 
-def _print(*texts: str, end: str = '\n') -> bool:
-    """Print and return True; if that fails, report it once and go on, to restore the device."""
-    try:
-        # Flushed, so that a reader at the other end of a pipe sees it immediately.
-        print(*texts, sep='\n', end=end, flush=True)
-    except BrokenPipeError:
-        discard_output()
-    except OSError as error:
-        _complain(f'standard output: {error.strerror}')
-        discard_output()
-        return False
-    return True
+# A failure is reported once, and the run goes on, to restore the device.
+_print = functools.partial(print_output, _complain)

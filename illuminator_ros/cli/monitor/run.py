@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import io
 import sys
 import threading
 import time
@@ -35,7 +36,7 @@ from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
 from .ros_graph import Graph
 from .view import plain, screen, ViewState
-from ..entry_point import discard_output, one_line
+from ..entry_point import one_line, print_output
 from ..options import option, Parser
 from ..termination import Termination
 from ... import __version__
@@ -202,19 +203,9 @@ def _print_once(monitor: Monitor, options: argparse.Namespace, termination: Term
     if not lights:
         print('monitor: no lights found', file=sys.stderr)
         return 1
-    console = Console(width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True)
-    status = 0
-    try:
-        with console.capture() as captured:
-            console.print(plain(ViewState(lights, None, monitor.clock())))
-        for line in captured.get().splitlines():
-            print(line.rstrip())
-        sys.stdout.flush()
-    except OSError as error:
-        # A reader that closes a pipe wants no more.
-        if not isinstance(error, BrokenPipeError):
-            print(f'monitor: standard output: {error.strerror}', file=sys.stderr)
-            status = 1
-        # The interpreter would report it again at its exit.
-        discard_output()
-    return status
+    table = io.StringIO()
+    Console(file=table, width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True
+            ).print(plain(ViewState(lights, None, monitor.clock())))
+    written = print_output(lambda reason: print(f'monitor: {reason}', file=sys.stderr),
+                           *(line.rstrip() for line in table.getvalue().splitlines()))
+    return 0 if written else 1
