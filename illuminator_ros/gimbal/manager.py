@@ -260,7 +260,7 @@ class GimbalManager(Payload):
     def status(self, now: float) -> GimbalManagerStatus:
         """Return the message that tells who is in control."""
         setpoint, device = self._setpoint, self._device_status(now)
-        flags = MountFlags(0) if setpoint is None else setpoint.device_flags
+        flags = 0 if setpoint is None else setpoint.device_flags
         accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
         primary, secondary = (self.control.holder(role) or Address(0, 0) for role in Role)
         return GimbalManagerStatus(
@@ -360,7 +360,7 @@ class GimbalManager(Payload):
         except ValueError:
             self._attitude = None
         if not self.has_mavlink and self.state is ManagerState.ACTIVE:
-            flags = MountFlags(0) if self._setpoint is None else self._setpoint.operation
+            flags = 0 if self._setpoint is None else self._setpoint.operation
             self._commands.send(replace(
                 status, flags=int(status.flags | flags), gimbal_device_id=self.device_id,
                 failure_flags=status.failure_flags | self._limits_reached))
@@ -533,7 +533,7 @@ class GimbalManager(Payload):
                 self.events.emit(SetpointClipped(tuple(clipped)))
         sent = setpoint
         if attitude is not setpoint.attitude:
-            sent = replace(setpoint, attitude=attitude, turning=STILL)
+            sent = setpoint._replace(attitude=attitude, turning=STILL)
         if converts:
             if heading is None:
                 self._lose('heading', now)
@@ -683,7 +683,7 @@ class GimbalManager(Payload):
 def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttitude:
     attitude = setpoint.attitude
     q = UNSET_QUATERNION if attitude is None else (attitude.w, attitude.x, attitude.y, attitude.z)
-    return GimbalDeviceSetAttitude(*device, int(setpoint.device_flags), q, *setpoint.rates)
+    return GimbalDeviceSetAttitude(*device, setpoint.device_flags, q, *setpoint.rates)
 
 
 def _params(command: AnyCommand) -> tuple[Sequence[float], int]:

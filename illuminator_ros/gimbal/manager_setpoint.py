@@ -22,8 +22,7 @@ vehicle's heading, as the :class:`~..payload.mount_attitude.YawFrame` says.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
@@ -51,9 +50,10 @@ from ..payload.rotation import Quaternion, Vector
 # The attitude is set by the flag alone.
 POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
 # Flags that GIMBAL_DEVICE_SET_ATTITUDE passes on; those of the yaw frame are set by its value.
-_PASSED_ON = (POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
-              | MountFlags.RC_MIXED)
-_PASSED_BITS = int(_PASSED_ON)
+# An operation on an IntFlag takes ten times as long as on an int.
+_PASSED_BITS = int(POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
+                   | MountFlags.RC_MIXED)
+_POSE_BITS = int(POSES)
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
 # The capability that a flag needs.
@@ -110,10 +110,10 @@ class GimbalModel:
             capabilities |= Capabilities(0) if range_.is_fixed else flag
         return cls(capabilities, ranges)
 
-    def lacks(self, flags: MountFlags) -> MountFlags:
+    def lacks(self, flags: int) -> MountFlags:
         """Return those of the flags that the gimbal cannot follow."""
         lacking = MountFlags(0)
-        if not int(flags) & _NEEDING:
+        if not flags & _NEEDING:
             return lacking
         for flag, needed in _NEEDED.items():
             if flags & flag and self.capabilities and not self.capabilities & needed:
@@ -133,42 +133,46 @@ class GimbalModel:
         return bool(self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """
     A player's request, as one message or command has it.
 
+    :param flags: :class:`~..payload.mount_attitude.MountFlags`.
+    :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
     :param rates: of the axes, rad/s; NaN where none is given.
     :param attitude: replaces the angles, None if none is given.
-    :raises ValueError: if the flags name both yaw frames, or a value is infinite.
     """
 
-    flags: MountFlags = MountFlags(0)
+    flags: int = 0
+    frame: YawFrame = YawFrame.VEHICLE
     angles: Vector = UNSET_VECTOR
     rates: Vector = UNSET_VECTOR
     attitude: Quaternion | None = None
 
-    def __post_init__(self) -> None:
-        self.frame  # noqa: B018 - raises an exception
-        if any(map(math.isinf, (*self.angles, *self.rates))):
-            raise ValueError('an angle or a rate is infinite')
-
-    @cached_property
-    def frame(self) -> YawFrame:
-        """Return the frame of its yaw."""
-        return yaw_frame(self.flags)
-
     @property
     def is_complete(self) -> bool:
         """Whether the attitude that follows depends on nothing else."""
-        return (bool(self.flags & POSES) or self.attitude is not None
+        return (bool(self.flags & _POSE_BITS) or self.attitude is not None
                 or all(map(math.isfinite, self.angles)))
 
     @property
     def target(self) -> Vector:
         """Return roll, pitch and yaw of the attitude or the angles, rad; NaN where none is."""
         return self.angles if self.attitude is None else self.attitude.euler()
+
+    @classmethod
+    def _checked(
+        cls, flags: int, angles: Vector, rates: Vector, attitude: Quaternion | None = None,
+    ) -> Demand:
+        """
+        Return a demand with the yaw frame that its flags name.
+
+        :raises ValueError: if they name both, or a value is infinite.
+        """
+        if any(map(math.isinf, angles)) or any(map(math.isinf, rates)):
+            raise ValueError('an angle or a rate is infinite')
+        return cls(flags, yaw_frame(flags), angles, rates, attitude)
 
     @classmethod
     def from_attitude(
@@ -179,9 +183,9 @@ class Demand:
 
         :raises ValueError: if the quaternion is not a rotation, or see above.
         """
-        return cls(MountFlags(message.flags), rates=(
+        return cls._checked(message.flags, UNSET_VECTOR, (
             message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
-            attitude=_attitude(message.q))
+            _attitude(message.q))
 
     @classmethod
     def from_pitch_yaw(
@@ -193,7 +197,7 @@ class Demand:
         :raises ValueError: see above.
         """
         roll = math.nan if math.isnan(pitch) and math.isnan(yaw) else 0.0
-        return cls(MountFlags(flags), (roll, pitch, yaw), (math.nan, pitch_rate, yaw_rate))
+        return cls._checked(flags, (roll, pitch, yaw), (math.nan, pitch_rate, yaw_rate))
 
     @classmethod
     def from_manual_control(
@@ -239,8 +243,7 @@ def _attitude(q: Components) -> Quaternion | None:
     return None if all(map(math.isnan, q)) else Quaternion(*q).normalized()
 
 
-@dataclass(frozen=True)
-class Setpoint:
+class Setpoint(NamedTuple):
     """
     The setpoint of a gimbal.
 
@@ -250,7 +253,7 @@ class Setpoint:
     :param since: when the attitude applies, s.
     """
 
-    flags: MountFlags
+    flags: int
     frame: YawFrame
     attitude: Quaternion | None
     rates: Vector = UNSET_VECTOR
@@ -260,7 +263,7 @@ class Setpoint:
     @property
     def is_pose(self) -> bool:
         """Whether a flag alone sets the attitude."""
-        return bool(self.flags & POSES)
+        return bool(self.flags & _POSE_BITS)
 
     @property
     def moves(self) -> bool:
@@ -276,15 +279,14 @@ class Setpoint:
             self.turning))
 
     @property
-    def operation(self) -> MountFlags:
+    def operation(self) -> int:
         """Return the flags without those of the yaw frame."""
-        return self.flags & _PASSED_ON
+        return self.flags & _PASSED_BITS
 
     @property
-    def device_flags(self) -> MountFlags:
+    def device_flags(self) -> int:
         """Return the flags for the device."""
-        # An operation on an IntFlag takes ten times as long as on an int.
-        return MountFlags(int(self.flags) & _PASSED_BITS | int(self.frame.flag))
+        return self.flags & _PASSED_BITS | int(self.frame.flag)
 
 
 def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> Setpoint:
@@ -296,7 +298,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     :param turns: whether the manager must turn the gimbal where only rates are given.
     """
     flags, frame = demand.flags, demand.frame
-    if flags & POSES:
+    if flags & _POSE_BITS:
         return Setpoint(flags, frame, None, since=now)
     if demand.attitude is not None:
         return Setpoint(flags, frame, demand.attitude, demand.rates, since=now)
@@ -322,8 +324,9 @@ def stopped(setpoint: Setpoint, now: float) -> Setpoint:
     if setpoint.is_pose:
         return setpoint
     attitude = setpoint.at(now)
-    return replace(setpoint, attitude=attitude, turning=STILL, since=now,
-                   rates=STILL if attitude is None else UNSET_VECTOR)
+    return setpoint._replace(
+        attitude=attitude, turning=STILL, since=now,
+        rates=STILL if attitude is None else UNSET_VECTOR)
 
 
 def nudge(demand: Demand, limit: float) -> Vector:
@@ -357,19 +360,18 @@ def clip(
     :param offset: the direction from which the range of the yaw counts, rad in the frame of the
         attitude; None where it is not known, which leaves the yaw as it is.
     """
-    roll, pitch, yaw = attitude.euler()
     clipped = []
-    angles = [roll, pitch, yaw]
-    for index, (axis, range_) in enumerate(zip(AXES, ranges, strict=True)):
-        zero = offset if axis == 'yaw' else 0.0
+    angles = list(attitude.euler())
+    for index, range_ in enumerate(ranges):
+        zero = offset if index == 2 else 0.0
         if (zero is None or range_.low <= angles[index] - zero <= range_.high
-                or range_.high - range_.low >= 2 * math.pi - 1e-6):
+                or range_.is_endless):
             continue
         asked = _nearest(angles[index] - zero, range_)
-        limit = max(range_.low, min(range_.high, asked))
+        limit = range_.clip(asked)
         # A difference by float32 rounding does not count.
         if abs(limit - asked) > 1e-5:
-            clipped.append(Clipped(axis, asked, limit))
+            clipped.append(Clipped(AXES[index], asked, limit))
             angles[index] = limit + zero
     return (_from_angles(angles), clipped) if clipped else (attitude, [])
 
@@ -382,8 +384,8 @@ def _nearest(angle: float, range_: Range) -> float:
 
 def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:
     """Return a setpoint with its yaw relative to the vehicle instead of north."""
-    return replace(
-        setpoint, frame=YawFrame.VEHICLE, flags=setpoint.flags & ~MountFlags.YAW_LOCK,
+    return setpoint._replace(
+        frame=YawFrame.VEHICLE, flags=setpoint.flags & ~MountFlags.YAW_LOCK,
         attitude=setpoint.attitude and turned_by(setpoint.attitude, -heading))
 
 

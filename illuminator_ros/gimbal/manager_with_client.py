@@ -38,6 +38,8 @@ from ..payload.messages import GimbalDeviceAttitudeStatus
 
 T = TypeVar('T')
 
+_FOR_CLIENT = frozenset(GimbalClient.messages)
+
 
 class ManagerWithClient(Payload):
     """
@@ -77,7 +79,7 @@ class ManagerWithClient(Payload):
             self._own.acknowledge(source, message, now)
         else:
             self._manage(self.manager.receive, source, message, now)
-            if source == self.manager.device and isinstance(message, GimbalClient.messages):
+            if source == self.manager.device and type(message) in _FOR_CLIENT:
                 self.client.receive(source, message, now)
         self._serve_client(now)
 
@@ -127,7 +129,7 @@ class ManagerWithClient(Payload):
         before = len(outgoing)
         result = call(*arguments)
         for _, message in list(islice(outgoing, before, None)):
-            if isinstance(message, GimbalClient.messages):
+            if type(message) in _FOR_CLIENT:
                 self.client.receive(self._commands.address, message, arguments[-1])
         return result
 

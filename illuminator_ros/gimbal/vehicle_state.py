@@ -37,14 +37,17 @@ class _Latest(Generic[T]):
     """The latest values of the link and of ROS; the value of the link comes first."""
 
     def __init__(self) -> None:
-        self._values: dict[bool, tuple[T, float]] = {}
+        # Of ROS, and of the link.
+        self._values: list[tuple[T | None, float]] = [(None, -math.inf)] * 2
 
     def set(self, value: T, now: float, *, link: bool) -> None:  # noqa: A003
         self._values[link] = value, now
 
     def get(self, now: float) -> T | None:
-        return next((value for link in (True, False) if link in self._values
-                     for value, at in (self._values[link],) if now < at + MAX_AGE), None)
+        for value, at in reversed(self._values):
+            if now < at + MAX_AGE:
+                return value
+        return None
 
 
 class VehicleState:
