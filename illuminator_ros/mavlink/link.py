@@ -402,20 +402,19 @@ class Link:
 
     def _flush(self) -> None:
         """Send the messages of the endpoint; without a channel they are dropped."""
-        outgoing, dropped = self.endpoint.outgoing, self._streams.dropped
+        outgoing, streams = self.endpoint.outgoing, self._streams
+        dropped = streams.dropped
         if outgoing:
             now = self.clock()
-            urgent = deque(one for one in outgoing if not self._streams.hold(*one, now))
+            urgent = [one for one in outgoing if not streams.hold(*one, now)]
             outgoing.clear()
-            if any(getattr(message, 'target_system', 0) for _, message in urgent):
-                self._hurry_until = now + HURRY
-            self._send_messages(urgent)
-        while self._streams and self._stream_due() <= self.clock():
-            self._send_messages(deque(self._streams.take(self.clock())))
-        self._traffic.frames_dropped += self._streams.dropped - dropped
+            self._send_messages(urgent, now)
+        while streams and self._stream_due() <= (now := self.clock()):
+            self._send_messages(streams.take(now), now)
+        self._traffic.frames_dropped += streams.dropped - dropped
         if self._channel is None:
             outgoing.clear()
-            self._streams.clear()
+            streams.clear()
 
     def _stream_due(self) -> float:
         """Return when messages of streams can be sent, infinity if the channel will tell."""
@@ -423,26 +422,24 @@ class Link:
             return math.inf
         return self._line_free_at - (URGENT_AHEAD if self._streams.is_urgent else AHEAD)
 
-    def _send_messages(self, messages: deque[tuple[Address, Message]]) -> None:
-        while messages and self._channel is not None:
-            channel, now = self._channel, self.clock()
-            all_peers = channel.peers(now)
-            # Frames for the same peers are sent together: each receiver is then woken only once.
-            frames: list[bytes] = []
-            peers: Sequence[Peer] = ()
-            while messages:
-                source, message = messages[0]
-                towards = self._router.towards(message, all_peers, now)
-                if frames and towards != peers:
-                    break
-                peers = towards
-                messages.popleft()
-                self._write(frames, source, message, now)
-            try:
-                if frames:
-                    self._send(channel, frames, peers)
-            except OSError as error:
-                self._lost(error)
+    def _send_messages(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
+        if self._channel is None:
+            return
+        all_peers = self._channel.peers(now)
+        # Frames for the same peers are sent together: each receiver is then woken only once.
+        frames: list[bytes] = []
+        peers: Sequence[Peer] = ()
+        for source, message in messages:
+            if getattr(message, 'target_system', 0):
+                self._hurry_until = now + HURRY
+            towards = self._router.towards(message, all_peers, now)
+            if frames and towards != peers:
+                self._send(frames, peers, now)
+                frames = []
+            peers = towards
+            self._write(frames, source, message, now)
+        if frames:
+            self._send(frames, peers, now)
 
     def _write(self, frames: list[bytes], source: Address, message: Message, now: float) -> None:
         try:
@@ -455,15 +452,21 @@ class Link:
                                for part in ('system', 'component')))
                 _frame_log.debug('sent from %s: %s', source, message, extra={'address': to})
 
-    def _send(self, channel: Channel, frames: list[bytes], peers: Sequence[Peer]) -> None:
-        now = self.clock()
+    def _send(self, frames: Sequence[bytes], peers: Sequence[Peer], now: float) -> None:
+        channel = self._channel
+        if channel is None:
+            return
+        dropped, size = channel.dropped, sum(map(len, frames))
+        try:
+            channel.send(frames, peers)
+        except OSError as error:
+            self._lost(error)
+            return
         self._traffic_seen(now)
-        dropped = channel.dropped
-        channel.send(frames, peers)
-        self._line_free_at = max(now, self._line_free_at) + sum(map(len, frames)) / channel.rate
+        self._line_free_at = max(now, self._line_free_at) + size / channel.rate
         self._traffic.frames_dropped += channel.dropped - dropped
         self._traffic.frames_sent += len(frames) * len(peers)
-        self._traffic.bytes_sent += sum(map(len, frames)) * len(peers)
+        self._traffic.bytes_sent += size * len(peers)
 
     def _connect(self, now: float) -> None:
         try:
