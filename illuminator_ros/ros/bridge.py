@@ -39,8 +39,8 @@ from .parameters import (
     given_parameters,
     ignored_sections,
     LinkParameters,
-    misspelt,
     ParameterError,
+    unknown_parameters,
 )
 from .payload import Host, RosPayload, ServedPayload
 from .throttled_log import LogForwarder, NodeLog
@@ -125,7 +125,8 @@ class Bridge:
             if own is not node:
                 self._executor.add_node(own)
         names = [one.get_fully_qualified_name() for one in self._own_nodes]
-        for warning in (*misspelt(node), *ignored_sections(arguments, names, self._may_name)):
+        for warning in (*unknown_parameters(self._own_nodes, arguments),
+                        *ignored_sections(arguments, names, self._may_name)):
             self.log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 import difflib
 import math
@@ -270,12 +270,44 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
             'holds the parameters given on the command line') from None
 
 
-def misspelt(node: Node) -> list[str]:
-    """Return a warning for each given parameter that resembles one of the node's."""
-    known = list(node.list_parameters([], 0).names)
-    return [f'parameter {name!r} is unknown and ignored; did you mean {close[0]!r}?'
-            for name in given_parameters(node) if not node.has_parameter(name)
-            if (close := difflib.get_close_matches(name, known, 1, 0.75))]
+def unknown_parameters(nodes: Sequence[Node], arguments: Sequence[str]) -> list[str]:
+    """
+    Return a warning for each parameter that is given and unknown.
+
+    A section with a wildcard that has no parameter of ours is meant for other nodes: its
+    parameters are unknown only if they resemble one of ours.
+
+    :param nodes: those that exist at the start.
+    """
+    known = {name for node in nodes for name in node.list_parameters([], 0).names}
+    given = dict.fromkeys(name for node in nodes for name in given_parameters(node))
+    others = {name for _, section, values in _files(arguments)
+              if not _WILDCARDS.keys().isdisjoint(section) and known.isdisjoint(values - _OF_RCLPY)
+              for name in values}
+    return [_unknown(name, close) for name in given if name not in known
+            if (close := difflib.get_close_matches(name, known, 1, 0.75))
+            or name.partition('.')[0] not in {*others, 'qos_overrides'}]
+
+
+def ignored_parameters(node: Node, first: Node) -> list[str]:
+    """Return a warning for each parameter that is given for a further node and has no effect."""
+    warnings = []
+    for name, parameter in given_parameters(node).items():
+        if node.has_parameter(name):
+            continue
+        if not first.has_parameter(name):
+            if name not in given_parameters(first):
+                warnings.append(_unknown(name, difflib.get_close_matches(
+                    name, node.list_parameters([], 0).names, 1, 0.75)))
+        elif parameter.value != first.get_parameter(name).value:
+            warnings.append(f'parameter {name!r} is ignored here: that of '
+                            f'{first.get_fully_qualified_name()} holds')
+    return warnings
+
+
+def _unknown(name: str, close: Sequence[str]) -> str:
+    hint = f'; did you mean {close[0]!r}?' if close else ''
+    return f'parameter {name!r} is unknown and ignored{hint}'
 
 
 def ignored_sections(
@@ -287,13 +319,9 @@ def ignored_sections(
     :param names: fully qualified, of the nodes that exist.
     :param may_name: whether a node that is made later may have a name, without namespace.
     """
-    files = [path for option, path in zip(arguments, arguments[1:], strict=False)
-             if option == '--params-file']
-    sections = [(path, section) for path in files
-                for section in _sections(yaml.safe_load(Path(path).read_text(encoding='utf-8')))]
     namespace = names[0].rpartition('/')[0]
     warnings = []
-    for path, section in sections:
+    for path, section, _ in _files(arguments):
         *_, last = section
         later = [f'{namespace}/{last}'] if may_name(last) else []
         pattern = ''.join(_WILDCARDS.get(part, '/' + re.escape(part)) for part in section)
@@ -303,18 +331,27 @@ def ignored_sections(
     return warnings
 
 
+# Parameters that each node of rclpy has.
+_OF_RCLPY = {'use_sim_time', 'start_type_description_service'}
 # Of parts of a name in a parameter file (rcl_yaml_param_parser).
 _WILDCARDS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
 
 
-def _sections(content: object) -> Iterator[tuple[str, ...]]:
-    """Return the name of each section, in parts."""
+def _files(arguments: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], Set[str]]]:
+    """Return path, name in parts and parameters of each section of the parameter files."""
+    for option, path in zip(arguments, arguments[1:], strict=False):
+        if option == '--params-file':
+            content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+            yield from ((path, *section) for section in _sections(content))
+
+
+def _sections(content: object) -> Iterator[tuple[tuple[str, ...], Set[str]]]:
     for key, below in content.items() if isinstance(content, Mapping) else ():
         if key == 'ros__parameters':
-            yield ()
+            yield (), below.keys() if isinstance(below, Mapping) else set()
         else:
             parts = [part for part in str(key).split('/') if part]
-            yield from ((*parts, *rest) for rest in _sections(below))
+            yield from (((*parts, *rest), values) for rest, values in _sections(below))
 
 
 class DeviceParameters:

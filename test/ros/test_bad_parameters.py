@@ -129,24 +129,31 @@ def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
         'is /illuminator'] * is_ignored
 
 
-def test_misspelt_names_are_warned_about_and_parameters_of_other_nodes_are_not(
+def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
     ros: Ros, tmp_path: Path,
 ) -> None:
     file = tmp_path / 'shared.yaml'
-    file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false}}\n'
+    file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false,\n'
+                    '  qos_overrides: {/tf: {publisher: {depth: 1}}}}}\n'
+                    '/*: {ros__parameters: {status_interval: 1.0, azimuth: 3}}\n'
+                    'illuminator: {ros__parameters: {elevation: 3}}\n'
                     'boat: {illuminator: {ros__parameters: {brightness: 40}}}\n'
                     'illuminator_1_244: {ros__parameters: {brightness: 40}}\n'
                     'belly: {ros__parameters: {brightness: 40}}')
     misspelt = {'brightnes': 'brightness', 'conection_url': 'connection_url',
                 'target_sytem': 'target_system', 'strobe_periode': 'strobe_period'}
-    given = {'names': '[1/244=belly]', **dict.fromkeys(misspelt, 1)}
+    # Without a similar name: on the command line, in our section, and beside one of ours.
+    unknown = ('zoom', 'elevation', 'azimuth')
+    given = {'names': '[1/244=belly]', **dict.fromkeys([*misspelt, 'zoom'], 1)}
     with running_bridge(ros.domain, free_port(), '--params-file', str(file),
                         **cast(dict[str, Any], given)) as bridge:
         for wrong, right in misspelt.items():
             bridge.wait_for(
                 f"parameter '{wrong}' is unknown and ignored; did you mean '{right}'?")
         bridge.wait_for('the section boat/illuminator matches no node and is ignored')
-        assert bridge.count('WARN') == len(misspelt) + 1
+        for name in unknown:
+            assert bridge.count(f"parameter '{name}' is unknown and ignored") == 1
+        assert bridge.count('WARN') == len(misspelt) + len(unknown) + 1, bridge.log
 
 
 def test_off_as_yaml_reads_it_and_integers_for_doubles_are_accepted(ros: Ros) -> None:

@@ -145,6 +145,6 @@ def test_each_node_takes_its_own_section_of_a_parameter_file_but_for_link_parame
     Parameters(own_ros, '/illuminator').wait(brightness=30.0, mode='internal_control')
     Parameters(own_ros, '/illuminator_1_244').wait(
         brightness=40.0, mode='external_sync', frame_id='stern')
-    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is of the link, and ignored "
-                    'here: that of /illuminator holds')
+    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is ignored here: that of "
+                    '/illuminator holds')
     assert bridge.count('ignored here') == 1

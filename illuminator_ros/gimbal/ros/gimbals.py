@@ -30,7 +30,7 @@ from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
 from ..gimbal import GimbalSettings
 from ...payload.request import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
-from ...ros.parameters import misspelt, ParameterSpec, Values
+from ...ros.parameters import ignored_parameters, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.throttled_log import NodeLog
 
@@ -117,7 +117,7 @@ class Gimbals(ServedPayload):
         log = NodeLog(node.get_logger())
         gimbal_node = GimbalNode(node, self._host, log, self._client, self._settings,
                                  self._why_none)
-        for warning in misspelt(node):
+        for warning in ignored_parameters(node, self._host.node):
             log.warning(warning)
         self._host.log.info(f'gimbal {key} is served by {gimbal_node.full_name}', 'served')
         self._host.link.call(lambda now: self._bind(gimbal_node, key, now))

@@ -35,7 +35,7 @@ from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.link_call import LatestOnly
 from ...ros.node import Answer, CommandTopic, RequestService
-from ...ros.parameters import misspelt, Values
+from ...ros.parameters import ignored_parameters, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.throttled_log import NodeLog
 
@@ -114,7 +114,7 @@ class Lights(ServedPayload):
         log = NodeLog(node.get_logger())
         geometry = self._geometry.declare(node)
         light_node = LightNode(node, self._host, log, self._client, geometry)
-        for warning in (*parameters.ignored_parameters(node, self._host.node), *misspelt(node)):
+        for warning in ignored_parameters(node, self._host.node):
             log.warning(warning)
         self._host.log.info(f'light {address} is served by {light_node.full_name}', 'served')
         self._host.link.call(lambda now: self._bind(light_node, address, now))

@@ -29,7 +29,6 @@ from ...mavlink.messages import Address
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.parameters import (
     declare_read_only,
-    given_parameters,
     ParameterError,
     ParameterSpec,
     Values,
@@ -111,15 +110,6 @@ class BeamGeometry:
         """
         return BeamGeometry.of(declare_read_only(
             node, (spec for spec in LIGHT_PARAMETERS if spec.name in _GEOMETRY), vars(self)))
-
-
-def ignored_parameters(node: Node, first: Node) -> list[str]:
-    """Return a warning for each parameter that is given for a further node and has no effect."""
-    given = given_parameters(node)
-    return [f'parameter {name!r} is of the link, and ignored here: that of '
-            f'{first.get_fully_qualified_name()} holds' for name, parameter in given.items()
-            if not node.has_parameter(name) and first.has_parameter(name)
-            and parameter.value != first.get_parameter(name).value]
 
 
 def settings(values: Values) -> Settings:
