@@ -21,11 +21,14 @@ for a second makes nothing time out; a test that wants something to time out set
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+import contextlib
+import fcntl
 import mmap
 import os
 from pathlib import Path
 import selectors
+import threading
 import time
 from typing import Any
 
@@ -39,22 +42,37 @@ LOOK_INTERVAL = 0.05
 # s on the clock at its beginning: 0 as a time is found out.
 START = 1000.0
 VARIABLE = 'ILLUMINATOR_ROS_TEST_CLOCK'
+# Links at a time that live by the clock.
+LINKS = 256
+# Bytes of a number in the file.
+SIZE = 8
 
 
 class SlowClock:
     """
     A clock that all who open the same file share.
 
+    The file has the time by which the clock was set forward, and for each link a process id, 0
+    for none, and the time up to which the link has done its work.
+
     :ivar path: of the file.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with path.open('r+b') as file:
-            self._ahead = memoryview(mmap.mmap(file.fileno(), 8)).cast('d')
+        self._lock = threading.Lock()
+        self._file = path.open('r+b')
+        mapped = memoryview(mmap.mmap(self._file.fileno(), SIZE * (1 + 2 * LINKS))).cast('d')
+        self._ahead, self._pids, self._done = (
+            mapped[:1], mapped[1:1 + LINKS], mapped[1 + LINKS:])
 
     def __call__(self) -> float:
         return START + time.monotonic() * SPEED + self._ahead[0]
+
+    @property
+    def ahead(self) -> float:
+        """Return by how much it was set forward, s."""
+        return self._ahead[0]
 
     def forward(self, seconds: float) -> None:
         """Let time pass, s of this clock."""
@@ -65,13 +83,54 @@ class SlowClock:
         """Return what tells another process of this clock."""
         return {VARIABLE: str(self.path)}
 
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        # A lock of a file is one of the whole process.
+        with self._lock:
+            fcntl.lockf(self._file, fcntl.LOCK_EX)
+            try:
+                yield
+            finally:
+                fcntl.lockf(self._file, fcntl.LOCK_UN)
+
+    def add_link(self) -> int:
+        """Return the number of one more link."""
+        with self._locked():
+            number = next(
+                number for number, pid in enumerate(self._pids) if not _runs(int(pid)))
+            self._done[number] = self.ahead
+            self._pids[number] = os.getpid()
+        return number
+
+    def remove_link(self, number: int) -> None:
+        """Wait for this link no longer."""
+        self._pids[number] = 0
+
+    def work_done(self, number: int, ahead: float) -> None:
+        """Note the time up to which a link has done its work."""
+        self._done[number] = ahead
+
+    def is_caught_up(self) -> bool:
+        """Return whether all links have done their work since the clock was set forward."""
+        return all(done >= self.ahead or not _runs(int(pid))
+                   for pid, done in zip(self._pids, self._done, strict=True))
+
+
+def _runs(pid: int) -> bool:
+    """Return whether a process runs; one that has ended and is not waited for does not."""
+    if pid in (0, os.getpid()):
+        return pid != 0
+    with contextlib.suppress(OSError):
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
+    return False
+
 
 def _open_clock() -> SlowClock:
     if path := os.environ.get(VARIABLE):
         return SlowClock(Path(path))
     # A file in memory: it goes with the last process that has it, however that ends.
     descriptor = os.memfd_create('clock of tests')
-    os.write(descriptor, bytes(8))
+    os.ftruncate(descriptor, SIZE * (1 + 2 * LINKS))
     return SlowClock(Path(f'/proc/{os.getpid()}/fd/{descriptor}'))
 
 
@@ -82,11 +141,12 @@ def pass_time_until(condition: Callable[[], Any], step: float = 1.0) -> None:
     """
     Let time pass until something is so.
 
-    Only for where nothing else is meanwhile to be in time: how often the others come to do
-    something in a step is not certain.
+    A step is over when all links have done the work that was due in it, and have received the
+    frames that were sent before it. So a frame takes one step at most, however busy the machine
+    is; a step must be shorter than any limit that must hold.
     """
     def passed() -> Any:
-        if not (result := condition()):
+        if not (result := condition()) and CLOCK.is_caught_up():
             CLOCK.forward(step)
         return result
 
@@ -94,10 +154,29 @@ def pass_time_until(condition: Callable[[], Any], step: float = 1.0) -> None:
 
 
 class _SlowSelector(selectors.DefaultSelector):
+    """Waits for real time in place of slow time, and tells the clock that a link waits."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._number: int | None = None
+        self._ahead = CLOCK.ahead
 
     def select(self, timeout: float | None = None) -> Any:
+        if self._number is None:
+            self._number = CLOCK.add_link()
+        CLOCK.work_done(self._number, self._ahead)
         seconds = LOOK_INTERVAL if timeout is None else timeout / SPEED
-        return super().select(min(seconds, LOOK_INTERVAL))
+        found = super().select(min(seconds, LOOK_INTERVAL))
+        if self._ahead != CLOCK.ahead:
+            self._ahead = CLOCK.ahead
+            # Frames sent before the clock was set forward may have come after the first look.
+            found = super().select(0)
+        return found
+
+    def close(self) -> None:
+        if self._number is not None:
+            CLOCK.remove_link(self._number)
+        super().close()
 
 
 class SlowLink(Link):
