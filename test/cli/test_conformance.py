@@ -138,6 +138,8 @@ def test_a_second_signal_ends_at_once_and_says_that_the_light_is_changed(
     simulator = simulate()
     program = start(CONFORMANCE, f'udpout://{url}', *LONG)
     simulator.wait_for('ON     100 %')
+    # So that the light is not restored before the second signal.
+    simulator.send(signal.SIGSTOP)
     program.send(signal.SIGINT)
     program.wait_for('restoring the light')
     program.send(signal.SIGINT)

@@ -76,10 +76,13 @@ def served(ros: Ros) -> Iterator[tuple[Program, FakeManager]]:
 
 
 @pytest.fixture
-def gimbal(served: tuple[Program, FakeManager]) -> Iterator[FakeManager]:
-    """Return the module's gimbal, which does as it is told."""
+def gimbal(ros: Ros, served: tuple[Program, FakeManager]) -> Iterator[FakeManager]:
+    """Return the module's gimbal, which does as it is told and has received nothing yet."""
     manager = served[1]
     before = vars(manager).copy()
+    # The end of control ends the setpoints of the test before, which would be repeated.
+    for name in ('take_control', 'release_control'):
+        assert trigger(ros, name).success
     manager.received.clear()
     manager.commands.clear()
     yield manager
@@ -126,12 +129,13 @@ def test_gm_2_attitude_is_flu_and_its_frame_tells_what_yaw_is_relative_to(
     assert values(rates.wait().vector) == pytest.approx((0.1, -0.2, -0.3))
     assert lock.wait().data is False
 
-    gimbal.flags, gimbal.rates = MountFlags.YAW_LOCK | MountFlags.YAW_IN_EARTH_FRAME, (NAN,) * 3
-    gimbal.q = to_mavlink(TURNED, YawFrame.EARTH)
+    gimbal.q, gimbal.rates = to_mavlink(TURNED, YawFrame.EARTH), (NAN,) * 3
+    gimbal.flags = MountFlags.YAW_LOCK | MountFlags.YAW_IN_EARTH_FRAME
     lock.wait_value(True)
+    earth = angles.wait(lambda one: one.header.frame_id == 'map')
+    assert values(earth.vector) == pytest.approx(ROS_ANGLES, abs=1e-6)
+    ros.synchronize('/gimbal')
     angles.clear()
-    assert angles.wait(lambda one: one.header.frame_id == 'map')
-    assert values(angles.wait().vector) == pytest.approx(ROS_ANGLES, abs=1e-6)
     rates.clear()
     angles.wait(count=4)
     assert not rates.messages

@@ -20,6 +20,7 @@ from collections.abc import Callable
 import math
 
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
+from illuminator_ros.gimbal.messages import GimbalCommand
 from illuminator_ros.gimbal.simulated_device import SimulatedGimbal
 from illuminator_ros.mavlink.messages import Address, MavResult
 from illuminator_ros.payload.arbitration import Policy
@@ -86,7 +87,9 @@ def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None
         eventually(lambda: abs(gimbal.get_attitude(GIMBAL).euler_angle_north.yaw_deg - 90) < 1)
         assert result(second.take_control, GIMBAL, primary) == DENIED
         assert result(second.set_angles, GIMBAL, 0.0, -20.0, 0.0, follow, once) == DENIED
-        assert [ack.result for ack in vehicle.acks[-2:]] == [MavResult.DENIED] * 2
+        answers = [ack.result for ack in vehicle.acks if ack.command in set(GimbalCommand)
+                   and (ack.target_system, ack.target_component) == SECOND]
+        assert answers[-2:] == [MavResult.DENIED] * 2
         assert manager.control.holder(Role.PRIMARY) == FIRST
 
         assert result(gimbal.release_control, GIMBAL) == 'SUCCESS'

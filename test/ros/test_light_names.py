@@ -94,7 +94,7 @@ def test_only_target_leaves_other_lights_alone_and_unused_names_are_logged(
         names='["1/244=stern", "1/250=mast", "7/243=nose"]')
 
     assert light_of(own_ros, '/illuminator', lights) == FIRST
-    assert nodes(own_ros) == {'/illuminator', '/stern'}
+    eventually(lambda: nodes(own_ros) == {'/illuminator', '/stern'})
     assert lights[0].fake.received == []
     assert not bridge.count('names: ')
     CLOCK.forward(NAME_GRACE)

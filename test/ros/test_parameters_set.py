@@ -34,10 +34,12 @@ LIMIT = 0.9
 
 
 @pytest.fixture(autouse=True)
-def start(light: ServedLight, parameters: Parameters) -> None:
+def start(ros: Ros, light: ServedLight, parameters: Parameters) -> None:
     """Have every test begin with the same configuration."""
     light.report(mode=1, brightness=80.0, strobe_period=0.0, strobe_duty_cycle=0.0)
     parameters.wait(**START)
+    # The event of this change is none of the test's.
+    ros.synchronize()
     light.forget()
 
 

@@ -14,7 +14,6 @@
 
 """The topics that the node publishes from each ILLUMINATOR_STATUS."""
 
-import itertools
 import math
 from typing import Any
 
@@ -26,12 +25,11 @@ from support.light import ON_OFF, ServedLight
 from support.recording import Recorder
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import CLOCK, pass_time_until
+from support.waiting import eventually
 
 STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
     'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64}
-
-TEMPERATURES = itertools.count()
 
 
 @pytest.fixture(scope='module')
@@ -44,14 +42,14 @@ def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
 
 
 @pytest.fixture
-def topics(light: ServedLight, recorders: dict[str, Recorder]) -> dict[str, Recorder]:
+def topics(
+    ros: Ros, light: ServedLight, recorders: dict[str, Recorder],
+) -> dict[str, Recorder]:
     """Return empty recorders of a light that sends a status only when a test says so."""
     light.fake.stream = 0.0
-    # Of each status the bridge publishes the temperature last, and it is subscribed to last.
-    temperature = 20.0 + next(TEMPERATURES) / 8
     light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0, strobe_duty_cycle=0.0,
-                 error_status=0, temp_c=temperature)
-    recorders['temperature'].wait(lambda message: message.temperature == temperature)
+                 error_status=0, temp_c=25.0)
+    ros.catch_up()
     for recorder in recorders.values():
         recorder.clear()
     return recorders
@@ -129,7 +127,8 @@ def test_connected_is_false_before_a_light_is_heard_and_published_on_change_only
             light.fake.silent = True
             pass_time_until(lambda: recorder.values.count(False) == 2)
             light.fake.silent = False
-            uptime.wait(count=6)
+            recorder.wait(lambda message: message.data, count=2)
+            own_ros.synchronize()
 
         assert recorder.values == [False, True, False, True]
 
@@ -161,6 +160,7 @@ def test_all_names_follow_namespace_node_name_and_remapping(
         CLOCK.forward(1.0)
         array = recorder.wait(lambda array: len(array.status) == 2)
 
+        eventually(lambda: set(remapped) <= foreign())
         name = node.rpartition('/')[2]
         assert [status.name for status in array.status] == [f'{name}: link', f'{name}: lamp']
         assert foreign() == {'/parameter_events', '/rosout', diagnostics, *remapped}

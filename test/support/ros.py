@@ -72,7 +72,7 @@ class Ros(SpunNode):
         self.find_publisher(topic)
         if qos.durability is DurabilityPolicy.VOLATILE:
             for node in eventually(lambda: self._publishing_nodes(topic)):
-                self._meet(node)
+                self.meet(node)
         return recorder
 
     def _publishing_nodes(self, topic: str) -> list[str]:
@@ -88,7 +88,7 @@ class Ros(SpunNode):
         if publisher is None:
             publisher = self._publishers[topic] = self.node.create_publisher(type_, topic, 10)
             eventually(publisher.get_subscription_count)
-            self._meet(node or topic.partition('/cmd/')[0])
+            self.meet(node or topic.partition('/cmd/')[0])
         return publisher
 
     def publish(self, type_: Any, topic: str, *values: Any, node: str = '') -> None:
@@ -97,7 +97,7 @@ class Ros(SpunNode):
         for value in values:
             publisher.publish(type_(data=value))
 
-    def _meet(self, node: str) -> None:
+    def meet(self, node: str) -> None:
         """
         Make sure that a node knows what we have just created.
 
@@ -118,7 +118,7 @@ class Ros(SpunNode):
             # The old one is left alone: it may still wait for an answer.
             client = self.node.create_client(type_, service)
             eventually(client.service_is_ready)
-            self._meet(node)
+            self.meet(node)
             self._clients[service] = (client, self._incarnations(node))
         return client
 
@@ -148,9 +148,24 @@ class Ros(SpunNode):
         return answer
 
     def catch_up(self, node: str = '/illuminator') -> None:
-        """Wait until a node has processed every message that its light has sent until now."""
+        """
+        Wait until a node has processed every message that its light has sent until now.
+
+        All that it has published of them has been taken, too.
+        """
         answer = self.refresh(node)
         assert 'ILLUMINATOR_STATUS: received' in answer.message, answer.message
+        self.synchronize(node)
+
+    def synchronize(self, node: str = '/illuminator') -> None:
+        """
+        Wait until a node has taken what we have published, and we what it has published.
+
+        An executor may take an answer before a message that came just before it, therefore twice.
+        An empty set goes through the node's executor and the thread of its link.
+        """
+        for _ in range(2):
+            self.call(srv.SetParameters, f'{node}/set_parameters', srv.SetParameters.Request())
 
     def outlast(self, seconds: float, others: Iterable[str]) -> None:
         """Let time pass so slowly that the lights of all these nodes are heard meanwhile."""
@@ -183,8 +198,7 @@ class Parameters:
                 recorder.take(event)
 
         self._ros.node.create_subscription(ParameterEvent, '/parameter_events', take, STREAM)
-        self._ros.find_publisher('/parameter_events')
-        self.get('frame_id')
+        self._ros.meet(self._node)
         return recorder
 
     def start(self, type_: Any, service: str, **request: Any) -> Call:

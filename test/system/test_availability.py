@@ -59,7 +59,8 @@ def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
             stdout=output, stderr=output, preexec_fn=prepare_child)
         try:
             Parameters(own_ros).wait(brightness=100.0)
-            assert own_ros.enable().success
+            eventually(lambda: own_ros.enable().success)
+            light.forget()
             assert Parameters(own_ros).set(brightness=200.0)[0].reason
             if not light_answers:
                 light.fake.results[ON_OFF] = None
@@ -67,7 +68,7 @@ def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
             process.send_signal(signal.SIGTERM)
 
             assert process.wait(PATIENCE) == 0
-            light.wait_for(ON_OFF, 2)
+            light.wait_for(ON_OFF)
             eventually(lambda: light.fake.fields['enable'] == int(not light_answers))
         finally:
             process.kill()

@@ -57,7 +57,7 @@ def test_light_behind_mavproxy_is_commanded_and_so_it_is_after_a_restart_of_mavp
             router.kill()
             pass_time_until(lambda: bridge.count('light 1/243 lost'))
             router = start_router(near, far, tmp_path)
-            pass_time_until(lambda: bridge.count('light 1/243 connected') == 2, step=0.1)
+            pass_time_until(lambda: bridge.count('light 1/243 connected') >= 2, step=0.1)
             assert own_ros.enable().success
     finally:
         router.kill()

@@ -72,18 +72,19 @@ def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, por
         assert line.startswith('[WARN]')
 
 
-@pytest.mark.parametrize(('result', 'line'), [
-    (MavResult.DENIED, 'light 1/243 may still be on: refused: MAV_RESULT_DENIED (1 try, '),
-    (None, 'light 1/243 may still be on: no confirmation within '),
+@pytest.mark.parametrize(('start', 'result', 'line'), [
+    (start_slow_bridge, MavResult.DENIED, 'refused: MAV_RESULT_DENIED (1 try, '),
+    (start_bridge, None, 'no confirmation within '),
 ])
 def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end(
-    own_ros: Ros, port: int, result: int | None, line: str,
+    own_ros: Ros, port: int, start: Callable[..., Program], result: int | None, line: str,
 ) -> None:
-    with lit(own_ros, port, start=start_bridge) as (program, light):
+    with lit(own_ros, port, start=start) as (program, light):
         light.fake.results[ON_OFF] = result
 
         assert_ends(program)
 
+        line = f'light 1/243 may still be on: {line}'
         assert [found[:7] for found in program.lines if line in found] == ['[ERROR]']
 
 

@@ -159,8 +159,8 @@ def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_aft
 
 def test_port_in_use_is_opened_once_it_is_free(run: live_link.Run) -> None:
     with contextlib.ExitStack() as stack:
-        taken = stack.enter_context(bound_socket())
-        port = taken.getsockname()[1]
+        port = free_port()
+        stack.enter_context(bound_socket(port=port))
         link = run(live_link.LiveLink(f'udpin://127.0.0.1:{port}'))
         link.wait_lost()
         assert (link.state().is_open, link.state().reason, link.state().openings) == (
