@@ -29,13 +29,7 @@ import socket
 import time
 from typing import Any
 
-from illuminator_ros.gimbal.messages import (
-    GimbalCommand,
-    GimbalDeviceSetAttitude,
-    GimbalManagerSetPitchyaw,
-    GimbalManagerStatus,
-    MAV_TYPE_GIMBAL,
-)
+from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.payload.rotation import Quaternion
@@ -47,7 +41,7 @@ from ..rows import at_most, one, quantiles, Row, times
 MANAGER, DEVICE = mav.Address(1, 194), mav.Address(1, 154)
 PLAYERS = [mav.Address(255, 100 + number) for number in range(20)]
 CLASSES: dict[int, type[mav.Message]] = {cls.id: cls for cls in (
-    mav.CommandAck, GimbalDeviceSetAttitude, GimbalManagerStatus)}
+    mav.CommandAck, gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerStatus)}
 WARM_UP = 50
 RATE, SECONDS = 1000, 10.0
 # rad between the yaws by which the setpoints of two players differ.
@@ -106,12 +100,12 @@ class Line:
 def configure(player: mav.Address) -> mav.CommandLong:
     """Return the command by which a player takes control."""
     return mav.CommandLong(
-        *MANAGER, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0, 0, 0)
+        *MANAGER, gimbal.GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0, 0, 0)
 
 
-def setpoint(player: mav.Address, pitch: float = 0.0) -> GimbalManagerSetPitchyaw:
+def setpoint(player: mav.Address, pitch: float = 0.0) -> gimbal.GimbalManagerSetPitchyaw:
     """Return a setpoint whose yaw belongs to one player."""
-    return GimbalManagerSetPitchyaw(
+    return gimbal.GimbalManagerSetPitchyaw(
         *MANAGER, 0, 0, pitch, STEP * (PLAYERS.index(player) - 10), math.nan, math.nan)
 
 
@@ -124,7 +118,7 @@ def managed() -> Iterator[tuple[int, Line, Line]]:
                 payloads='[gimbal_manager]'):
         until = time.monotonic() + 20.0
         while time.monotonic() < until:
-            device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
+            device.send(DEVICE, mav.heartbeat(gimbal.MAV_TYPE_GIMBAL), port)
             players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
             players.send(PLAYERS[0], configure(PLAYERS[0]), port)
             device.receive(0.1)
@@ -153,7 +147,7 @@ def _setpoints(bench: Bench) -> Row:
             for number in range(bench.amount(2000, 20)):
                 if time.monotonic() >= beat:
                     beat = time.monotonic() + 0.5
-                    device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
+                    device.send(DEVICE, mav.heartbeat(gimbal.MAV_TYPE_GIMBAL), port)
                     players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
                     time.sleep(0.01)
                 data = players.frame(PLAYERS[0], setpoint(
@@ -161,7 +155,8 @@ def _setpoints(bench: Bench) -> Row:
                 device.drain()
                 began = time.perf_counter()
                 players.socket.sendto(data, ('127.0.0.1', port))
-                took['manager'].append((device.arrival(GimbalDeviceSetAttitude) - began) * 1e3)
+                took['manager'].append(
+                    (device.arrival(gimbal.GimbalDeviceSetAttitude) - began) * 1e3)
                 began = time.perf_counter()
                 players.socket.sendto(data, ('127.0.0.1', forward))
                 far.socket.recv(2048)
@@ -199,7 +194,7 @@ def _competition(bench: Bench) -> Iterator[Row]:
         while (now := time.monotonic()) < began + seconds + 1.0:
             if now >= beat:
                 beat = now + 0.5
-                device.send(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), port)
+                device.send(DEVICE, mav.heartbeat(gimbal.MAV_TYPE_GIMBAL), port)
                 for player in PLAYERS:
                     players.send(player, mav.heartbeat(mav.MavType.GCS), port)
             while sent < min(now - began, seconds) * RATE:
@@ -211,9 +206,9 @@ def _competition(bench: Bench) -> Iterator[Row]:
                 results.update(message.result for message in received
                                if isinstance(message, mav.CommandAck))
             for message in device.receive(0.001):
-                if isinstance(message, GimbalDeviceSetAttitude):
+                if isinstance(message, gimbal.GimbalDeviceSetAttitude):
                     obeyed.add(round(Quaternion(*message.q).euler()[2] / STEP))
-                elif isinstance(message, GimbalManagerStatus):
+                elif isinstance(message, gimbal.GimbalManagerStatus):
                     statuses += now < began + seconds
                     holders.add(message.primary_control_compid)
     unanswered = sent - results.total()

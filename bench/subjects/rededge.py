@@ -34,12 +34,7 @@ import tty
 
 from geometry_msgs.msg import Quaternion as QuaternionMessage
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.rededge.conversions import (
-    attitude,
-    mount_angles,
-    mount_status,
-    MountFrame,
-)
+from illuminator_ros.rededge import conversions
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 from support.processes import python
@@ -171,8 +166,8 @@ def orientation(bench: Bench) -> Row:
     for _ in range(count):
         vehicle, body = (Quaternion(*(chance.gauss(0, 1) for _ in range(4))).normalized()
                          for _ in range(2))
-        one_, two = attitude(vehicle, (0.0, 0.0, 0.0), 0), mount_status(
-            mount_angles(body, MountFrame.CAMERA), (1, 100))
+        one_, two = conversions.attitude(vehicle, (0.0, 0.0, 0.0), 0), conversions.mount_status(
+            conversions.mount_angles(body, conversions.MountFrame.CAMERA), (1, 100))
         both = vehicle * body
         given.append([both.x, both.y, both.z, both.w])
         sent.append([one_.yaw, one_.pitch, one_.roll, *(

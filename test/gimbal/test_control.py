@@ -28,28 +28,21 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
 )
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandInt,
-    CommandLong,
-    MAV_AUTOPILOT_ARDUPILOTMEGA,
-    MavCmd,
-    MavResult,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.request import Done
 import pytest
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
 
 CONFIGURE = GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
-NONE = Address(0, 0)
+NONE = mav.Address(0, 0)
 Ask = Callable[[Gimbal, float, Done], None]
 
 
 def commands(rig: Rig, command: int) -> list[tuple[float, ...]]:
     """Return the params of the commands of a kind that were sent."""
     return [(one.param1, one.param2, one.param3, one.param4, one.param5, one.param6, one.param7)
-            for one in rig.messages(CommandLong) if one.command == command]
+            for one in rig.messages(mav.CommandLong) if one.command == command]
 
 
 def asked(rig: Rig, ask: Ask, seconds: float = 3.0) -> tuple[bool, str]:
@@ -61,8 +54,8 @@ def asked(rig: Rig, ask: Ask, seconds: float = 3.0) -> tuple[bool, str]:
     return result.success, result.message
 
 
-@pytest.mark.parametrize('secondary', [NONE, Address(255, 190)])
-def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: Address) -> None:
+@pytest.mark.parametrize('secondary', [NONE, mav.Address(255, 190)])
+def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: mav.Address) -> None:
     rig = Rig(FakeManager(primary=OTHER, secondary=secondary)).run(3.0)
 
     success, message = asked(rig, Gimbal.take_control)
@@ -80,7 +73,7 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: Addr
 
 
 @pytest.mark.parametrize(('fields', 'text'), [
-    ({'results': {CONFIGURE: MavResult.DENIED}},
+    ({'results': {CONFIGURE: mav.MavResult.DENIED}},
      'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
      '1/195 has control and must release it first'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
@@ -101,7 +94,7 @@ def test_gm_16_control_that_no_status_shows_is_not_a_success(
     (OURS, Gimbal.take_control, 'in control already: primary 1/194, secondary none'),
     (OTHER, Gimbal.release_control, 'not in control: primary 1/195, secondary none')])
 def test_request_for_what_the_status_shows_already_sends_nothing(
-        primary: Address, ask: Ask, text: str) -> None:
+        primary: mav.Address, ask: Ask, text: str) -> None:
     rig = Rig(FakeManager(primary=primary)).run(3.0)
 
     assert asked(rig, ask, 0.1) == (True, text)
@@ -109,7 +102,7 @@ def test_request_for_what_the_status_shows_already_sends_nothing(
 
 
 @pytest.mark.parametrize('primary', [OURS, NONE])
-def test_gm_16_release_includes_secondary_control(primary: Address) -> None:
+def test_gm_16_release_includes_secondary_control(primary: mav.Address) -> None:
     rig = Rig(FakeManager(primary=primary, secondary=OURS)).run(3.0)
 
     success, message = asked(rig, Gimbal.release_control)
@@ -136,7 +129,8 @@ def test_gm_17_lost_control_is_told_and_not_taken_back() -> None:
 
 
 def status_requests(rig: Rig) -> int:
-    return sum(one[0] == GimbalManagerStatus.id for one in commands(rig, MavCmd.REQUEST_MESSAGE))
+    return sum(one[0] == GimbalManagerStatus.id
+               for one in commands(rig, mav.MavCmd.REQUEST_MESSAGE))
 
 
 def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard() -> None:
@@ -182,7 +176,7 @@ def test_control_is_not_known_while_the_manager_is_silent() -> None:
 
 @pytest.mark.parametrize(('primary', 'was_lost'), [(OURS, False), (NONE, True), (OTHER, True)])
 def test_control_after_a_silence_is_compared_with_control_before(
-        primary: Address, was_lost: bool) -> None:
+        primary: mav.Address, was_lost: bool) -> None:
     rig = in_control()
     rig.managers[0].alive = False
     rig.run(4.0)
@@ -196,7 +190,7 @@ def test_control_after_a_silence_is_compared_with_control_before(
 
 @pytest.mark.parametrize(('primary', 'taken'), [(NONE, True), (OTHER, False)])
 def test_control_is_taken_automatically_only_where_no_component_has_it(
-        primary: Address, taken: bool) -> None:
+        primary: mav.Address, taken: bool) -> None:
     rig = Rig(FakeManager(primary=primary), auto_take_control=True).run(5.0)
 
     assert rig.gimbal.in_control is taken
@@ -204,7 +198,8 @@ def test_control_is_taken_automatically_only_where_no_component_has_it(
 
 
 def test_automatic_take_that_fails_is_told() -> None:
-    rig = Rig(FakeManager(results={CONFIGURE: MavResult.DENIED}), auto_take_control=True).run(5.0)
+    manager = FakeManager(results={CONFIGURE: mav.MavResult.DENIED})
+    rig = Rig(manager, auto_take_control=True).run(5.0)
 
     assert [event.message for event in rig.all_of(AutomaticTakeFailed)] == [
         'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
@@ -212,7 +207,7 @@ def test_automatic_take_that_fails_is_told() -> None:
 
 
 def test_gm_19_ardupilot_is_not_taken_for_a_manager_that_enforces_control() -> None:
-    rig = Rig(FakeManager(autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA)).run(3.0)
+    rig = Rig(FakeManager(autopilot=mav.MAV_AUTOPILOT_ARDUPILOTMEGA)).run(3.0)
 
     success, message = asked(rig, Gimbal.take_control)
 
@@ -275,7 +270,7 @@ def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() ->
 
     assert success
     assert message.startswith('MAV_RESULT_ACCEPTED (1 try')
-    (sent,) = rig.messages(CommandInt)
+    (sent,) = rig.messages(mav.CommandInt)
     assert (sent.command, sent.frame, sent.param1, sent.x, sent.y, sent.z) == (
         195, 0, 154, 473977419, 85455938, 488.5)
     assert asked(rig, Gimbal.clear_roi)[0]
@@ -293,7 +288,7 @@ def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
 def test_refusal_names_the_request_the_manager_and_who_has_control(
         ask: Ask, command: int, goal: str) -> None:
     rig = in_control()
-    rig.managers[0].results[command] = MavResult.DENIED
+    rig.managers[0].results[command] = mav.MavResult.DENIED
 
     refusal = f'manager 1/1 refused "{goal}": MAV_RESULT_DENIED (1 try, 0 ms); '
     assert asked(rig, ask) == (

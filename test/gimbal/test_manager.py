@@ -20,15 +20,8 @@ from dataclasses import replace
 import math
 from typing import Any
 
+from illuminator_ros.gimbal import manager as gimbal_manager
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.manager import (
-    AddressShared,
-    DemandRefused,
-    HOLD_INTERVAL,
-    ReferenceLost,
-    SetpointClipped,
-    SetpointSent,
-)
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
@@ -43,14 +36,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerStatus,
 )
 from illuminator_ros.gimbal.vehicle_state import ESTIMATES_ATTITUDE
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    heartbeat,
-    MavCmd,
-    MavResult,
-    MavType,
-)
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags, UNSET_QUATERNION
@@ -82,10 +68,10 @@ from support.gimbal_manager import (
 F = MountFlags
 
 
-def in_control(player: Address = PILOT, **settings: Any) -> ManagerRig:
+def in_control(player: mav.Address = PILOT, **settings: Any) -> ManagerRig:
     """Return a manager with a player in primary control."""
     rig = ManagerRig(**settings)
-    assert rig.take(player) is MavResult.ACCEPTED
+    assert rig.take(player) is mav.MavResult.ACCEPTED
     return rig
 
 
@@ -100,7 +86,7 @@ def test_gm_27_information_is_sent_on_request_with_what_the_device_reports() -> 
 
     ack, answer = rig.give(PILOT, request(GimbalManagerInformation))
 
-    assert ack.result == MavResult.ACCEPTED
+    assert ack.result == mav.MavResult.ACCEPTED
     assert replace(answer, time_boot_ms=0, yaw_max=0.0) == GimbalManagerInformation(
         0, int(FULL | Capabilities.CAN_POINT_LOCATION_GLOBAL), DEVICE.component, -0.5, 0.5, -0.5,
         0.5, -0.5, 0.0)
@@ -108,13 +94,13 @@ def test_gm_27_information_is_sent_on_request_with_what_the_device_reports() -> 
     assert len(rig.messages(GimbalManagerInformation)) == 1
 
 
-@pytest.mark.parametrize('to', [Address(1, 0), Address(0, 0)])
-def test_gm_27_a_request_to_all_components_is_answered(to: Address) -> None:
+@pytest.mark.parametrize('to', [mav.Address(1, 0), mav.Address(0, 0)])
+def test_gm_27_a_request_to_all_components_is_answered(to: mav.Address) -> None:
     rig = ManagerRig()
 
     sent = rig.give(PILOT, request(GimbalManagerInformation, to))
 
-    assert len(of(GimbalManagerInformation, sent)) == len(of(CommandAck, sent)) == 1
+    assert len(of(GimbalManagerInformation, sent)) == len(of(mav.CommandAck, sent)) == 1
 
 
 def test_the_manager_passes_on_the_information_of_its_device() -> None:
@@ -150,10 +136,10 @@ def test_gm_13_no_player_stops_the_status_for_the_others() -> None:
     rig = ManagerRig()
     begun = rig.now
 
-    result = rig.result(PILOT, long(MavCmd.SET_MESSAGE_INTERVAL, GimbalManagerStatus.id, -1))
+    result = rig.result(PILOT, long(mav.MavCmd.SET_MESSAGE_INTERVAL, GimbalManagerStatus.id, -1))
     rig.run(1.0)
 
-    assert result is MavResult.DENIED
+    assert result is mav.MavResult.DENIED
     assert len(rig.messages(GimbalManagerStatus, begun)) >= 5
 
 
@@ -180,16 +166,16 @@ def test_gm_16_a_player_in_control_sets_the_attitude_of_the_device() -> None:
 
 
 @pytest.mark.parametrize('holder', [None, PILOT])
-def test_gm_14_a_player_that_is_not_in_control_is_refused(holder: Address | None) -> None:
+def test_gm_14_a_player_that_is_not_in_control_is_refused(holder: mav.Address | None) -> None:
     rig = in_control(holder) if holder else ManagerRig()
     rig.give(AUTOPILOT, position(47.0, 8.0, 500.0))
 
     assert rig.points(GUEST) == []
     assert [rig.result(GUEST, command) for command in (
         pitch_yaw_command(1, 1), region(47.1, 8.0, 0.0), long(GimbalCommand.DO_SET_ROI_NONE))
-    ] == [MavResult.DENIED] * 3
+    ] == [mav.MavResult.DENIED] * 3
     assert rig.messages(GimbalDeviceSetAttitude) == []
-    [refused] = of(DemandRefused, rig.events)
+    [refused] = of(gimbal_manager.DemandRefused, rig.events)
     assert refused.player == GUEST
     assert (f'{holder} has control' if holder else 'take control first') in refused.reason
 
@@ -202,20 +188,20 @@ def test_refusals_are_reported_once_a_second() -> None:
     rig.run(1.0, each=rig.heartbeats(PILOT))
     rig.points(GUEST)
 
-    assert [one.unreported for one in of(DemandRefused, rig.events)] == [0, 99]
+    assert [one.unreported for one in of(gimbal_manager.DemandRefused, rig.events)] == [0, 99]
 
 
 @pytest.mark.parametrize(('policy', 'overrules', 'result'), [
-    (Policy.HOLD, False, MavResult.DENIED), (Policy.HOLD, True, MavResult.ACCEPTED),
-    (Policy.TAKEOVER, False, MavResult.ACCEPTED)])
+    (Policy.HOLD, False, mav.MavResult.DENIED), (Policy.HOLD, True, mav.MavResult.ACCEPTED),
+    (Policy.TAKEOVER, False, mav.MavResult.ACCEPTED)])
 def test_gm_17_control_moves_as_the_policy_says(
-        policy: Policy, overrules: bool, result: MavResult) -> None:
+        policy: Policy, overrules: bool, result: mav.MavResult) -> None:
     rig = in_control(control=ControlSettings(
         policy, overruling=frozenset({GUEST} if overrules else ())))
 
     assert rig.take(GUEST) is result
 
-    obeyed, ignored = (GUEST, PILOT) if result is MavResult.ACCEPTED else (PILOT, GUEST)
+    obeyed, ignored = (GUEST, PILOT) if result is mav.MavResult.ACCEPTED else (PILOT, GUEST)
     assert rig.points(ignored) == []
     assert len(rig.points(obeyed)) == 1
 
@@ -228,14 +214,14 @@ def test_gm_28_messages_and_commands_of_other_devices_are_refused(device_id: int
     result = rig.result(PILOT, pitch_yaw_command(1, 1, device_id=device_id))
     sent = rig.give(PILOT, pitch_yaw(0.1, 0.1, device_id=device_id))
 
-    assert result is (MavResult.ACCEPTED if ours else MavResult.DENIED)
+    assert result is (mav.MavResult.ACCEPTED if ours else mav.MavResult.DENIED)
     assert len(sent) == ours
 
 
 def test_a_setpoint_to_another_manager_is_ignored() -> None:
     rig = in_control()
 
-    assert rig.give(PILOT, pitch_yaw(0.1, 0.1, to=Address(1, 1))) == []
+    assert rig.give(PILOT, pitch_yaw(0.1, 0.1, to=mav.Address(1, 1))) == []
 
 
 def test_gm_16_the_gimbal_stays_where_it_points_when_its_player_falls_silent() -> None:
@@ -278,7 +264,7 @@ def test_a_setpoint_is_repeated_at_least_once_a_second() -> None:
     times = [begun, *(at for at, message in rig.sent
                       if at > begun and isinstance(message, GimbalDeviceSetAttitude))]
     assert max(b - a for a, b in zip(times, times[1:], strict=False)) <= 1.0
-    assert len(times) <= 10.0 / HOLD_INTERVAL + 2
+    assert len(times) <= 10.0 / gimbal_manager.HOLD_INTERVAL + 2
 
 
 Q = Quaternion.from_euler(0.1, 0.2, 0.3)
@@ -346,9 +332,9 @@ def test_an_invalid_setpoint_is_refused_and_named(message: Any) -> None:
     sent = rig.give(PILOT, message)
 
     assert of(GimbalDeviceSetAttitude, sent) == []
-    acks = of(CommandAck, sent)
-    assert [ack.result for ack in acks] == [MavResult.DENIED] * len(acks)
-    assert len(acks) + len(of(DemandRefused, rig.events)) == 1
+    acks = of(mav.CommandAck, sent)
+    assert [ack.result for ack in acks] == [mav.MavResult.DENIED] * len(acks)
+    assert len(acks) + len(of(gimbal_manager.DemandRefused, rig.events)) == 1
 
 
 def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
@@ -356,10 +342,10 @@ def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
 
     result = rig.result(PILOT, pitch_yaw_command(0, 0, flags=F.YAW_LOCK))
 
-    assert result is MavResult.DENIED
-    assert 'YAW_LOCK' in of(DemandRefused, rig.events)[0].reason
+    assert result is mav.MavResult.DENIED
+    assert 'YAW_LOCK' in of(gimbal_manager.DemandRefused, rig.events)[0].reason
     assert rig.give(PILOT, pitch_yaw(0.1, 0.0, flags=F.YAW_LOCK)) == []
-    assert 'YAW_LOCK' in of(DemandRefused, rig.events)[0].reason
+    assert 'YAW_LOCK' in of(gimbal_manager.DemandRefused, rig.events)[0].reason
 
 
 @pytest.mark.parametrize('heading', [NAN, 1.0])
@@ -375,7 +361,7 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_that_knows_no_north(
 
     if math.isnan(heading):
         assert sent == []
-        assert 'heading' in of(DemandRefused, rig.events)[0].reason
+        assert 'heading' in of(gimbal_manager.DemandRefused, rig.events)[0].reason
         return
     assert euler(sent[0]) == (0.0, 0.1, 0.2)
     assert F(sent[0].flags) == F.YAW_IN_VEHICLE_FRAME
@@ -392,14 +378,14 @@ def test_gm_9_the_secondary_player_adds_no_more_than_the_limit(
         asked: float, pitch: float) -> None:
     rig = in_control(nudge_limit=0.2)
     rig.points(PILOT, 0.2, 0.1)
-    assert rig.result(GUEST, configure(-1, -1, *GUEST)) is MavResult.ACCEPTED
+    assert rig.result(GUEST, configure(-1, -1, *GUEST)) is mav.MavResult.ACCEPTED
 
     [message] = rig.points(GUEST, asked, 0.0)
 
     assert euler(message) == (0.0, pitch, 0.1)
     # Overriding replaces the setpoint, not the offset.
     assert euler(rig.points(PILOT, 0.0, 0.0)[0]) == (0.0, round(pitch - 0.2, 4), 0.0)
-    assert rig.result(GUEST, configure(-3, -3, -3, -3)) is MavResult.ACCEPTED
+    assert rig.result(GUEST, configure(-3, -3, -3, -3)) is mav.MavResult.ACCEPTED
     assert euler(rig.points(PILOT, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
 
 
@@ -420,7 +406,7 @@ def test_gm_9_limits_are_applied_after_mixing_and_reported() -> None:
     [message] = rig.points(GUEST, 0.2, 0.0)
 
     assert euler(message) == (0.0, 0.5, -0.1)
-    [[clipped]] = [one.clipped for one in of(SetpointClipped, rig.events)]
+    [[clipped]] = [one.clipped for one in of(gimbal_manager.SetpointClipped, rig.events)]
     assert (clipped.axis, round(clipped.asked, 4), clipped.limit) == ('pitch', 0.6, 0.5)
 
 
@@ -430,7 +416,7 @@ def test_gm_5_an_axis_that_the_device_lacks_is_not_turned() -> None:
     [message] = rig.points(PILOT, 0.1, 0.4)
 
     assert euler(message) == (0.0, 0.1, 0.0)
-    assert [one.axis for event in of(SetpointClipped, rig.events)
+    assert [one.axis for event in of(gimbal_manager.SetpointClipped, rig.events)
             for one in event.clipped] == ['yaw']
 
 
@@ -442,7 +428,7 @@ def following(**device: Any) -> ManagerRig:
         f'{axis}_{end}': NAN for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')}
     rig = in_control(device=replace(information(), **everywhere, **device))
     rig.give(AUTOPILOT, position(47.0, 8.0, 500.0, home=400.0), vehicle_yaw(math.pi / 2))
-    assert rig.result(PILOT, region(47.008993, 8.0, 500.0)) is MavResult.ACCEPTED
+    assert rig.result(PILOT, region(47.008993, 8.0, 500.0)) is mav.MavResult.ACCEPTED
     return rig
 
 
@@ -479,11 +465,11 @@ def test_gm_8_a_new_setpoint_or_clearing_ends_the_region_of_interest() -> None:
 
 @pytest.mark.parametrize('after', [None, GUEST])
 def test_gm_8_a_region_of_interest_ends_with_the_control_of_its_player(
-        after: Address | None) -> None:
+        after: mav.Address | None) -> None:
     rig = following()
     before = euler(last(rig))
 
-    assert rig.result(PILOT, configure(*(after or (0, 0)))) is MavResult.ACCEPTED
+    assert rig.result(PILOT, configure(*(after or (0, 0)))) is mav.MavResult.ACCEPTED
     rig.give(AUTOPILOT, position(46.0, 8.0, 1500.0))
     rig.run(1.0)
 
@@ -497,18 +483,18 @@ def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
     rig.run(3.0, each=rig.heartbeats(PILOT))
 
     assert euler(last(rig)) == before
-    assert {one.unknown for one in of(ReferenceLost, rig.events)} == {'position'}
+    assert {one.unknown for one in of(gimbal_manager.ReferenceLost, rig.events)} == {'position'}
 
 
 @pytest.mark.parametrize(('command', 'result'), [
-    (region(47.1, 8.0, 100.0, frame=3), MavResult.ACCEPTED),
-    (region(47.1, 8.0, 100.0, frame=10), MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
-    (region(97.1, 8.0, 100.0), MavResult.DENIED),
-    (region(47.1, 8.0, NAN), MavResult.DENIED),
-    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, 47, 8, 0), MavResult.ACCEPTED),
-    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, NAN, 8, 0), MavResult.DENIED)])
+    (region(47.1, 8.0, 100.0, frame=3), mav.MavResult.ACCEPTED),
+    (region(47.1, 8.0, 100.0, frame=10), mav.MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
+    (region(97.1, 8.0, 100.0), mav.MavResult.DENIED),
+    (region(47.1, 8.0, NAN), mav.MavResult.DENIED),
+    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, 47, 8, 0), mav.MavResult.ACCEPTED),
+    (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, NAN, 8, 0), mav.MavResult.DENIED)])
 def test_gm_8_a_region_of_interest_is_answered_with_its_reason(
-        command: Any, result: MavResult) -> None:
+        command: Any, result: mav.MavResult) -> None:
     rig = following()
 
     assert rig.result(PILOT, command) is result
@@ -527,8 +513,8 @@ def test_gm_8_without_a_position_a_region_of_interest_is_rejected_for_now() -> N
     rig = in_control()
     rig.give(AUTOPILOT, position(0.0, 0.0, 0.0))
 
-    assert rig.result(PILOT, region(47.1, 8.0, 0.0)) is MavResult.TEMPORARILY_REJECTED
-    assert 'position' in of(DemandRefused, rig.events)[0].reason
+    assert rig.result(PILOT, region(47.1, 8.0, 0.0)) is mav.MavResult.TEMPORARILY_REJECTED
+    assert 'position' in of(gimbal_manager.DemandRefused, rig.events)[0].reason
 
 
 # GM-22: a device without MAVLink
@@ -542,7 +528,7 @@ def test_gm_22_a_device_without_mavlink_gets_no_message_of_the_gimbal_set() -> N
 
     assert rig.messages(GimbalDeviceSetAttitude) == []
     assert rig.messages(AutopilotStateForGimbalDevice) == []
-    setpoint = of(SetpointSent, rig.events)[-1].setpoint
+    setpoint = of(gimbal_manager.SetpointSent, rig.events)[-1].setpoint
     assert setpoint.attitude is not None
     assert [round(angle, 4) for angle in setpoint.attitude.euler()] == [0.0, 0.5, 0.3]
 
@@ -554,7 +540,7 @@ def test_gm_22_the_manager_turns_a_device_that_takes_no_rates() -> None:
     rig.give(PILOT, pitch_yaw(yaw_rate=0.5))
     rig.run(1.0, each=rig.heartbeats(PILOT))
 
-    setpoint = of(SetpointSent, rig.events)[-1].setpoint
+    setpoint = of(gimbal_manager.SetpointSent, rig.events)[-1].setpoint
     assert setpoint.attitude is not None
     assert setpoint.attitude.euler() == pytest.approx((0.0, 0.1, 0.5), abs=0.03)
 
@@ -639,16 +625,18 @@ def test_the_device_is_told_no_velocity_that_is_not_finite() -> None:
 
 # A forged address
 
-@pytest.mark.parametrize(('second', 'shared'), [(MavType.GCS, False), (MavType.SUBMARINE, True)])
+@pytest.mark.parametrize(('second', 'shared'), [
+    (mav.MavType.GCS, False), (mav.MavType.SUBMARINE, True)])
 def test_two_senders_with_the_address_of_the_player_in_control_are_reported(
-        second: MavType, shared: bool) -> None:
+        second: mav.MavType, shared: bool) -> None:
     rig = in_control()
-    rig.give(PILOT, heartbeat(MavType.GCS))
+    rig.give(PILOT, mav.heartbeat(mav.MavType.GCS))
 
     rig.run(0.5)
-    rig.give(PILOT, heartbeat(second))
+    rig.give(PILOT, mav.heartbeat(second))
 
-    assert of(AddressShared, rig.events) == [AddressShared(PILOT)] * shared
+    assert of(gimbal_manager.AddressShared, rig.events) == [
+        gimbal_manager.AddressShared(PILOT)] * shared
 
 
 # States
@@ -658,7 +646,7 @@ def test_commands_are_rejected_for_now_until_the_manager_is_active() -> None:
     rig.run(1.0)
 
     assert rig.manager.state is ManagerState.LISTENING
-    assert rig.take(PILOT) is MavResult.TEMPORARILY_REJECTED
+    assert rig.take(PILOT) is mav.MavResult.TEMPORARILY_REJECTED
     assert rig.messages(GimbalManagerStatus) == []
 
 

@@ -40,14 +40,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
-from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
-from geometry_msgs.msg import (  # noqa: E402
-    QuaternionStamped,
-    Twist,
-    TwistWithCovariance,
-    Vector3,
-    Vector3Stamped,
-)
+from geometry_msgs import msg as geometry  # noqa: E402
 from illuminator_ros.gimbal.ros.conversions import read_place  # noqa: E402
 from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
     _read_fix,
@@ -107,10 +100,10 @@ def trigger(ros: Ros, name: str) -> Trigger.Response:
     return answer
 
 
-def turned(roll: float, pitch: float, yaw: float) -> QuaternionMessage:
+def turned(roll: float, pitch: float, yaw: float) -> geometry.Quaternion:
     """Return a rotation, deg."""
     q = Quaternion.from_euler(*map(math.radians, (roll, pitch, yaw)))
-    return QuaternionMessage(w=q.w, x=q.x, y=q.y, z=q.z)
+    return geometry.Quaternion(w=q.w, x=q.x, y=q.y, z=q.z)
 
 
 def report(ros: Ros, text: str) -> DiagnosticStatus:
@@ -135,15 +128,16 @@ def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
         assert answer.success, answer.message
         own_ros.subscribe(String, f'{NODE}/controller').wait_value(
             f'primary {OURS}, secondary none')
-        own_ros.publisher(QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
-            QuaternionStamped(header=VEHICLE, quaternion=turned(0, 20, 10)))
+        own_ros.publisher(geometry.QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
+            geometry.QuaternionStamped(header=VEHICLE, quaternion=turned(0, 20, 10)))
         # ROS: pitch down and yaw left are positive.
         eventually(lambda: [round(math.degrees(one)) for one in gimbal.mount.motion.angles] == [
             0, -20, -10])
 
         # The vehicle heads north, 10 m/s; ROS counts yaw from the east.
-        imu = Imu(orientation=turned(0, 0, 90), angular_velocity=Vector3(z=0.0))
-        odometry = Odometry(twist=TwistWithCovariance(twist=Twist(linear=Vector3(x=10.0))))
+        imu = Imu(orientation=turned(0, 0, 90), angular_velocity=geometry.Vector3(z=0.0))
+        odometry = Odometry(twist=geometry.TwistWithCovariance(
+            twist=geometry.Twist(linear=geometry.Vector3(x=10.0))))
         odometry.pose.pose.orientation = imu.orientation
         publishers = [(own_ros.publisher(type(one), f'{NODE}/{name}', NODE), one)
                       for name, one in (('imu', imu), ('odometry', odometry))]
@@ -168,19 +162,19 @@ def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:
     # The link is open once a peer is heard.
     with manager(own_ros, port, gimbal_device_id=1, pitch_max=0.5, auto_take_control='true'), \
             device(port):
-        setpoint = own_ros.subscribe(QuaternionStamped, f'{NODE}/device/setpoint', STREAM)
-        attitude = own_ros.subscribe(QuaternionStamped, f'{NODE}/attitude', STREAM)
+        setpoint = own_ros.subscribe(geometry.QuaternionStamped, f'{NODE}/device/setpoint', STREAM)
+        attitude = own_ros.subscribe(geometry.QuaternionStamped, f'{NODE}/attitude', STREAM)
         own_ros.subscribe(Bool, f'{NODE}/in_control').wait_value(True)
-        own_ros.publisher(QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
-            QuaternionStamped(header=VEHICLE, quaternion=turned(0, 60, 10)))
+        own_ros.publisher(geometry.QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
+            geometry.QuaternionStamped(header=VEHICLE, quaternion=turned(0, 60, 10)))
 
         message = setpoint.wait()
         q = message.quaternion
         assert message.header.frame_id == 'base_link_stabilized'
         assert Quaternion(q.w, q.x, q.y, q.z).euler() == pytest.approx(
             (0.0, 0.5, math.radians(10)), abs=1e-5)
-        reported = QuaternionStamped(header=VEHICLE, quaternion=turned(0, 5, 5))
-        driver = own_ros.publisher(QuaternionStamped, f'{NODE}/device/attitude', NODE)
+        reported = geometry.QuaternionStamped(header=VEHICLE, quaternion=turned(0, 5, 5))
+        driver = own_ros.publisher(geometry.QuaternionStamped, f'{NODE}/device/attitude', NODE)
         eventually(lambda: driver.publish(reported) or any(
             abs(one.quaternion.y - reported.quaternion.y) < 1e-6 for one in attitude.messages))
 
@@ -189,8 +183,8 @@ def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:
 def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
         own_ros: Ros) -> None:  # noqa: F811
     def point(source: str, yaw: float) -> None:
-        own_ros.publisher(Vector3Stamped, f'{NODE}/{source}cmd/angles', NODE).publish(
-            Vector3Stamped(header=VEHICLE, vector=Vector3(z=math.radians(yaw))))
+        own_ros.publisher(geometry.Vector3Stamped, f'{NODE}/{source}cmd/angles', NODE).publish(
+            geometry.Vector3Stamped(header=VEHICLE, vector=geometry.Vector3(z=math.radians(yaw))))
 
     port = free_port()
     names = "['safety', 'operator', 'autonomy']"
@@ -325,15 +319,16 @@ def test_no_player_floods_the_log_or_holds_back_the_error_about_another_manager(
 
 @pytest.mark.parametrize('value', [1e39, -math.inf])
 def test_values_of_the_vehicle_beyond_all_limits_are_refused(value: float) -> None:
-    upright = QuaternionMessage(w=1.0)
-    odometries = [Odometry(twist=TwistWithCovariance(twist=twist)) for twist in (
-        Twist(linear=Vector3(y=value)), Twist(angular=Vector3(z=value)))]
+    upright = geometry.Quaternion(w=1.0)
+    odometries = [Odometry(twist=geometry.TwistWithCovariance(twist=twist)) for twist in (
+        geometry.Twist(linear=geometry.Vector3(y=value)),
+        geometry.Twist(angular=geometry.Vector3(z=value)))]
     for odometry in odometries:
         odometry.pose.pose.orientation = upright
         with pytest.raises(ValueError, match='is beyond'):
             _read_odometry(odometry)
     with pytest.raises(ValueError, match='is beyond'):
-        _read_imu(Imu(orientation=upright, angular_velocity=Vector3(z=value)))
+        _read_imu(Imu(orientation=upright, angular_velocity=geometry.Vector3(z=value)))
     with pytest.raises(ValueError, match='is not a place'):
         read_place(NavSatFix(latitude=47.0, longitude=8.0, altitude=value), 0.0)
 

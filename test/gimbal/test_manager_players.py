@@ -28,12 +28,8 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
-from illuminator_ros.gimbal.messages import (
-    GimbalDeviceSetAttitude,
-    GimbalManagerSetPitchyaw,
-    GimbalManagerStatus,
-)
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.payload.arbitration import Cause, Policy
@@ -159,9 +155,9 @@ class Arena:
             [(message.command, *source)]
             if isinstance(message, mav.CommandLong | mav.CommandInt) else [])
         self._check_changes(events, source)
-        is_setpoint = isinstance(message, GimbalManagerSetPitchyaw) or (
+        is_setpoint = isinstance(message, gimbal.GimbalManagerSetPitchyaw) or (
             isinstance(message, mav.CommandLong) and message.command == 1000)
-        if is_setpoint and source == holder and of(GimbalDeviceSetAttitude, sent):
+        if is_setpoint and source == holder and of(gimbal.GimbalDeviceSetAttitude, sent):
             self.obeyed = source
         elif is_setpoint and commanded and source not in (
                 holder, self.rig.manager.control.holder(Role.SECONDARY)):
@@ -170,13 +166,13 @@ class Arena:
 
     def _check_sent(self, sent: list[Any], source: mav.Address | None) -> None:
         """Check that the device keeps a setpoint of the player that was obeyed last."""
-        for message in of(GimbalDeviceSetAttitude, sent):
+        for message in of(gimbal.GimbalDeviceSetAttitude, sent):
             _, pitch, yaw = Quaternion(*message.q).euler()
             assert abs(pitch) <= 0.02 + 1e-6
             [number] = [player.number for player in self.players
                         if abs(mark(player.number) - yaw) <= 0.02 + 1e-4]
             assert address_of(number) == self.obeyed, (number, source)
-        for status in of(GimbalManagerStatus, sent):
+        for status in of(gimbal.GimbalManagerStatus, sent):
             shown = mav.Address(status.primary_control_sysid, status.primary_control_compid)
             assert shown == (self.rig.manager.control.holder(Role.PRIMARY) or mav.Address(0, 0))
 
@@ -213,7 +209,7 @@ def test_gm_13_control_moves_and_setpoints_reach_the_device_in_that_test() -> No
     arena.run()
 
     assert arena.changes > 20
-    assert len(arena.rig.messages(GimbalDeviceSetAttitude)) > 50
+    assert len(arena.rig.messages(gimbal.GimbalDeviceSetAttitude)) > 50
 
 
 def test_gm_16_of_1000_players_that_take_control_at_once_one_has_it() -> None:

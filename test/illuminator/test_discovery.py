@@ -18,12 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.illuminator.events import (
-    AnyLightEvent,
-    LightConnected,
-    LightForgotten,
-    LightFound,
-)
+from illuminator_ros.illuminator import events
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES
@@ -42,7 +37,7 @@ class Heard(Client):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(BRIDGE, Settings(), **options)
-        self.heard: list[AnyLightEvent] = []
+        self.heard: list[events.AnyLightEvent] = []
         self.events.subscribe(self.heard.append)
         self.link_opened(0.0)
 
@@ -68,7 +63,7 @@ def test_a_light_is_found_by_its_messages_at_any_address(
         client.receive(source, message, 0.0)
     assert list(client.lights) == [source]
     assert client.lights[source].connected
-    assert client.heard[:2] == [LightFound(source), LightConnected(source)]
+    assert client.heard[:2] == [events.LightFound(source), events.LightConnected(source)]
 
 
 @pytest.mark.parametrize('message', [
@@ -122,7 +117,8 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
     client.run(70.0)
     client.receive(LIGHT, status_message(), 70.0)
     assert list(client.lights) == [FORGED[0], LIGHT]
-    forgotten = [event.address for event in client.heard if isinstance(event, LightForgotten)]
+    forgotten = [event.address for event in client.heard
+                 if isinstance(event, events.LightForgotten)]
     assert sorted(forgotten) == FORGED[1:MAX_DEVICES]
     assert [light.address for light in client.commanded_or_found] == [LIGHT, FORGED[0]]
 

@@ -19,31 +19,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_receiver import AnyCommand, MAX_RESULTS, REPEAT_TIME
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Payload
-from illuminator_ros.mavlink.messages import (
-    Address,
-    CommandAck,
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    heartbeat,
-    MavResult,
-    Message,
-)
 import pytest
 
-OURS, PILOT, OTHER = Address(1, 194), Address(255, 190), Address(255, 191)
+OURS, PILOT, OTHER = mav.Address(1, 194), mav.Address(255, 190), mav.Address(255, 191)
 SUPPORTED = 1000
 
 
 class Turner(Payload):
     """Executes one command, and sends a heartbeat for it."""
 
-    messages = (CommandLong, CommandInt)
+    messages = (mav.CommandLong, mav.CommandInt)
 
-    def __init__(self, commands: CommandSender, supported: int, *results: MavResult) -> None:
+    def __init__(self, commands: CommandSender, supported: int, *results: mav.MavResult) -> None:
         self.commands = commands
         self.supported = supported
         self.results = list(results)
@@ -55,26 +46,28 @@ class Turner(Payload):
     def next_deadline(self) -> float:
         return math.inf
 
-    def receive(self, source: Address, message: Message, now: float) -> None:
+    def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         raise AssertionError('commands are executed')
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+    def execute(
+        self, source: mav.Address, command: AnyCommand, now: float,
+    ) -> mav.MavResult | None:
         if command.command != self.supported:
             return None
         self.executed.append(command)
-        self.commands.send(heartbeat(26))
-        return self.results.pop(0) if self.results else MavResult.ACCEPTED
+        self.commands.send(mav.heartbeat(26))
+        return self.results.pop(0) if self.results else mav.MavResult.ACCEPTED
 
 
 class Rig:
     """A component with two payloads, of which the second supports the command."""
 
-    def __init__(self, *results: MavResult) -> None:
+    def __init__(self, *results: mav.MavResult) -> None:
         commands = CommandSender(OURS)
         self.turner = Turner(commands, SUPPORTED, *results)
         self.component = Component(commands, [Turner(commands, 1001), self.turner])
 
-    def give(self, command: Any, *, source: Address = PILOT, now: float = 1.0) -> list[Any]:
+    def give(self, command: Any, *, source: mav.Address = PILOT, now: float = 1.0) -> list[Any]:
         """Return what the component sends when it receives a command."""
         self.component.receive(source, command, now)
         sent = [message for _, message in self.component.outgoing]
@@ -82,46 +75,46 @@ class Rig:
         return sent
 
 
-def long(command: int = SUPPORTED, *, to: Address = OURS, confirmation: int = 0,
-         param1: float = math.nan) -> CommandLong:
-    return CommandLong(*to, command, confirmation, param1, *(0.0,) * 6)
+def long(command: int = SUPPORTED, *, to: mav.Address = OURS, confirmation: int = 0,
+         param1: float = math.nan) -> mav.CommandLong:
+    return mav.CommandLong(*to, command, confirmation, param1, *(0.0,) * 6)
 
 
-def whole(command: int = SUPPORTED, *, to: Address = OURS) -> CommandInt:
-    return CommandInt(*to, 0, command, 0, 0, *(0.0,) * 4, 0, 0, 0.0)
+def whole(command: int = SUPPORTED, *, to: mav.Address = OURS) -> mav.CommandInt:
+    return mav.CommandInt(*to, 0, command, 0, 0, *(0.0,) * 4, 0, 0, 0.0)
 
 
-def ack(result: MavResult, command: int = SUPPORTED) -> CommandAck:
-    return CommandAck(command, result, 0, 0, *PILOT)
+def ack(result: mav.MavResult, command: int = SUPPORTED) -> mav.CommandAck:
+    return mav.CommandAck(command, result, 0, 0, *PILOT)
 
 
 @pytest.mark.parametrize('make', [long, whole])
 def test_a_command_is_acknowledged_before_the_messages_that_it_causes(make: Any) -> None:
-    first, second = Rig(MavResult.DENIED).give(make())
+    first, second = Rig(mav.MavResult.DENIED).give(make())
 
-    assert first == ack(MavResult.DENIED)
-    assert isinstance(second, Heartbeat)
+    assert first == ack(mav.MavResult.DENIED)
+    assert isinstance(second, mav.Heartbeat)
 
 
 @pytest.mark.parametrize(('to', 'command', 'result'), [
-    (OURS, SUPPORTED, MavResult.ACCEPTED),
-    (Address(1, 0), SUPPORTED, MavResult.ACCEPTED),
-    (Address(0, 0), SUPPORTED, MavResult.ACCEPTED),
-    (OURS, 31000, MavResult.UNSUPPORTED),
-    (Address(1, 0), 31000, None),
-    (Address(0, 0), 31000, None),
-    (Address(1, 1), SUPPORTED, None),
-    (Address(2, 194), SUPPORTED, None),
+    (OURS, SUPPORTED, mav.MavResult.ACCEPTED),
+    (mav.Address(1, 0), SUPPORTED, mav.MavResult.ACCEPTED),
+    (mav.Address(0, 0), SUPPORTED, mav.MavResult.ACCEPTED),
+    (OURS, 31000, mav.MavResult.UNSUPPORTED),
+    (mav.Address(1, 0), 31000, None),
+    (mav.Address(0, 0), 31000, None),
+    (mav.Address(1, 1), SUPPORTED, None),
+    (mav.Address(2, 194), SUPPORTED, None),
 ])
 @pytest.mark.parametrize('make', [long, whole])
 def test_a_command_is_answered_if_it_is_for_us(
-        make: Any, to: Address, command: int, result: MavResult | None) -> None:
+        make: Any, to: mav.Address, command: int, result: mav.MavResult | None) -> None:
     rig = Rig()
 
     sent = rig.give(make(command, to=to))
 
     assert sent[:1] == ([] if result is None else [ack(result, command)])
-    assert bool(rig.turner.executed) == (result is MavResult.ACCEPTED)
+    assert bool(rig.turner.executed) == (result is mav.MavResult.ACCEPTED)
 
 
 # The second command that comes after long(), and whether it is executed.
@@ -137,29 +130,29 @@ SECOND = {
 @pytest.mark.parametrize('case', SECOND)
 def test_a_repeated_command_is_acknowledged_again_but_not_executed_again(case: str) -> None:
     command, source, pause, executed = SECOND[case]
-    rig = Rig(MavResult.DENIED)
+    rig = Rig(mav.MavResult.DENIED)
     rig.give(long())
 
     [answer, *_] = rig.give(command, source=source, now=1.0 + pause)
 
     assert len(rig.turner.executed) == 1 + executed
-    assert answer.result == (MavResult.ACCEPTED if executed else MavResult.DENIED)
+    assert answer.result == (mav.MavResult.ACCEPTED if executed else mav.MavResult.DENIED)
 
 
 def test_a_command_that_was_rejected_temporarily_is_executed_when_it_is_repeated() -> None:
-    rig = Rig(MavResult.TEMPORARILY_REJECTED)
+    rig = Rig(mav.MavResult.TEMPORARILY_REJECTED)
     rig.give(long())
 
     [answer, _] = rig.give(long(confirmation=1))
 
-    assert answer == ack(MavResult.ACCEPTED)
+    assert answer == ack(mav.MavResult.ACCEPTED)
 
 
 def test_only_so_many_results_are_remembered() -> None:
     rig = Rig()
     rig.give(long())
     for number in range(MAX_RESULTS):
-        rig.give(long(), source=Address(2 + number // 250, 1 + number % 250))
+        rig.give(long(), source=mav.Address(2 + number // 250, 1 + number % 250))
 
     rig.give(long(confirmation=1))
 

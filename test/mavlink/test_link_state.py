@@ -16,35 +16,28 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.link_state import (
-    EVENT_INTERVAL,
-    LinkInput,
-    LinkState,
-    LinkStatus,
-    MAX_EVENTS,
-    MAX_REASONS,
-)
+from illuminator_ros.mavlink import link_state
 import pytest
 
 
 # The initials of the inputs -> the state, whether it counts as open, and the reported events.
 @pytest.mark.parametrize(('inputs', 'state', 'events'), [
-    ('', LinkState.OPENING, []),
-    ('o', LinkState.UNPROVEN, ['open']),
-    ('op', LinkState.OPEN, ['open']),
-    ('opc', LinkState.LOST, ['open', 'lost']),
-    ('opcop', LinkState.OPEN, ['open', 'lost', 'open']),
-    ('c', LinkState.RETRYING, ['not open']),
+    ('', link_state.LinkState.OPENING, []),
+    ('o', link_state.LinkState.UNPROVEN, ['open']),
+    ('op', link_state.LinkState.OPEN, ['open']),
+    ('opc', link_state.LinkState.LOST, ['open', 'lost']),
+    ('opcop', link_state.LinkState.OPEN, ['open', 'lost', 'open']),
+    ('c', link_state.LinkState.RETRYING, ['not open']),
     # A transport that is closed at once each time counts as open only when it is proved again.
-    ('ococo', LinkState.DOUBTFUL, ['open', 'lost']),
-    ('ocop', LinkState.OPEN, ['open', 'lost', 'open']),
-    ('opcoco', LinkState.DOUBTFUL, ['open', 'lost', 'open', 'lost']),
-    ('ops', LinkState.STOPPED, ['open'])])
+    ('ococo', link_state.LinkState.DOUBTFUL, ['open', 'lost']),
+    ('ocop', link_state.LinkState.OPEN, ['open', 'lost', 'open']),
+    ('opcoco', link_state.LinkState.DOUBTFUL, ['open', 'lost', 'open', 'lost']),
+    ('ops', link_state.LinkState.STOPPED, ['open'])])
 def test_state_and_events_follow_from_the_inputs(
-        inputs: str, state: LinkState, events: list[str]) -> None:
-    status, reported = LinkStatus('label', 0.0), []
+        inputs: str, state: link_state.LinkState, events: list[str]) -> None:
+    status, reported = link_state.LinkStatus('label', 0.0), []
     for now, initial in enumerate(inputs):
-        (input_,) = (one for one in LinkInput if one.value[0] == initial)
+        (input_,) = (one for one in link_state.LinkInput if one.value[0] == initial)
         status.take(input_, float(now), 'name', 'reason')
         while event := status.event(float(now)):
             reported.append(str(event).split(':')[0].removeprefix('link '))
@@ -54,22 +47,23 @@ def test_state_and_events_follow_from_the_inputs(
 
 
 def test_reasons_for_not_opening_are_reported_once_each_up_to_a_bound() -> None:
-    status, reported = LinkStatus('label', 0.0), []
-    for number in range(2 * MAX_REASONS):
+    status, reported = link_state.LinkStatus('label', 0.0), []
+    for number in range(2 * link_state.MAX_REASONS):
         for _ in range(2):
             status.failed(f'reason {number}')
             while event := status.event(0.0):
                 reported.append(str(event))
     assert reported == [f'link not open: label: reason {number}; trying again'
-                        for number in range(MAX_REASONS)]
-    assert status.reason == f'reason {2 * MAX_REASONS - 1}'
+                        for number in range(link_state.MAX_REASONS)]
+    assert status.reason == f'reason {2 * link_state.MAX_REASONS - 1}'
 
 
-def flap(status: LinkStatus, now: float, times: int) -> list[int]:
+def flap(status: link_state.LinkStatus, now: float, times: int) -> list[int]:
     """Open and lose a link at one moment; return the unreported changes of each report."""
     found = []
     for _ in range(times):
-        for input_ in (LinkInput.OPENED, LinkInput.PROVED, LinkInput.CLOSED):
+        for input_ in (link_state.LinkInput.OPENED, link_state.LinkInput.PROVED,
+                       link_state.LinkInput.CLOSED):
             status.take(input_, now, 'name', 'reason')
             while event := status.event(now):
                 found.append(event.unreported)
@@ -77,18 +71,18 @@ def flap(status: LinkStatus, now: float, times: int) -> list[int]:
 
 
 def test_reports_beyond_the_limit_are_refilled_with_time_and_count_the_rest() -> None:
-    status = LinkStatus('label', 0.0)
-    assert flap(status, 0.0, 50) == [0] * MAX_EVENTS
-    assert status.next_deadline() == EVENT_INTERVAL
-    assert status.event(EVENT_INTERVAL - 0.1) is None
+    status = link_state.LinkStatus('label', 0.0)
+    assert flap(status, 0.0, 50) == [0] * link_state.MAX_EVENTS
+    assert status.next_deadline() == link_state.EVENT_INTERVAL
+    assert status.event(link_state.EVENT_INTERVAL - 0.1) is None
     # The newest two changes are kept, and all others counted.
-    event = status.event(EVENT_INTERVAL)
+    event = status.event(link_state.EVENT_INTERVAL)
     assert event is not None
     assert str(event) == (
-        f'link open: name ({100 - MAX_EVENTS - 2} more changes not reported)')
-    assert status.event(EVENT_INTERVAL) is None
-    last = status.event(2 * EVENT_INTERVAL)
+        f'link open: name ({100 - link_state.MAX_EVENTS - 2} more changes not reported)')
+    assert status.event(link_state.EVENT_INTERVAL) is None
+    last = status.event(2 * link_state.EVENT_INTERVAL)
     assert (last and (last.is_open, last.unreported)) == (False, 0)
     assert status.next_deadline() == float('inf')
     # The limit does not grow beyond its beginning.
-    assert flap(status, 1000 * EVENT_INTERVAL, 50) == [0] * MAX_EVENTS
+    assert flap(status, 1000 * link_state.EVENT_INTERVAL, 50) == [0] * link_state.MAX_EVENTS

@@ -19,14 +19,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from illuminator_ros.mavlink import frame_writer
 from illuminator_ros.mavlink.frame import Frame
-from illuminator_ros.mavlink.frame_writer import (
-    FrameWriter,
-    LoopbackFilter,
-    MAX_FRAMES,
-    MAX_STAMPS,
-    MEMORY,
-)
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
@@ -38,24 +32,25 @@ FRAME = Frame(2, 7, OURS, 0, b'\x01\x02')
 
 
 @pytest.mark.parametrize(('changes', 'after', 'is_ours'), [
-    ({}, 0.0, True), ({}, MEMORY, True), ({'payload': b'\x01\x02\0\0'}, 0.1, True),
+    ({}, 0.0, True), ({}, frame_writer.MEMORY, True), ({'payload': b'\x01\x02\0\0'}, 0.1, True),
     ({'sequence': 8}, 0.1, False), ({'payload': b'\x01\x03'}, 0.1, False),
     ({'message_id': 76}, 0.1, False), ({'source': Address(1, 195)}, 0.1, False),
-    ({}, MEMORY + 0.1, False)])
+    ({}, frame_writer.MEMORY + 0.1, False)])
 def test_unsigned_frame_is_ours_if_it_equals_one_sent_within_a_second(
         changes: dict[str, Any], after: float, is_ours: bool) -> None:
-    loopback = LoopbackFilter()
+    loopback = frame_writer.LoopbackFilter()
     loopback.sent(OURS, 7, 0, b'\x01\x02\0\0', 100.0)
     assert [loopback.has(replace(FRAME, **changes), 100.0 + after) for _ in range(2)] == [
         is_ours, is_ours]
-    for number in range(MAX_FRAMES):
+    for number in range(frame_writer.MAX_FRAMES):
         loopback.sent(OURS, number, 76, b'\x01', 100.0)
     assert not loopback.has(FRAME, 100.0)
 
 
 def test_signed_frame_that_returns_late_is_ours_until_many_have_followed() -> None:
-    writer = FrameWriter(Signing(SigningMode.REQUIRE, bytes(range(32))))
-    first, *others = [only(writer.frame(LIGHT, STATUS, 0.0, 1.7e9)) for _ in range(MAX_STAMPS)]
+    writer = frame_writer.FrameWriter(Signing(SigningMode.REQUIRE, bytes(range(32))))
+    first, *others = [only(writer.frame(LIGHT, STATUS, 0.0, 1.7e9))
+                      for _ in range(frame_writer.MAX_STAMPS)]
     assert writer.is_loopback(first, 3600.0)
     writer.frame(LIGHT, STATUS, 0.0, 1.7e9)
     assert [writer.is_loopback(frame, 3600.0) for frame in (first, others[0])] == [False, True]

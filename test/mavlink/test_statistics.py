@@ -20,29 +20,23 @@ from collections.abc import Iterable
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.mavlink import statistics
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.mavlink.statistics import (
-    MAX_SOURCES,
-    SequenceCounter,
-    Traffic,
-    WINDOW,
-    WindowedCounter,
-)
 import pytest
 from support.frames import LIGHT
 
 Counts = tuple[int, int, int, int]
 
 
-def after(sequences: Iterable[int]) -> SequenceCounter:
+def after(sequences: Iterable[int]) -> statistics.SequenceCounter:
     """Return a counter that has taken these numbers, modulo 256."""
-    counter = SequenceCounter()
+    counter = statistics.SequenceCounter()
     for sequence in sequences:
         counter.add(sequence & 0xFF)
     return counter
 
 
-def counts(counter: SequenceCounter) -> Counts:
+def counts(counter: statistics.SequenceCounter) -> Counts:
     """Return frames received, lost, duplicate and reordered."""
     return counter.received, counter.lost, counter.duplicate, counter.reordered
 
@@ -54,11 +48,11 @@ def counts(counter: SequenceCounter) -> Counts:
     ([1, 3, 2, 2], (4, 0, 1, 1)), ([1, 5, 3], (3, 2, 0, 1)), ([0, 128], (2, 127, 0, 0)),
     (range(10_000), (10_000, 0, 0, 0)),
     # A late frame is recognised as far back as the window.
-    ([10, *range(12, 11 + WINDOW), 11], (WINDOW + 1, 0, 0, 1)),
+    ([10, *range(12, 11 + statistics.WINDOW), 11], (statistics.WINDOW + 1, 0, 0, 1)),
     # The sender has restarted and counts from 0 again: half a turn of losses at most.
     *(([*range(last - 20, last + 1), *range(100)], (121, lost, duplicate, 0))
       for last, lost, duplicate in ((255, 0, 0), (250, 5, 0), (128, 127, 0), (127, 0, 0),
-                                    (WINDOW, 0, 0), (30, 0, 31))),
+                                    (statistics.WINDOW, 0, 0), (30, 0, 31))),
     ([*range(80, 101), 0, 1, 2, 2, 4, 3, 7], (28, 2, 1, 1))])
 def test_lost_duplicate_and_reordered_frames_are_counted_apart(
         sequences: Iterable[int], expected: Counts) -> None:
@@ -81,7 +75,7 @@ def test_lost_duplicate_and_reordered_frames_are_counted_apart(
     ([*((number % 256, number) for number in range(254, 600)), (80, 592)], '0' * 347, 0)])
 def test_senders_with_one_address_are_told_apart_by_numbers_and_contents(
         frames: list[tuple[int, int | None]], senders: str, lost: int) -> None:
-    counter, found = SequenceCounter(), ''
+    counter, found = statistics.SequenceCounter(), ''
     for number, content in frames:
         counter.add(number, content)
         found += str(counter.sender)
@@ -114,7 +108,7 @@ def test_counts_agree_with_numbers_that_do_not_wrap(journey: tuple[list[int], Co
     assert counts(after(order)) == expected
 
 
-def recent_loss(counter: SequenceCounter, now: float) -> float:
+def recent_loss(counter: statistics.SequenceCounter, now: float) -> float:
     """Sample the recent loss, %."""
     counter.sample(now)
     return counter.recent_loss
@@ -134,7 +128,7 @@ def test_recent_loss_is_the_share_of_the_frames_sent_lately(
 
 
 def test_recent_loss_is_shown_for_10_s_and_forgotten_after_20_s_or_a_restart() -> None:
-    counter, losses = SequenceCounter(), []
+    counter, losses = statistics.SequenceCounter(), []
     for second in range(30):
         counter.add(second if second < 2 else second + 10)
         losses.append(recent_loss(counter, float(second)))
@@ -149,7 +143,7 @@ def test_recent_loss_is_shown_for_10_s_and_forgotten_after_20_s_or_a_restart() -
 
 @pytest.mark.parametrize('interval', [0.5, 1.0, 7.0])
 def test_rate_is_that_of_the_last_seconds(interval: float) -> None:
-    window, now, count, rates = WindowedCounter(), 0.0, 0, []
+    window, now, count, rates = statistics.WindowedCounter(), 0.0, 0, []
     while now < 100.0:
         # 1000 a second at first, then 10.
         count += int((1000 if now < 50.0 else 10) * interval)
@@ -163,7 +157,7 @@ def test_rate_is_that_of_the_last_seconds(interval: float) -> None:
 
 
 def test_snapshot_of_traffic_has_rates_and_does_not_change() -> None:
-    traffic = Traffic()
+    traffic = statistics.Traffic()
     traffic.snapshot(0.0)
     traffic.bytes_received, traffic.bytes_sent = 5000, 200
     snapshot = traffic.snapshot(2.0)
@@ -172,7 +166,7 @@ def test_snapshot_of_traffic_has_rates_and_does_not_change() -> None:
 
 
 def test_traffic_counts_each_source_apart_and_over_interruptions() -> None:
-    traffic = Traffic()
+    traffic = statistics.Traffic()
     traffic.count(LIGHT, bytes((10, 13)))
     traffic.count(Address(1, 1), bytes((20, 26)))
     traffic.restart()
@@ -183,9 +177,10 @@ def test_traffic_counts_each_source_apart_and_over_interruptions() -> None:
 
 
 def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
-    traffic = Traffic()
-    for number in range(2 * MAX_SOURCES):
+    traffic = statistics.Traffic()
+    for number in range(2 * statistics.MAX_SOURCES):
         traffic.count(Address(2 + number // 256, number % 256), b'\0')
     traffic.count(Address(2, 0), b'\1')
-    assert (len(traffic.sources), traffic.frames_received) == (MAX_SOURCES, 2 * MAX_SOURCES + 1)
+    assert (len(traffic.sources), traffic.frames_received) == (
+        statistics.MAX_SOURCES, 2 * statistics.MAX_SOURCES + 1)
     assert traffic.sources[Address(2, 0)].received == 2

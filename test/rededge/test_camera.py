@@ -22,15 +22,9 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
+from illuminator_ros.rededge import messages as rededge
 from illuminator_ros.rededge.camera import CameraConnected, CameraLost, ImageTaken
 from illuminator_ros.rededge.client import RedEdgeClient, Settings
-from illuminator_ros.rededge.messages import (
-    CameraFeedback,
-    CameraStatus,
-    DigicamControl,
-    Ping,
-    Shot,
-)
 import pytest
 
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
@@ -39,12 +33,12 @@ BEAT = Heartbeat(0, 1, 2, 3, 4, 3)
 CLOSED_LOOP, OPEN_LOOP = 3, 4
 
 
-def feedback(index: int, flags: int = CLOSED_LOOP) -> CameraFeedback:
-    return CameraFeedback(0, 1, 0, index, 0, 0, 0, 0, 0, 0, 0, 0, flags)
+def feedback(index: int, flags: int = CLOSED_LOOP) -> rededge.CameraFeedback:
+    return rededge.CameraFeedback(0, 1, 0, index, 0, 0, 0, 0, 0, 0, 0, 0, flags)
 
 
-def status(index: int, event: int = 1) -> CameraStatus:
-    return CameraStatus(0, 1, 0, index, event, 0, 0, 0, 0)
+def status(index: int, event: int = 1) -> rededge.CameraStatus:
+    return rededge.CameraStatus(0, 1, 0, index, event, 0, 0, 0, 0)
 
 
 class Rig:
@@ -88,14 +82,14 @@ class Rig:
     def take_result(self, success: bool, text: str) -> None:
         self.results.append((success, text))
 
-    def ping(self) -> Ping:
+    def ping(self) -> rededge.Ping:
         """Request a PING and return it."""
         self.client.camera.ping(self.now, self.take_result)
         self.run(0.0)
-        found: Ping = self.all(Ping)[-1]
+        found: rededge.Ping = self.all(rededge.Ping)[-1]
         return found
 
-    def capture(self, shot: Shot = Shot.SURVEY) -> None:
+    def capture(self, shot: rededge.Shot = rededge.Shot.SURVEY) -> None:
         self.client.camera.capture(shot, self.now, self.take_result)
         self.run(0.0)
 
@@ -104,9 +98,9 @@ class Rig:
         return self.client.snapshot(self.now).camera
 
 
-def reply(request: Ping, **changes: int) -> Ping:
-    return Ping(**{'time_usec': 0, 'seq': request.seq, 'target_system': OWN.system,
-                   'target_component': OWN.component, **changes})
+def reply(request: rededge.Ping, **changes: int) -> rededge.Ping:
+    return rededge.Ping(**{'time_usec': 0, 'seq': request.seq, 'target_system': OWN.system,
+                           'target_component': OWN.component, **changes})
 
 
 def test_the_camera_is_known_by_its_component_id_alone_re_6_re_7() -> None:
@@ -126,7 +120,7 @@ def test_a_camera_that_adopts_our_system_id_is_the_same_camera_re_8() -> None:
     assert rig.events == [CameraConnected(NEW)]
     assert (rig.state.address, rig.state.conflict) == (ADOPTED, False)
     rig.capture()
-    control = rig.all(DigicamControl)[-1]
+    control = rig.all(rededge.DigicamControl)[-1]
     assert (control.target_system, control.target_component) == ADOPTED
 
 
@@ -158,7 +152,7 @@ def test_two_components_with_the_camera_s_id_are_noticed() -> None:
 def test_each_ping_is_a_request_with_a_new_sequence_number_that_wraps_re_10() -> None:
     rig = Rig()
     rig.run(5.0, beats=True)
-    pings = rig.all(Ping)
+    pings = rig.all(rededge.Ping)
     assert [(one.target_system, one.target_component) for one in pings] == [(0, 0)] * 3
     assert [one.seq for one in pings] == [0xFFFFFFFF, 0, 1]
 
@@ -189,7 +183,7 @@ def test_a_lost_ping_is_sent_again_with_another_number_re_12() -> None:
     rig = Rig()
     first = rig.ping()
     rig.run(1.2)
-    second = rig.all(Ping)[-1]
+    second = rig.all(rededge.Ping)[-1]
     rig.hear(reply(second))
     assert second.seq != first.seq
     assert [success for success, _ in rig.results] == [True]
@@ -218,11 +212,12 @@ def test_no_request_waits_without_a_link() -> None:
         (False, 'the link is not open'), (False, 'no camera connected: link lost: unplugged')]
 
 
-@pytest.mark.parametrize('shot', Shot)
-def test_a_capture_is_a_success_after_its_feedback_re_5(shot: Shot) -> None:
+@pytest.mark.parametrize('shot', rededge.Shot)
+def test_a_capture_is_a_success_after_its_feedback_re_5(shot: rededge.Shot) -> None:
     rig = Rig()
     rig.capture(shot)
-    assert rig.all(DigicamControl) == [DigicamControl(255, 100, 1, 1, 0, 0, shot, 0, 0, 0.0)]
+    assert rig.all(rededge.DigicamControl) == [
+        rededge.DigicamControl(255, 100, 1, 1, 0, 0, shot, 0, 0, 0.0)]
     rig.hear(status(1))
     rig.run(0.5)
     assert rig.results == []
@@ -276,4 +271,4 @@ def test_a_capture_is_refused_without_a_camera_or_while_another_runs() -> None:
     rig.capture()
     assert rig.results == [(False, 'no camera connected: none heard yet'),
                            (False, 'another capture is under way')]
-    assert len(rig.all(DigicamControl)) == 1
+    assert len(rig.all(rededge.DigicamControl)) == 1

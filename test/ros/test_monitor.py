@@ -16,11 +16,7 @@
 
 from collections.abc import Iterator
 
-from illuminator_ros.cli.monitor.key_bindings import (
-    refresh,
-    strobe,
-    switch,
-)
+from illuminator_ros.cli.monitor import key_bindings
 from illuminator_ros.cli.monitor.model import Outcome, State
 from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS, type_name
 import pytest
@@ -50,7 +46,7 @@ def test_monitor_shows_a_light_with_the_link_and_identity_and_sends_its_requests
 
     light.report(brightness=30.0, temp_c=61.5, error_status=1, strobe_period=0.5,
                  strobe_duty_cycle=20.0, mode=2)
-    monitor.ask(switch)
+    monitor.ask(key_bindings.switch)
 
     assert 'confirmed by ILLUMINATOR_STATUS' in monitor.outcome('on', Outcome.DONE)
     shown = monitor.wait(
@@ -60,7 +56,7 @@ def test_monitor_shows_a_light_with_the_link_and_identity_and_sends_its_requests
     assert shown.link is not None and shown.link.number('loss_percent') == 0.0
     assert shown.lamp is not None and shown.lamp.values['vendor'] == 'maker'
     assert light.fake.fields['enable'] == 1
-    for ask, text in ((refresh, 'refresh'), (strobe, 'no strobe')):
+    for ask, text in ((key_bindings.refresh, 'refresh'), (key_bindings.strobe, 'no strobe')):
         monitor.ask(ask)
         monitor.outcome(text, Outcome.DONE)
     assert light.fake.fields['strobe_period'] == 0.0

@@ -27,13 +27,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import (
-    Quaternion,
-    QuaternionStamped,
-    Twist,
-    TwistStamped,
-    Vector3,
-)
+from geometry_msgs import msg as geometry
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from rosgraph_msgs.msg import Clock
@@ -71,7 +65,7 @@ class Robot:
         self.stamp: Callable[[], Time] = lambda: self.clock.now().to_msg()
         self._publishers = {
             name: ros.publisher(cls, f'/rededge/{name}', '/rededge') for name, cls in (
-                ('fix', NavSatFix), ('velocity', TwistStamped), ('satellites', UInt32),
+                ('fix', NavSatFix), ('velocity', geometry.TwistStamped), ('satellites', UInt32),
                 ('imu', Imu))}
         self._ros = ros
         self._ended = threading.Event()
@@ -84,21 +78,22 @@ class Robot:
         while not self._ended.wait(0.05):
             header = Header(stamp=self.stamp(), frame_id='base_link')
             if self.velocity:
-                self.publish('velocity', TwistStamped(header=header, twist=Twist(
-                    linear=Vector3(x=3.0, y=-4.0, z=0.0))))
+                self.publish('velocity', geometry.TwistStamped(header=header, twist=geometry.Twist(
+                    linear=geometry.Vector3(x=3.0, y=-4.0, z=0.0))))
                 self.publish('satellites', UInt32(data=9))
             self.publish('fix', NavSatFix(
                 header=header, status=NavSatStatus(status=0), **self.position))
             # Nose to the north-west, rolled to the right.
-            self.publish('imu', Imu(header=header, orientation=Quaternion(
+            self.publish('imu', Imu(header=header, orientation=geometry.Quaternion(
                 w=0.3826834, x=0.0, y=0.0, z=0.9238795)))
             if 'mount' in self._publishers:
                 # It looks ahead and 45 degrees down.
-                self.publish('mount', QuaternionStamped(header=header, quaternion=Quaternion(
-                    w=math.cos(math.pi / 8), x=0.0, y=math.sin(math.pi / 8), z=0.0)))
+                mount = geometry.Quaternion(
+                    w=math.cos(math.pi / 8), x=0.0, y=math.sin(math.pi / 8), z=0.0)
+                self.publish('mount', geometry.QuaternionStamped(header=header, quaternion=mount))
 
     def add_mount(self) -> None:
-        publisher = self._ros.publisher(QuaternionStamped, '/rededge/mount', '/rededge')
+        publisher = self._ros.publisher(geometry.QuaternionStamped, '/rededge/mount', '/rededge')
         self._publishers = {**self._publishers, 'mount': publisher}
 
     def __enter__(self) -> Robot:
@@ -169,7 +164,7 @@ def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) ->
           running_node(own_ros, camera, geoid_separation=48.0)):
         connected = own_ros.subscribe(Bool, '/rededge/connected')
         fix = own_ros.subscribe(NavSatFix, '/rededge/image/fix', STREAM)
-        attitude = own_ros.subscribe(QuaternionStamped, '/rededge/image/attitude', STREAM)
+        attitude = own_ros.subscribe(geometry.QuaternionStamped, '/rededge/image/attitude', STREAM)
         index = own_ros.subscribe(UInt32, '/rededge/image/index', STREAM)
         connected.wait_value(True)
         ping, image, panel = (call(own_ros, name) for name in ('ping', 'capture', 'capture_panel'))

@@ -22,13 +22,7 @@ from typing import Any, TypeVar
 
 from illuminator_ros.cli.conformance.run import LISTEN_TIME
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.requirement import (
-    Conditions,
-    PayloadChecks,
-    Requirement,
-    Result,
-    Verdict,
-)
+from illuminator_ros.payload.checks import requirement
 from illuminator_ros.payload.checks.runner import absence, CheckRunner
 from illuminator_ros.payload.checks.session import Interrupted
 from illuminator_ros.payload.simulated import SimulatedComponents
@@ -50,9 +44,9 @@ class ChecksRun:
     """
 
     def __init__(
-        self, checks: PayloadChecks[Any], devices: SimulatedComponents[Any], *,
+        self, checks: requirement.PayloadChecks[Any], devices: SimulatedComponents[Any], *,
         target: Address | None = None, consent: bool = True, only: tuple[str, ...] = (),
-        requirements: Sequence[Requirement[Any]] = (), version: int = 2,
+        requirements: Sequence[requirement.Requirement[Any]] = (), version: int = 2,
         utc: float = 0.0, **options: float,
     ) -> None:
         self.checks = checks
@@ -62,7 +56,7 @@ class ChecksRun:
         self.link = VirtualLink(self.session, devices, version)
         defaults = {one.name: one.default for one in checks.options}
         self.runner = CheckRunner(
-            checks, self.session, Conditions(
+            checks, self.session, requirement.Conditions(
                 consent, lambda: self.link.decoders[0].counters.crc_errors,
                 {**defaults, **options}, lambda: utc + self.link.now),
             [one for one in requirements or checks.requirements
@@ -82,16 +76,16 @@ class ChecksRun:
         self.link.run_until(lambda: not self.session.runner.running, within=3600.0)
         return self
 
-    def names(self, verdict: Verdict) -> set[str]:
+    def names(self, verdict: requirement.Verdict) -> set[str]:
         """Return the names of the requirements with a verdict."""
         return {one.requirement.name for one in self.runner.results if one.verdict is verdict}
 
     @property
     def failed(self) -> set[str]:
         """Return the names of the requirements that the device does not meet."""
-        return self.names(Verdict.FAIL)
+        return self.names(requirement.Verdict.FAIL)
 
-    def result(self, name: str) -> Result:
+    def result(self, name: str) -> requirement.Result:
         """Return the result of a requirement."""
         (result,) = [one for one in self.runner.results if one.requirement.name == name]
         return result

@@ -22,12 +22,7 @@ import heapq
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command_sender import (
-    Command,
-    CommandResult,
-    CommandSender,
-    CommandStatus,
-)
+from illuminator_ros.mavlink import command_sender
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, MavResult
 
 OURS = Address(1, 194)
@@ -46,23 +41,23 @@ class Run:
     Its frames are known by param7, which has the number of the run.
     """
 
-    command: Command
+    command: command_sender.Command
     frames: list[tuple[float, Any]] = field(default_factory=list)
-    outcomes: list[CommandResult] = field(default_factory=list)
+    outcomes: list[command_sender.CommandResult] = field(default_factory=list)
     ended_at: float = math.nan
 
-    def __call__(self, outcome: CommandResult, now: float) -> None:
+    def __call__(self, outcome: command_sender.CommandResult, now: float) -> None:
         self.outcomes.append(outcome)
         self.ended_at = now
 
     @property
-    def outcome(self) -> CommandResult:
+    def outcome(self) -> command_sender.CommandResult:
         """Return the outcome; an error unless there is exactly one."""
         (outcome,) = self.outcomes
         return outcome
 
     @property
-    def status(self) -> CommandStatus:
+    def status(self) -> command_sender.CommandStatus:
         """How it ended."""
         return self.outcome.status
 
@@ -85,7 +80,7 @@ class Rig:
     def __init__(self, *answers: Sequence[int], timeout: float = 0.5, retries: int = 3) -> None:
         self.now = 1000.0
         self.frames: list[tuple[float, Any]] = []
-        self.sender = CommandSender(OURS, timeout, retries)
+        self.sender = command_sender.CommandSender(OURS, timeout, retries)
         self.answers: Callable[[Any, int], Sequence[int]] = (
             lambda message, number: answers[number] if number < len(answers) else ())
         self.runs: list[Run] = []
@@ -98,7 +93,7 @@ class Rig:
               overtake: bool = False) -> Run:
         """Start a command; the limit is s from now. With params its frames are not told apart."""
         number = len(self.runs) + 1.0
-        run = Run(Command(
+        run = Run(command_sender.Command(
             target, command, (0.0,) * 6 + (number,) if params is None else params))
         self.runs.append(run)
         self.sender.start(

@@ -28,17 +28,8 @@ from std_msgs.msg import Header
 
 from .conversions import Frames, quaternion_message, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
+from .. import manager as gimbal_manager
 from ..axes import Range
-from ..manager import (
-    AddressShared,
-    DemandRefused,
-    GimbalManager,
-    ManagerEvent,
-    ManagerSettings,
-    ReferenceLost,
-    SetpointClipped,
-    SetpointSent,
-)
 from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_setpoint import GeoPoint
 from ..manager_state import ManagerState, StateChanged
@@ -96,7 +87,7 @@ def _players(values: Values, name: str, ros: Address) -> tuple[Address, ...]:
     return tuple(players)
 
 
-def manager_settings(values: Values, ros: Address) -> ManagerSettings:
+def manager_settings(values: Values, ros: Address) -> gimbal_manager.ManagerSettings:
     """
     Return the settings of the manager.
 
@@ -111,7 +102,7 @@ def manager_settings(values: Values, ros: Address) -> ManagerSettings:
             raise ParameterError(f'{axis}_min: {low} rad is above {axis}_max: {high} rad')
         ranges.append(Range(low, high) if axis == 'roll' else Range(-high + 0.0, -low + 0.0))
     roll, pitch, yaw = ranges
-    return ManagerSettings(
+    return gimbal_manager.ManagerSettings(
         ControlSettings(
             Policy(values['policy']), _players(values, 'priority', ros),
             frozenset(_players(values, 'overruling', ros)), values['lease']),
@@ -180,30 +171,30 @@ class ManagerNode(ServedPayload):
 
     # Events
 
-    def _take(self, event: ManagerEvent) -> None:
-        if isinstance(event, SetpointSent):
+    def _take(self, event: gimbal_manager.ManagerEvent) -> None:
+        if isinstance(event, gimbal_manager.SetpointSent):
             self._publish(event)
         elif isinstance(event, StateChanged):
             self._state_changed(event)
         elif isinstance(event, RoleHolderChanged):
             self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
-        elif isinstance(event, DemandRefused):
+        elif isinstance(event, gimbal_manager.DemandRefused):
             more = f' ({event.unreported} more)' if event.unreported else ''
             self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}{more}',
                               'refused')
-        elif isinstance(event, SetpointClipped):
+        elif isinstance(event, gimbal_manager.SetpointClipped):
             for one in event.clipped:
                 self._log.warning(
                     f'the setpoint is clipped: {one.axis} {one.asked:.3f} rad in MAVLink is '
                     f'beyond the limit {one.limit:.3f} rad', f'clipped {one.axis}')
-        elif isinstance(event, AddressShared):
+        elif isinstance(event, gimbal_manager.AddressShared):
             self._log.error(f'{event.player} has control, and two different senders use that '
                             'address: require signing, or give one another address', 'shared')
-        elif isinstance(event, ReferenceLost):
+        elif isinstance(event, gimbal_manager.ReferenceLost):
             self._log.warning(f'the {event.unknown} of the vehicle is unknown: the gimbal does '
                               'not follow its setpoint', f'lost {event.unknown}')
 
-    def _publish(self, event: SetpointSent) -> None:
+    def _publish(self, event: gimbal_manager.SetpointSent) -> None:
         setpoint = event.setpoint
         if self._manager.has_mavlink:
             return
@@ -245,7 +236,7 @@ class ManagerNode(ServedPayload):
             self._manager, now))
 
 
-def findings(manager: GimbalManager, ways: int) -> list[Finding]:
+def findings(manager: gimbal_manager.GimbalManager, ways: int) -> list[Finding]:
     """
     Return the findings on a manager.
 
@@ -269,7 +260,7 @@ def _reports(
                    lambda: values)]
 
 
-def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
+def _values(manager: gimbal_manager.GimbalManager, now: float) -> dict[str, Value]:
     control, settings = manager.control, manager.settings.control
     since = control.since(Role.PRIMARY)
     return {
