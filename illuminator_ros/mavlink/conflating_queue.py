@@ -21,7 +21,7 @@ from collections.abc import Sequence
 
 from .messages import Address, Message
 
-# Classes of messages that are sent together, and replaced together.
+# Classes of messages that are sent together, in this order, and replaced together.
 StreamGroup = Sequence[type[Message]]
 # s for which a group is worth sending: a line may be blocked for long.
 MAX_AGE = 0.5
@@ -39,7 +39,9 @@ class ConflatingQueue:
 
     def __init__(self, groups: Sequence[StreamGroup]) -> None:
         self.dropped = 0
-        self._places = {cls: place for place, group in enumerate(groups) for cls in group}
+        # Of each class its group, and its position there.
+        self._places = {cls: (place, position) for place, group in enumerate(groups)
+                        for position, cls in enumerate(group)}
         self._held: list[list[tuple[Address, Message]]] = [[] for _ in groups]
         # When the first message of each group was taken, s.
         self._since = [0.0 for _ in groups]
@@ -54,11 +56,12 @@ class ConflatingQueue:
 
     def hold(self, source: Address, message: Message, now: float) -> bool:
         """Take a message, if it belongs to a stream; return whether it does."""
-        place = self._places.get(type(message))
-        if place is None:
+        if type(message) not in self._places:
             return False
+        place, position = self._places[type(message)]
         held = self._held[place]
-        if any(type(other) is type(message) for _, other in held):
+        # One that does not follow the last one begins anew, also after the end of a group alone.
+        if held and self._places[type(held[-1][1])][1] >= position:
             self.dropped += len(held)
             held.clear()
         if not held:

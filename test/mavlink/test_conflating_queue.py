@@ -53,6 +53,15 @@ def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first(
     assert not queue
 
 
+def test_a_pair_replaces_the_second_half_that_was_held_alone() -> None:
+    queue = ConflatingQueue(GROUPS)
+    for message in (pair(1)[1], *pair(2)):
+        queue.hold(SOURCE, message, 0.0)
+
+    assert [message for _, message in queue.take(0.0)] == [*pair(2)]
+    assert queue.dropped == 1
+
+
 @dataclass
 class Stream:
     """Sends a message, or several, again and again."""
