@@ -52,6 +52,14 @@ class MountOrientations:
             self._vehicles[source.system] = message, now
         return False
 
+    def absence(self, system: int, device_id: int) -> str:
+        """Return that a mount was never heard, and which ones were; '' if it was."""
+        if (system, device_id) in self._mounts:
+            return ''
+        heard = ', '.join(f'{number} of system {one}' for one, number in sorted(self._mounts))
+        return (f'no attitude of gimbal device {device_id} of system {system} has been heard, so '
+                f'the beam is not shown; heard: {heard or "none"}')
+
     def direction(self, system: int, device_id: int, now: float) -> Quaternion | None:
         """
         Return the rotation from the FLU axes of a mount to those of its vehicle's body.

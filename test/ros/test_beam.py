@@ -18,11 +18,12 @@ from collections.abc import Iterator
 import math
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from support.gimbals import FakeManager, served_gimbals
+from support.gimbals import FakeManager, OTHER, served_gimbals
 from support.light import Address, ServedLight
 from support.ports import free_port
 from support.processes import Program
@@ -134,3 +135,25 @@ def test_beam_of_a_light_on_a_gimbal_points_where_the_gimbal_points(
         light.report(enable=1)
         beam.clear()
         pass_time_until(lambda: any(map(gone, beam.messages)))
+
+
+def test_gimbal_of_a_beam_that_is_not_heard_is_reported_with_those_that_are(
+    own_ros: Ros, port: int,
+) -> None:
+    absence = ('no attitude of gimbal device 154 of system 1 has been heard, so the beam is not '
+               'shown; heard: 171 of system 1')
+    with (running_bridge(own_ros.domain, port, beam_range=20.0, mounted_on=154) as bridge,
+          ServedLight(port, enable=1), served_gimbals(port, FakeManager(device_id=171))):
+        recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        pass_time_until(lambda: bridge.count(f'{absence}; set mounted_on'))
+
+        lamp = recorder.wait(lambda array: any(
+            absence in status.message for status in array.status))
+        assert bridge.count('no attitude of gimbal device') == 1
+        with served_gimbals(port, FakeManager(OTHER)):
+            recorder.clear()
+            recorder.wait(lambda array: any(
+                status.name == 'illuminator: lamp' and absence not in status.message
+                for status in array.status))
+    assert [status.level for status in lamp.status if absence in status.message] == [
+        DiagnosticStatus.WARN]

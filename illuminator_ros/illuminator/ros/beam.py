@@ -111,6 +111,7 @@ class BeamPublisher:
 
     :param direction: returns the rotation of a gimbal, given its gimbal device id, relative to
         the vehicle; None if it is not known.
+    :ivar device_id: gimbal device id of the gimbal that turns it, 0 for none.
     """
 
     def __init__(
@@ -124,7 +125,7 @@ class BeamPublisher:
         self._publisher = node.create_publisher(Marker, '~/beam', STATE_QOS)
         self._beam = Beam()
         self._due = math.inf
-        self._mounted_on = self._device_id = geometry.mounted_on
+        self._mounted_on = self.device_id = geometry.mounted_on
         self._direction = direction
         # As it was published last, and when, s.
         self._rotation: Quaternion | None = Quaternion()
@@ -141,7 +142,7 @@ class BeamPublisher:
     def take(self, event: AnyLightEvent) -> None:
         """Take an event of the light."""
         if isinstance(event, StatusReceived):
-            self._device_id = self._mounted_on or event.status.gimbal_device_id
+            self.device_id = self._mounted_on or event.status.gimbal_device_id
             self._show(self._beam.updated(event.status))
         elif isinstance(event, LightLost):
             self._show(replace(self._beam, on=False))
@@ -160,7 +161,7 @@ class BeamPublisher:
             self._publish()
 
     def _current_rotation(self) -> Quaternion | None:
-        return self._direction(self._device_id) if self._device_id else Quaternion()
+        return self._direction(self.device_id) if self.device_id else Quaternion()
 
     def close(self) -> None:
         """Remove the beam, after the link's thread has ended."""

@@ -109,7 +109,7 @@ def why_no_light(link: diagnostics.LinkSnapshot, heard: LightsHeard) -> str:
 
 def reports(
     link: diagnostics.LinkSnapshot, *, light: LightSnapshot | None, heard: LightsHeard,
-    hardware_id: str, started: float,
+    hardware_id: str, started: float, mount_absence: str = '',
 ) -> list[diagnostics.Report]:
     """
     Return the reports of a node.
@@ -117,6 +117,7 @@ def reports(
     :param light: the node's light, None if there is none yet.
     :param hardware_id: of the light, '' while its identity is not settled.
     :param started: when the node was started, s on the link's clock.
+    :param mount_absence: why the direction of its gimbal is not known, '' if it is.
     """
     address = light.address if light else None
     findings = diagnostics.link_findings(
@@ -125,7 +126,7 @@ def reports(
         findings.append((diagnostics.WARN, f'more than {heard.count} lights, some ignored'))
     made = [diagnostics.link_report(link, address, findings, {'lights': heard.count})]
     if light is not None and hardware_id:
-        made.append(lamp_report(light, hardware_id, link.taken_at))
+        made.append(lamp_report(light, hardware_id, link.taken_at, mount_absence))
     return made
 
 
@@ -153,11 +154,16 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]
     return findings
 
 
-def lamp_report(light: LightSnapshot, hardware_id: str, now: float) -> diagnostics.Report:
+def lamp_report(
+    light: LightSnapshot, hardware_id: str, now: float, mount_absence: str = '',
+) -> diagnostics.Report:
     """Return the report on a light."""
     on = light.status.enabled if light.status else None
     fine = {True: 'on', False: 'off', None: 'connected'}[on]
-    return diagnostics.Report('lamp', hardware_id, lamp_findings(light, now), fine,
+    findings = lamp_findings(light, now)
+    if mount_absence:
+        findings.append((diagnostics.WARN, mount_absence))
+    return diagnostics.Report('lamp', hardware_id, findings, fine,
                               lambda: _lamp_values(light, now))
 
 

@@ -37,6 +37,7 @@ from ...payload.request import Result
 from ...payload.rotation import Quaternion
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
+from ...ros.diagnostics import DISCOVERY_GRACE
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.parameter_services import ParameterServices
@@ -72,7 +73,8 @@ class LightNode:
         self._host = host
         self._log = log
         self._client = client
-        self._started = host.link.clock()
+        self._started = self._bound_at = host.link.clock()
+        self._told_of_mount = False
         self._hardware_id = ''
         limits = client.settings.limits
         parameters = DeviceParameters(node, device_parameters(limits))
@@ -103,7 +105,7 @@ class LightNode:
 
     def bind(self, address: Address, now: float) -> None:
         """Serve a light from now on, and publish what is known of it."""
-        self.address = address
+        self.address, self._bound_at = address, now
         self._host.frame_log.assign(address, self._log)
         light = self._client.lights.get(address)
         if light is not None:
@@ -133,10 +135,20 @@ class LightNode:
         return self.address and self._client.mounts.direction(
             self.address.system, device_id, self._host.link.clock())
 
+    def _mount_absence(self, now: float) -> str:
+        """Return that the gimbal which turns the beam was never heard; '' if it was."""
+        if (self._beam is None or not self._beam.device_id or self.address is None
+                or now < self._bound_at + DISCOVERY_GRACE):
+            return ''
+        return self._client.mounts.absence(self.address.system, self._beam.device_id)
+
     def poll(self) -> None:
         """Do what is due."""
         if self._beam is not None:
             self._beam.poll()
+        if not self._told_of_mount and (absence := self._mount_absence(self._host.link.clock())):
+            self._told_of_mount = True
+            self._log.warning(f'{absence}; set mounted_on')
 
     def close(self) -> None:
         """Remove the beam, after the link's thread has ended."""
@@ -248,7 +260,7 @@ class LightNode:
             self._hardware_id = self._hardware_id or hardware_id(snapshot)
         return functools.partial(
             reports, light=snapshot, heard=self._heard(), hardware_id=self._hardware_id,
-            started=self._started)
+            started=self._started, mount_absence=self._mount_absence(now))
 
     def _heard(self) -> LightsHeard:
         client = self._client
