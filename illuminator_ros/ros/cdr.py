@@ -12,16 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Serialised messages (CDR, little endian): publishing bytes takes half the time."""
+"""
+Serialised messages (CDR): publishing bytes takes half the time, and reading them a third.
+
+A serialised message is the encapsulation header, which tells the byte order, and the values, each
+aligned to its size (DDS-RTPS 2.5, section 10; Extended CDR version 1).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+import functools
+import importlib
+import operator
+import re
 import struct
+from types import SimpleNamespace
 
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 _HEADER = b'\0\1\0\0'
+# Of the values, by the first two bytes of the header.
+_BYTE_ORDERS = {b'\0\0': '>', b'\0\1': '<'}
+# Formats of struct; that of a string is the format of its length.
+_STRING = 'L'
+_FORMATS = {
+    'boolean': '?', 'int8': 'b', 'uint8': 'B', 'int16': 'h', 'uint16': 'H', 'int32': 'i',
+    'uint32': 'I', 'int64': 'q', 'uint64': 'Q', 'float': 'f', 'double': 'd', 'string': _STRING}
+# Takes the values of a field, in the order of the message, and returns that of the field.
+_Build = Callable[[Iterator[object]], object]
+# Returns the types of the fields of a message class, by name.
+_field_types = operator.methodcaller('get_fields_and_field_types')
 
 
 def serializer(type_: type) -> Callable[[object], object]:
@@ -51,6 +72,77 @@ def temperature(celsius: float, nanoseconds: int, frame_id: str) -> bytes:
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
     head = struct.pack(f'<iII{len(name)}s', seconds, rest, len(name), name)
     return _HEADER + head + bytes(-len(head) % 8) + struct.pack('<dd', celsius, 0.0)
+
+
+def deserializer(type_: type[object]) -> Callable[[bytes], SimpleNamespace]:
+    """
+    Return a function that reads serialised messages of a class, in either byte order.
+
+    It returns the fields as attributes, arrays as tuples. It raises ValueError for bytes that are
+    not such a message.
+
+    :raises TypeError: if the class has a sequence, or another type of variable size but a string.
+    """
+    formats: list[str] = []
+    build = _structure(type_, formats)
+    *before_strings, rest = re.split(f'(?<={_STRING})', ''.join(formats))
+
+    def read(data: bytes) -> SimpleNamespace:
+        values: list[object] = []
+        # Values are aligned from the end of the header.
+        body, position = data[len(_HEADER):], 0
+        try:
+            byte_order = _BYTE_ORDERS[data[:2]]
+            for part in before_strings:
+                layout = _layout(byte_order, part, position % 8)
+                *some, length = layout.unpack_from(body, position)
+                start = position + layout.size
+                position = start + length
+                if position > len(body):
+                    raise ValueError
+                # The length counts the terminator.
+                values += *some, body[start:position][:-1].decode()
+            values += _layout(byte_order, rest, position % 8).unpack_from(body, position)
+        except (KeyError, ValueError, struct.error):
+            raise ValueError(f'{len(data)} bytes that are not a serialised message') from None
+        return build(iter(values))
+
+    return read
+
+
+def _structure(
+    type_: type[object], formats: list[str],
+) -> Callable[[Iterator[object]], SimpleNamespace]:
+    """Append the formats of the values of a message; return what makes the message of them."""
+    fields = {name: _field(field, formats)
+              for name, field in _field_types(type_).items()}
+    return lambda values: SimpleNamespace(
+        **{name: build(values) for name, build in fields.items()})
+
+
+def _field(name: str, formats: list[str]) -> _Build:
+    if array := re.fullmatch(r'(.+)\[(\d+)\]', name):
+        elements = [_field(array[1], formats) for _ in range(int(array[2]))]
+        return lambda values: tuple(build(values) for build in elements)
+    if message := re.fullmatch(r'(\w+)/(\w+)', name):
+        package = importlib.import_module(f'{message[1]}.msg')
+        return _structure(getattr(package, message[2]), formats)
+    if name not in _FORMATS:
+        raise TypeError(f'a field of type {name} cannot be read')
+    formats.append(_FORMATS[name])
+    return next
+
+
+@functools.cache
+def _layout(byte_order: str, formats: str, position: int) -> struct.Struct:
+    """Return the layout of values that begin at a position, modulo 8."""
+    text = byte_order
+    for one in formats:
+        size = struct.calcsize(byte_order + one)
+        padding = -position % size
+        text += f'{padding}x{one}'
+        position += padding + size
+    return struct.Struct(text)
 
 
 _PACK: dict[type, Callable[..., bytes]] = {

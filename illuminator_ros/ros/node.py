@@ -26,7 +26,7 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from .cdr import serializer
+from .cdr import deserializer, serializer
 from .executor import A, DeferredService, Q, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
 from .throttled_log import NodeLog
@@ -129,10 +129,11 @@ class CommandTopic(Generic[T]):
     """
     A topic ``~/name`` that the node subscribes to.
 
-    :param type: the message's class.
+    :param type: the message's class, without sequences.
     :param take: called in the link's thread with a value and the time (s); of values that come
         faster than the link takes them only the newest.
-    :param read: returns the value of a message, in any thread; a ValueError is logged.
+    :param read: returns the value of a message, in any thread; a ValueError is logged. The message
+        has the fields of ``type`` only, and tuples for arrays.
     """
 
     name: str
@@ -167,7 +168,8 @@ class NodeInterface:
                 qos_profile=SERVICE_QOS)
         for command in commands:
             node.create_subscription(
-                command.type, f'~/{command.name}', _Newest(link, log, command).offer, COMMAND_QOS)
+                command.type, f'~/{command.name}', _Newest(link, log, command).offer, COMMAND_QOS,
+                raw=True)
 
     def publish(self, name: str, value: object) -> None:
         """
@@ -199,12 +201,13 @@ class _Newest(Generic[T]):
         self._link = link
         self._log = log
         self._command = command
+        self._deserialize = deserializer(command.type)
         self._waiting: list[T] = []
         self._lock = threading.Lock()
 
-    def offer(self, message: object) -> None:
+    def offer(self, data: bytes) -> None:
         try:
-            value = self._command.read(message)
+            value = self._command.read(self._deserialize(data))
         except ValueError as error:
             self._log.warning(f'~/{self._command.name}: ignored: {error}', self._command.name)
             return
