@@ -288,8 +288,22 @@ class Link:
         """Do what others asked for, and what is due."""
         self._work_pending = False
         self._run_calls()
-        # Before other work: a caller waits for the answer to a request.
         self._flush()
+        self._due = self._next_deadline()
+        if self.clock() >= self._due:
+            self._poll()
+            self._due = self._next_deadline()
+
+    def _next_deadline(self) -> float:
+        """Return when :meth:`_poll` is due."""
+        return min(
+            self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
+            self._status.next_deadline(), self._snapshot_due, self._stream_due(),
+            self._receiver.next_deadline(),
+            math.inf if self._channel is not None or self._connecting else self._connect_at)
+
+    def _poll(self) -> None:
+        """Do what is due."""
         now = self.clock()
         if self._channel is not None:
             self._poll_channel(self._channel, now)
@@ -302,10 +316,6 @@ class Link:
             self._store_due = now + STORE_INTERVAL
             self._keep_timestamp(last=False)
         self._report(now)
-        self._due = min(
-            self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
-            self._status.next_deadline(), self._snapshot_due, self._stream_due(),
-            math.inf if self._channel is not None or self._connecting else self._connect_at)
 
     def _keep_timestamp(self, *, last: bool) -> None:
         if self._store:

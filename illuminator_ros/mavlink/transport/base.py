@@ -129,17 +129,19 @@ class FrameQueue:
             dropped += 1
         return dropped
 
-    def head(self) -> bytes:
+    def unwritten(self) -> bytes:
         """Return the bytes to write next."""
-        return self._frames[0]
+        return b''.join(self._frames)
 
     def written(self, count: int) -> None:
-        """Note that ``count`` bytes of the head were written."""
-        frame = self._frames.popleft()
+        """Note that the first ``count`` bytes were written."""
         self._size -= count
-        self._begun = count < len(frame)
-        if self._begun:
-            self._frames.appendleft(frame[count:])
+        while count:
+            frame = self._frames.popleft()
+            self._begun = count < len(frame)
+            if self._begun:
+                self._frames.appendleft(frame[count:])
+            count -= min(count, len(frame))
 
 
 class Stream:
@@ -174,7 +176,8 @@ class Stream:
         dropped = sum(map(self._queue.put, frames))
         with contextlib.suppress(BlockingIOError):
             while self._queue:
-                self._queue.written(os.write(self._descriptor, self._queue.head()))
+                # In one call: each takes longer than making the frames.
+                self._queue.written(os.write(self._descriptor, self._queue.unwritten()))
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
         if selector.get_key(self.file).events != events:
             selector.modify(self.file, events)
