@@ -119,6 +119,22 @@ def test_included_file_declares_the_arguments_given_to_it(launch: ET.Element) ->
         assert given <= set(declared(included))
 
 
+@EVERY
+def test_included_file_is_given_each_argument_that_the_including_file_has_too(
+        launch: ET.Element) -> None:
+    # It would have the value of the including file, not its own default.
+    for include in launch.findall('include'):
+        included = FILES[Path(include.attrib['file']).name]
+        given = {argument.attrib['name'] for argument in include.findall('arg')}
+        assert {*declared(included)} & {*declared(launch)} <= given
+
+
+@EVERY
+def test_command_of_the_user_may_have_arguments(launch: ET.Element) -> None:
+    for executable in launch.findall('executable'):
+        assert ('shell' in executable.attrib) is executable.attrib['cmd'].startswith('$(var ')
+
+
 def test_parameter_of_the_bridge_exists_with_that_type() -> None:
     known = {spec.name: spec for spec in (*LINK_PARAMETERS, *LIGHT_PARAMETERS)}
     given = [param.attrib for param in FILES['bridge.launch.xml'].iterfind('node/param')]
