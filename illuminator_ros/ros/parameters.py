@@ -299,7 +299,8 @@ def ignored_parameters(node: Node, first: Node) -> list[str]:
             if name not in given_parameters(first):
                 warnings.append(_unknown(name, difflib.get_close_matches(
                     name, node.list_parameters([], 0).names, 1, 0.75)))
-        elif parameter.value != first.get_parameter(name).value:
+        elif parameter.value not in (None, first.get_parameter(name).value):
+            # None is an empty list.
             warnings.append(f'parameter {name!r} is ignored here: that of '
                             f'{first.get_fully_qualified_name()} holds')
     return warnings
