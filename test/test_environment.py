@@ -105,3 +105,13 @@ def test_chosen_python_that_cannot_be_used_is_explained(
 
     assert (status, message in output) == (1, True), output
     assert 'venv' not in project.calls()
+
+
+def test_machine_without_wheels_gets_two_ways_to_go_on(project: Project) -> None:
+    status, output = project.run('-c', (
+        "import platform, runpy; platform.machine = lambda: 'aarch64'; "
+        "runpy.run_path('tools/environment.py', run_name='__main__')"))
+
+    assert (status, project.calls()) == (1, '')
+    for text in ('this is aarch64', 'source /opt/ros/', 'docker run '):
+        assert text in output

@@ -16,40 +16,26 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
-import importlib.util
-from typing import Any
 
-from ..rig import Bench, ROOT
+from support.faulty_wire import Faults
+from support.lossy_line import COMMANDS, CONFIRMED, Run
+
+from ..rig import Bench
 from ..rows import at_most, one, Row
 
-MATRIX = ROOT / 'test/illuminator/test_loss_matrix.py'
-LINE, SHARE = 'drop, duplicate and reorder', 0.3
-
-
-def matrix() -> Any:
-    """Return the module of the test that plays the whole matrix."""
-    spec = importlib.util.spec_from_file_location('test_loss_matrix', MATRIX)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+SHARE = 0.3
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Play one cell of the matrix in simulated time, and judge what each command came to."""
-    module = matrix()
-    module.COMMANDS = bench.amount(module.COMMANDS, 20)
-    module.LINES[LINE] = (('drop', 'duplicate', 'reorder'),) * 2
-    for line in ('drop', LINE):
-        _, requests, judge = module.play(line, SHARE)
-        judgements = [judge.judge(request) for request in requests]
-        kinds = Counter(kind for kind, _ in judgements)
-        untrue = sum(bool(wrong) for _, wrong in judgements)
-        several = sum(len(request.answer.results) != 1 for request in requests)
-        yield Row(f'commands confirmed, {line}: {SHARE:.0%} each way', '%',
-                  one(100 * kinds['confirmed'] / len(requests)),
+    """Send commands in simulated time, and compare each outcome with the state of the light."""
+    for kinds in (['drop'], ['drop', 'duplicate', 'reorder']):
+        faults = Faults(**dict.fromkeys(kinds, SHARE))
+        run = Run(faults, faults, str(kinds), commands=bench.amount(COMMANDS, 20))
+        untrue = len(list(run.untruths()))
+        several = sum(len(request.answer.results) != 1 for request in run.requests)
+        yield Row(f'commands confirmed, {", ".join(kinds)}: {SHARE:.0%} each way', '%',
+                  one(100 * run.outcomes[CONFIRMED] / len(run.requests)),
                   targets=[at_most(untrue, 0, 'outcomes untrue'),
                            at_most(several, 0, 'with no or several outcomes')],
-                  note=f'{len(requests)} commands')
+                  note=f'{len(run.requests)} commands')

@@ -46,6 +46,8 @@ MIN_TIMEOUT = 0.2
 MAX_SAMPLES = 64
 # Before this many samples the given time-out holds.
 MIN_SAMPLES = 4
+# s for which an acknowledgement, or a copy of it, may be under way.
+ACK_REACH = 5.0
 # COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
 GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
 DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
@@ -219,17 +221,25 @@ def format_seconds(seconds: float) -> str:
 
 
 class RttEstimator:
-    """The last :data:`MAX_SAMPLES` round-trip times of one target, s."""
+    """
+    The last :data:`MAX_SAMPLES` round-trip times of one target, s.
+
+    :ivar doubtful_until: s; until then acknowledgements may belong to earlier tries or be copies.
+    """
 
     def __init__(self) -> None:
+        self.doubtful_until = -math.inf
+        self._certain: deque[float] = deque(maxlen=8)
         self._samples: deque[float] = deque()
         self._sorted: list[float] = []
 
     def __len__(self) -> int:
         return len(self._sorted)
 
-    def add(self, seconds: float) -> None:
+    def add(self, seconds: float, now: float) -> None:
         """Add a sample, s."""
+        if now >= self.doubtful_until:
+            self._certain.append(seconds)
         self._samples.append(seconds)
         bisect.insort(self._sorted, seconds)
         if len(self._samples) > MAX_SAMPLES:
@@ -240,6 +250,12 @@ class RttEstimator:
         if not self._sorted:
             return None
         return self._sorted[min(int(share * len(self._sorted)), len(self._sorted) - 1)]
+
+    def least(self, now: float) -> float:
+        """Return the time in which no answer comes, s; 0 while acknowledgements are certain."""
+        if now >= self.doubtful_until or not self._certain:
+            return 0.0
+        return sorted(self._certain)[len(self._certain) // 4]
 
     def timeout(self, longest: float) -> float:
         """
@@ -417,6 +433,7 @@ class CommandSender:
                 and request.state is not RequestState.WAITING]
         if not sent:
             self.counters.unexpected_acks += 1
+            self._doubt(source, now)
             return
         # A command in progress is not rejected: the rejection belongs to a command beside it.
         request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
@@ -427,7 +444,7 @@ class CommandSender:
         if request.tries == 1 and request.result is None:
             # An acknowledgement after a resend may be that of either try: no measure (RFC 6298).
             self._round_trips.setdefault(request.command.target, RttEstimator()).add(
-                now - request.last_sent)
+                now - request.last_sent, now)
         request.result = ack.result
         state = TRANSITIONS.get((request.state, ack.result))
         if state is RequestState.IN_PROGRESS:
@@ -451,6 +468,10 @@ class CommandSender:
             return
         request.state = state
 
+    def _doubt(self, target: Address, now: float) -> None:
+        if target in self._round_trips:
+            self._round_trips[target].doubtful_until = now + ACK_REACH
+
     def poll(self, now: float) -> None:
         """Resend or end what is due."""
         for requests in list(self._requests.values()):
@@ -469,6 +490,7 @@ class CommandSender:
             self._end(request, CommandStatus.NO_ANSWER, now)
         else:
             request.state = RequestState.SENT
+            self._doubt(request.command.target, now)
             self._transmit(request, now)
 
     def next_deadline(self) -> float:

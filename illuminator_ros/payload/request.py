@@ -40,8 +40,6 @@ ASK_INTERVAL = 0.25
 MAX_WAITING = 32
 # The result of a request that was not carried out since another one overtook it.
 OVERTAKEN = 'cancelled by a later request'
-# s for which an acknowledgement, or a copy of it, may be under way.
-ACK_REACH = 5.0
 # s by which the statuses of a device without a clock may be late, until that was measured.
 UNKNOWN_DELAY = 0.75
 
@@ -109,6 +107,10 @@ class Target:
 
     def _status_answered(self, result: command_sender.CommandResult, now: float) -> None:
         self._status_requested = False
+
+    def round_trip(self, now: float) -> float:
+        """Return the time in which no answer comes, s; 0 while acknowledgements are certain."""
+        return self._commands.round_trip(self.address).least(now)
 
     @property
     def status_delay(self) -> float:
@@ -320,7 +322,7 @@ class Request(Generic[S]):
             self.fail(OVERTAKEN, now)
         elif outcome.accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
-        elif outcome.accepted or outcome.may_answer_earlier(now, ACK_REACH):
+        elif outcome.accepted or outcome.may_answer_earlier(now, command_sender.ACK_REACH):
             self._step(Step.ACKNOWLEDGED)
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
@@ -342,7 +344,7 @@ class Request(Generic[S]):
             self._repeats = 0
             if (earlier is not None and earlier.result is None
                     and earlier.command.params != self._sent.params
-                    and outcome.may_answer_earlier(now, ACK_REACH)):
+                    and outcome.may_answer_earlier(now, command_sender.ACK_REACH)):
                 self._repeats = earlier.tries
         self._repeats -= 1
         self._was_repeated |= self._repeats >= 0
@@ -358,7 +360,8 @@ class Request(Generic[S]):
         self._has_status = True
         if not self.is_confirming:
             return
-        delay = 0.0 if report.has_clock else self._target.status_delay
+        delay = (self._target.round_trip(now) if report.has_clock
+                 else self._target.status_delay)
         shown = self._sent.shown_by(report.status)
         if (shown and not self._was_repeated and self._before is not None
                 and not self._sent.shown_by(self._before)):

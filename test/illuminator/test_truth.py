@@ -30,7 +30,7 @@ from illuminator_ros.illuminator.events import (
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 import pytest
 from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight, LIGHT
+from support.fake_light import FakeLight, LIGHT, status_message
 from support.faulty_wire import Faults
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
@@ -135,6 +135,23 @@ def test_a_status_from_before_the_last_repeat_does_not_confirm(
         faked.run(0.05)
     fake.send(shows_off)
     assert not faked.wait_for(answer).success
+
+
+def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeLight) -> None:
+    # A copy of an earlier ON comes late and is undone before ours comes: the light acknowledges
+    # it and shows it, after we have sent ours but before it can know of that.
+    pair = Pair(fake, there=Faults(latency=0.2)).settle()
+    for on in (True, False, True, False):
+        assert pair.enable(on).success
+        pair.run(6.0)
+    fake.applies, fake.stream = False, 0.0
+    acknowledgement = CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE)
+    fake.send(acknowledgement)
+    pair.run(0.5)
+    fake.send(acknowledgement)
+    fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
+    pair.run(0.1)
+    assert not pair.enable(True).success
 
 
 def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(

@@ -33,7 +33,7 @@ def of(*seconds: float) -> RttEstimator:
     """Return an estimator with these samples."""
     estimator = RttEstimator()
     for sample in seconds:
-        estimator.add(sample)
+        estimator.add(sample, 0.0)
     return estimator
 
 
@@ -61,6 +61,14 @@ def test_timeout_and_quantiles_stay_within_bounds_for_any_samples(
 
 def test_quantile_of_no_sample_is_unknown() -> None:
     assert of().quantile(0.5) is None
+
+
+def test_least_is_known_from_certain_samples_and_needed_while_others_are_doubtful() -> None:
+    estimator = of(*[0.4] * 6)
+    assert estimator.least(0.0) == 0.0
+    estimator.doubtful_until = 5.0
+    estimator.add(0.001, 4.9)
+    assert (estimator.least(4.9), estimator.least(5.0)) == (0.4, 0.0)
 
 
 def taught(seconds: float, timeout: float) -> Rig:

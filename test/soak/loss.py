@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Sends commands to simulated lights over faulty lines, and compares each outcome with the light.
+
+Each run of 400 commands draws what the line does to frames in each direction (loss, repetition,
+reordering, delay, corruption), how the lights behave, and whether users wait for answers. Time is
+simulated, so 500 outcomes take a second. An outcome is untrue if a success was not acknowledged
+or never done, if a failure gives a wrong reason, or if there is not exactly one; and the state
+shown at the end must be that of the light.
+
+    python3 test/soak/loss.py --outcomes 600000
+    python3 test/soak/loss.py --outcomes 1 --seed 17     the one run of a seed
+
+Exit status: 0 if all outcomes are true, 1 if not.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from dataclasses import replace
+import itertools
+from pathlib import Path
+import random
+import sys
+from typing import Any
+
+TEST = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(TEST.parent), str(TEST)]
+
+from support.faulty_wire import Faults  # noqa: E402
+from support.lossy_line import FAULTLESS, OUTCOMES, Run  # noqa: E402
+
+KINDS = ('drop', 'duplicate', 'reorder', 'delay', 'corrupt')
+BEHAVIOURS: tuple[dict[str, Any], ...] = (
+    {}, {}, {'apply_after': 0.005}, {'apply_after': 0.2}, {'slow': 0.1}, {'progress': 0.5},
+    {'status_on_change': False}, {'acks_target': False}, {'answers_command_int': False})
+
+
+def line(draw: random.Random) -> Faults:
+    """Return the faults of one direction: each kind in half of the runs, up to a share of 0.5."""
+    kinds = {kind: draw.uniform(0.0, 0.5) for kind in KINDS if draw.random() < 0.5}
+    return Faults(**kinds, latency=draw.choice((0.0005, 0.002, 0.05, 0.2)),
+                  longest_delay=draw.choice((0.1, 0.5, 1.0)))
+
+
+def play(seed: int) -> Run:
+    """Return the run of a seed."""
+    draw = random.Random(seed)
+    there, back = line(draw), line(draw)
+    return Run(there, back, str(seed), impatience=draw.choice((0.0, 0.2)),
+               behaviour=replace(FAULTLESS, **draw.choice(BEHAVIOURS)))
+
+
+def main() -> int:
+    """Play runs until there are enough outcomes."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[1])
+    parser.add_argument('--outcomes', type=int, default=100_000)
+    parser.add_argument('--seed', type=int, default=0, help='of the first run (0)')
+    arguments = parser.parse_args()
+    outcomes: Counter[str] = Counter()
+    untrue = 0
+    for seed in itertools.count(arguments.seed):
+        run = play(seed)
+        outcomes += run.outcomes
+        for text in run.untruths():
+            untrue += 1
+            print(f'seed {seed}: {text}', flush=True)
+        if outcomes.total() >= arguments.outcomes:
+            break
+    for name in OUTCOMES:
+        print(f'{outcomes[name]:8} {name}')
+    print(f'{outcomes.total():8} outcomes, {untrue} untrue, seeds {arguments.seed} to {seed}')
+    return 1 if untrue else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

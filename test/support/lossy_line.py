@@ -1,0 +1,241 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Users of simulated lights over a faulty line, and whether the answers that they get are true."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+import math
+import random
+from typing import Any
+
+from illuminator_ros.illuminator.light import Light
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+)
+from illuminator_ros.illuminator.thermal import ThermalProperties
+from illuminator_ros.mavlink.messages import Address, CommandAck, MavCmd, MavResult
+from illuminator_ros.payload.simulated import Change, SimulatedComponent
+from support.back_to_back import Pair
+from support.faulty_wire import Faults
+from support.records import Answer
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+COMMANDS = 400
+# s; more than the longest delay of a line, and then a status of each light.
+QUIET = 6.0
+# s by which a sending time that is told from an uptime may be wrong here.
+UPTIME_ERROR = 0.05
+CONFIRMED = 'confirmed'
+# The answers that a user may get, and texts that they contain. CONFIRMED is the one success.
+OUTCOMES = {
+    CONFIRMED: 'confirmed by ILLUMINATOR_STATUS',
+    'not acknowledged': 'no acknowledgement',
+    'contradicted': 'but ILLUMINATOR_STATUS shows',
+    'no status': 'ILLUMINATOR_STATUS came within',
+    'doubtful': 'may belong to an earlier command',
+    'overtaken': 'cancelled by a later request',
+    'not sent': 'not sent: earlier requests took too long',
+    'refused': 'refused: MAV_RESULT_',
+    'unfinished': 'not finished in time',
+    'progress stopped': 'no final acknowledgement',
+    'lost': 'is lost: no heartbeat for',
+}
+FAULTLESS = IlluminatorBehaviour()
+Fields = Mapping[str, Any]
+
+
+class Witness:
+    """Keeps the states that one simulated light has been in, each with its beginning (s)."""
+
+    def __init__(self, light: SimulatedComponent[SimulatedIlluminator], now: float) -> None:
+        self._lamp = light.device
+        self._apply = light.apply
+        light.apply = self._watched_apply  # type: ignore[method-assign]
+        self._states: list[tuple[float, Fields]] = [(now, self._fields())]
+
+    def _fields(self) -> Fields:
+        return {'enabled': self._lamp.enabled, **asdict(self._lamp.configuration)}
+
+    def _watched_apply(self, change: Change, now: float) -> None:
+        self._apply(change, now)
+        if (fields := self._fields()) != self._states[-1][1]:
+            self._states.append((now, fields))
+
+    def matches(self, wish: Fields, since: float, until: float) -> list[bool]:
+        """Return for each state between two times whether it was as wished."""
+        ends = [*(at for at, _ in self._states[1:]), math.inf]
+        return [wish.items() <= fields.items() for (at, fields), end in zip(
+            self._states, ends, strict=True) if at <= until and end >= since]
+
+    def is_as(self, light: Light, now: float) -> bool:
+        """Return whether the bridge shows the present state."""
+        fields, shown = self._states[-1][1], light.snapshot(now)
+        return (shown.status is not None and shown.status.enabled == fields['enabled']
+                and shown.configuration == self._lamp.configuration)
+
+
+@dataclass
+class Request:
+    """A request to a light, and the wish with which it was made."""
+
+    light: Light
+    kind: MavCmd
+    wish: Fields
+    answer: Answer
+
+    @property
+    def message(self) -> str:
+        """Return the text of the answer."""
+        return self.answer.result.message
+
+    @property
+    def outcome(self) -> str:
+        """Return which of :data:`OUTCOMES` the answer is, '' if it is none of them."""
+        name = next((name for name, text in OUTCOMES.items() if text in self.message), '')
+        return name if self.answer.result.success is (name == CONFIRMED) else ''
+
+    def overlaps(self, other: Request) -> bool:
+        """Return whether an acknowledgement may belong to either of two requests."""
+        return (self is not other and (self.light, self.kind) == (other.light, other.kind)
+                and other.answer.asked_at <= self.answer.ended_at
+                and self.answer.asked_at <= other.answer.ended_at)
+
+
+class User:
+    """
+    One user of one light: asks for something, waits for the answer, and asks again.
+
+    :ivar due: when it does the next thing, or later if it is still waiting then.
+    """
+
+    def __init__(
+        self, pair: Pair, light: Light, kind: MavCmd, draw: random.Random, impatience: float,
+    ) -> None:
+        self.pair, self.light, self.kind, self.draw = pair, light, kind, draw
+        self.due = pair.now + draw.uniform(0, 1)
+        self.requests: list[Request] = []
+        self._impatience = impatience
+        self._waits = True
+
+    @property
+    def idle(self) -> bool:
+        """Whether it waits for no answer."""
+        return not self.requests or not self._waits or bool(self.requests[-1].answer.results)
+
+    def act(self) -> None:
+        """Ask for something."""
+        if self.kind == ON_OFF:
+            wish: dict[str, Any] = {'enabled': self.draw.random() < 0.5}
+            answer = self.pair.ask_enable(wish['enabled'], self.light)
+        else:
+            values = {'brightness': float(self.draw.randrange(101)),
+                      'strobe_period': self.draw.choice((0.0, 0.5, 1.0, 2.0)),
+                      'strobe_duty_cycle': float(self.draw.randrange(101))}
+            wish = {name: values[name] for name in self.draw.sample(sorted(values), 2)}
+            answer = self.pair.ask_configure(self.light, **wish)
+        self.requests.append(Request(self.light, self.kind, wish, answer))
+        self.due = self.pair.now + self.draw.choice((0.001, 0.1, 0.3))
+        self._waits = self.draw.random() >= self._impatience
+
+
+class Run:
+    """
+    Users of two lights over a line, until there are enough requests, all answered.
+
+    :param there: the faults of the line towards the lights; ``back`` towards the bridge.
+    :param impatience: the share of requests whose answer their user does not wait for.
+    """
+
+    def __init__(
+        self, there: Faults, back: Faults, seed: str, *, commands: int = COMMANDS,
+        behaviour: IlluminatorBehaviour = FAULTLESS, impatience: float = 0.0,
+    ) -> None:
+        # Lights that stay as bright as they are told: heat is the subject of another test.
+        self.pair = pair = Pair(
+            [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperties(rise=0.0),
+                                   behaviour=behaviour) for one in (243, 244)],
+            there=there, back=back, seed=seed)
+        self._witnesses = {light.address: Witness(light, pair.now) for light in pair.devices}
+        lights = pair.controller.lights
+        pair.run_until(lambda: len(lights) == len(pair.devices) and all(
+            light.snapshot(0.0).configuration for light in lights.values()), within=600.0)
+        draw = random.Random(seed)
+        users = [User(pair, light, kind, draw, impatience)
+                 for kind in (ON_OFF, CONFIGURE) for light in lights.values()]
+        while sum(len(user.requests) for user in users) < commands:
+            for user in users:
+                if user.due <= pair.now and user.idle:
+                    user.act()
+            pair.step(min((user.due for user in users if user.idle), default=math.inf))
+        self.requests = [request for user in users for request in user.requests]
+        pair.run_until(lambda: all(request.answer.results for request in self.requests))
+
+    @property
+    def outcomes(self) -> Counter[str]:
+        """Return how often each of :data:`OUTCOMES` was the answer."""
+        return Counter(request.outcome for request in self.requests)
+
+    def untruths(self) -> Iterator[str]:
+        """Mend the line, and yield what is not true in the answers and in the state shown."""
+        for request in self.requests:
+            if wrong := self._untruth(request):
+                yield f'{wrong}: {request.light.address} {request.answer}'
+        self.pair.mend()
+        self.pair.run(QUIET)
+        for address, witness in self._witnesses.items():
+            light = self.pair.controller.lights[address]
+            if not witness.is_as(light, self.pair.now):
+                yield f'{address} is shown in another state than it is in'
+            if light.restarts or light.snapshot(self.pair.now).shared_address:
+                yield f'{address} is taken for a light that restarted, or for several'
+
+    def _untruth(self, request: Request) -> str:
+        """Return what is not true in the answer to a request, '' if all is."""
+        answer, outcome = request.answer, request.outcome
+        matches = self._witnesses[request.light.address].matches(
+            request.wish, answer.asked_at - UPTIME_ERROR * (outcome != CONFIRMED),
+            answer.ended_at)
+        acks = [at for at, source, ack in self.pair.near.received
+                if isinstance(ack, CommandAck) and ack.command == request.kind
+                and ack.result == MavResult.ACCEPTED and source == request.light.address
+                and answer.asked_at < at <= answer.ended_at]
+        others = [other for other in self.requests if request.overlaps(other)]
+        match outcome:
+            case 'confirmed':
+                # A refusal that may have answered an earlier command does not count.
+                if not acks and MavResult.ACCEPTED.name in request.message:
+                    return 'not accepted'
+                return '' if any(matches) else 'never done'
+            case 'not acknowledged':
+                return 'acknowledged' if acks and not others else ''
+            case 'contradicted':
+                shown = request.message.partition('shows ')[2]
+                # A command carries all fields, and a late copy may have changed another one.
+                is_other = request.kind == CONFIGURE and not any(
+                    name in shown for name in request.wish)
+                return '' if acks and (is_other or not all(matches)) else 'always as wished'
+            case 'refused':
+                return 'done' if matches[-1] and not matches[0] and not others else ''
+            case 'overtaken':
+                is_overtaken = any(not other.wish.get('enabled', True) for other in others)
+                return '' if request.wish.get('enabled') and is_overtaken else 'not overtaken'
+            case '':
+                return 'an unknown outcome'
+        return ''

@@ -1,0 +1,35 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The demonstration, on a computer without the command ros2."""
+
+import shlex
+import sys
+
+import pytest
+from support.processes import Program
+
+
+def test_demo_says_that_ros2_is_missing_and_ends_with_three_commands_that_run() -> None:
+    pytest.importorskip('serial', reason='pyserial is not installed')
+    demo = Program(sys.executable, 'demo/run.py', env={'PATH': '/usr/bin:/bin'})
+    try:
+        assert demo.wait() == 0, demo.log
+    finally:
+        demo.kill()
+
+    told, command = (demo.log.find(text) for text in ('ros2 is not installed here', '$ ros2 '))
+    assert 0 < told < command
+    for line in demo.lines[-3:]:
+        assert Program(*shlex.split(line, comments=True), '--help').wait() == 0, line
