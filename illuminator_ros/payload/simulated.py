@@ -375,20 +375,20 @@ class SimulatedComponent(Generic[D]):
             return
         if isinstance(message, self.device.messages):
             for sent in self.device.receive(source, message, now):
-                if behaviour.slow:
-                    self._schedule.add(now + behaviour.slow, functools.partial(self._send, sent))
-                else:
-                    self._send(sent, now)
+                self._after(behaviour.slow, functools.partial(self._send, sent), now)
             self._changed()
         if (not isinstance(message, AnyCommand) or not behaviour.answers_commands
                 or isinstance(message, messages.CommandInt) and not behaviour.answers_command_int):
             return
-        if behaviour.slow:
-            self._schedule.add(now + behaviour.slow,
-                               functools.partial(self._consider, source, message))
-        else:
-            self._consider(source, message, now)
+        self._after(behaviour.slow, functools.partial(self._consider, source, message), now)
         self._changed()
+
+    def _after(self, delay: float, action: Callable[[float], None], now: float) -> None:
+        """Act after some time, s, or at once."""
+        if delay:
+            self._schedule.add(now + delay, action)
+        else:
+            action(now)
 
     def _consider(self, source: Address, message: AnyCommand, now: float) -> None:
         """Answer a command at once, or report its progress first."""
@@ -451,10 +451,7 @@ class SimulatedComponent(Generic[D]):
         if change is None or not (
                 not behaviour.ignores_changes if accepted else behaviour.applies_rejected):
             return
-        if behaviour.apply_after:
-            self._schedule.add(now + behaviour.apply_after, functools.partial(self.apply, change))
-        else:
-            self.apply(change, now)
+        self._after(behaviour.apply_after, functools.partial(self.apply, change), now)
 
     def _requested(self, message_id: float, now: float) -> Message | None:
         if not math.isfinite(message_id) or (
@@ -486,10 +483,7 @@ class SimulatedComponent(Generic[D]):
         if message is None or self.silent(now):
             return
         for delay, sent in self._injector.inject(message, self.behaviour):
-            if delay:
-                self._schedule.add(now + delay, functools.partial(self._transmit, sent))
-            else:
-                self._transmit(sent, now)
+            self._after(delay, functools.partial(self._transmit, sent), now)
 
     def _transmit(self, message: Message, now: float) -> None:
         self.outgoing.append((self.device.sender(message, self.address), message))

@@ -63,9 +63,7 @@ def information_static(cls: type[Message]) -> Requirement[GimbalTester]:
     @requirement('information-static', f'sends the same {cls.name} at all times', PROPOSAL,
                  'Messaging (GM-10)')
     async def check(tester: GimbalTester) -> None:
-        first, second = [await tester.session.request(cls) for _ in range(2)]
-        if first is None or second is None:
-            raise Skipped(f'no {cls.name} was received')
+        first, second = [await tester.session.required(cls) for _ in range(2)]
         if (values := Limits.from_message(first)) != (others := Limits.from_message(second)) and (
                 any(one != other and not (math.isnan(one) and math.isnan(other))
                     for one, other in zip(values, others, strict=True))):

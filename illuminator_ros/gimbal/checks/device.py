@@ -135,9 +135,7 @@ async def status_to_all(tester: DeviceTester) -> str:
              'GIMBAL_DEVICE_INFORMATION')
 async def device_id(tester: DeviceTester) -> None:
     """Read it in INFORMATION and in the status."""
-    information = await tester.session.request(gimbal.GimbalDeviceInformation)
-    if information is None:
-        raise Skipped('no GIMBAL_DEVICE_INFORMATION was received')
+    information = await tester.session.required(gimbal.GimbalDeviceInformation)
     found = {information.gimbal_device_id, *(
         one.gimbal_device_id for _, one in tester.session.received(AttitudeStatus))}
     if found != {0}:

@@ -134,8 +134,7 @@ class ManagerTester(GimbalTester):
     async def take(self, primary: Address, secondary: Address = NO_COMPONENT) -> None:
         """Give control to two players; raise Failed if that is refused or not shown."""
         one = await self.configure(*primary, *secondary)
-        if not one.accepted:
-            raise one.failure()
+        one.expect(accepted=True)
         wanted = (primary, secondary)
         if (control := await self.shown(lambda control: control == wanted)) != wanted:
             raise one.failure(f'{one.answer}, and then {control_text(control)}')
@@ -344,8 +343,7 @@ async def no_control_command(tester: ManagerTester) -> None:
     target = await tester.target(-2 * STEP, STEP)
     one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN, sender=tester.other)
     await tester.stays(before, f'{one.text} of {tester.other}')
-    if one.accepted:
-        raise one.failure()
+    one.expect(accepted=False)
 
 
 @moves('no-control-messages', 'ignores setpoint messages of a component without control (GM-19)',
@@ -370,8 +368,7 @@ async def no_control_roi(tester: ManagerTester) -> None:
     one = await tester.session.command(
         GimbalCommand.DO_SET_ROI_NONE, tester.device_id, sender=tester.other)
     await tester.stays(before, f'{one.text} of {tester.other}')
-    if one.accepted:
-        raise one.failure()
+    one.expect(accepted=False)
 
 
 # Setpoints
@@ -394,8 +391,7 @@ async def pitchyaw(tester: ManagerTester) -> None:
     await tester.begin()
     target = await tester.target(-2 * STEP, STEP)
     one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN)
-    if not one.accepted:
-        raise one.failure()
+    one.expect(accepted=True)
     await tester.reach(target)
 
 
@@ -408,8 +404,7 @@ async def pitchyaw_rate(tester: ManagerTester) -> str:
     await tester.pause(1.0)
     after = await tester.pose()
     tester.point(None, rates=(NAN, 0.0, 0.0))
-    if not one.accepted:
-        raise one.failure()
+    one.expect(accepted=True)
     text = f'commanded -2 deg/s, turned {after.pitch - before.pitch:.1f} deg in 1 s'
     if not -6.0 < after.pitch - before.pitch < -0.5:
         raise Failed(text)
@@ -449,8 +444,7 @@ async def one_axis(tester: ManagerTester) -> None:
     before = await tester.begin()
     target = await tester.target(-2 * STEP, before.yaw)
     one = await tester.pitchyaw(target.pitch, NAN, NAN, NAN)
-    if not one.accepted:
-        raise one.failure()
+    one.expect(accepted=True)
     await tester.reach(target)
 
 
@@ -506,8 +500,7 @@ async def other_device(tester: ManagerTester) -> None:
     tester.point(target, device_id=device_id)
     one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN, device_id=device_id)
     await tester.stays(before, f'setpoints for gimbal device {device_id}')
-    if one.accepted:
-        raise one.failure()
+    one.expect(accepted=False)
 
 
 @moves('other-target', 'ignores setpoints and commands for other components', ROUTING,
@@ -550,14 +543,12 @@ async def roi(tester: ManagerTester) -> str:
             as_int=True)
         if not one.accepted and tester.vehicle is None:
             raise Skipped(f'{one.answer}: it may not know where the vehicle is')
-        if not one.accepted:
-            raise one.failure()
+        one.expect(accepted=True)
         if tester.vehicle is not None:
             await tester.reach(NORTH)
         pose = await tester.pose()
         one = await session.command(GimbalCommand.DO_SET_ROI_NONE, tester.device_id)
-        if not one.accepted:
-            raise one.failure()
+        one.expect(accepted=True)
         return str(pose)
     finally:
         tester.vehicle = None

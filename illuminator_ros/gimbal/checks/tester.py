@@ -192,10 +192,7 @@ class GimbalTester(ABC):
         :raises Skipped: if it does not tell.
         """
         if self._limits is None:
-            message = await self.session.request(self.information)
-            if message is None:
-                raise Skipped(f'no {self.information.name} was received')
-            self._limits = Limits.from_message(message)
+            self._limits = Limits.from_message(await self.session.required(self.information))
         return self._limits
 
     async def requires(self, capability: Capabilities) -> None:

@@ -233,8 +233,7 @@ def interval_requirements(
         one = await tester.session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
         if optional and one.result in (MavResult.UNSUPPORTED, MavResult.DENIED):
             raise Skipped(one.answer)
-        if not one.accepted:
-            raise one.failure()
+        one.expect(accepted=True)
 
     @on_interval('interval', f'sends {status.name} at the requested interval')
     async def requested(tester: Tester) -> str:

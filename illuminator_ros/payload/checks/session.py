@@ -269,6 +269,11 @@ class Transaction:
         """Return the name of the result."""
         return 'no acknowledgement' if self.result is None else result_name(self.result)
 
+    def expect(self, *, accepted: bool) -> None:
+        """Raise Failed where the command was not accepted, or was although it must not be."""
+        if self.accepted is not accepted:
+            raise self.failure()
+
     def failure(self, reason: str = '') -> Failed:
         """Return a failure of this command, by default with its result."""
         return Failed(f'{self.text}: {reason or self.answer}', self.lines)
@@ -534,6 +539,13 @@ class Session(Endpoint):
         await self.runner.until(lambda: one.acks, NO_ANSWER_TIME)
         await self.runner.sleep(SETTLE_TIME)
         return one
+
+    async def required(self, cls: type[M]) -> M:
+        """Return a message that was requested; raise Skipped if it does not come."""
+        message = await self.request(cls)
+        if message is None:
+            raise Skipped(f'no {cls.name} was received')
+        return message
 
     async def request(self, cls: type[M]) -> M | None:
         """Request a message until it comes; return it, None if it does not come."""
