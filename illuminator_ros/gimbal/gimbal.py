@@ -375,7 +375,10 @@ class Gimbal:
             return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
         if self._control is None:
             return _no_status(self._manager, self._managers[self._manager].status_at, now)
-        return '' if self.in_control else f'no control of gimbal {self.key}: {self._control}'
+        if self.in_control:
+            return ''
+        todo = '' if self._control.primary else '; take control first'
+        return f'no control of gimbal {self.key}: {self._control}{todo}'
 
     @property
     def has_any_control(self) -> bool:

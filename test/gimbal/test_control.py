@@ -314,6 +314,12 @@ def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(ask: Ask
     assert not {one.command for one in rig.managers[0].commands} & set(GimbalCommand)
 
 
+def test_request_while_no_component_has_control_tells_what_to_do() -> None:
+    assert asked(Rig(FakeManager()).run(3.0), Gimbal.clear_roi) == (
+        False,
+        'no control of gimbal 1/154: primary none, secondary none; take control first')
+
+
 @pytest.mark.parametrize('second', [2, 171])
 def test_gm_28_requests_and_setpoints_name_one_of_the_gimbals_of_a_manager(second: int) -> None:
     first, other = FakeManager(), FakeManager(device_id=second)
