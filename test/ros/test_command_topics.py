@@ -17,6 +17,7 @@
 import math
 
 import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32
 from support.light import CONFIGURE, eventually, MavResult, ON_OFF, params, ServedLight
 from support.processes import Program
@@ -66,6 +67,20 @@ def test_brightness_message_keeps_the_other_fields_and_moves_the_parameter(
     [command] = light.wait_for(CONFIGURE)
     assert params(command) == (1.0, 41.0, 2.0, 20.0)
     parameters.wait(brightness=41.0)
+
+
+def test_best_effort_publisher_is_heard(
+    ros: Ros, light: ServedLight, parameters: Parameters,
+) -> None:
+    publisher = ros.node.create_publisher(
+        Float32, BRIGHTNESS, QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+    eventually(publisher.get_subscription_count)
+    ros.meet('/illuminator')
+
+    publisher.publish(Float32(data=37.0))
+
+    parameters.wait(brightness=37.0)
+    ros.node.destroy_publisher(publisher)
 
 
 def test_invalid_or_early_brightness_is_logged_with_its_reason_and_not_sent(

@@ -15,14 +15,17 @@
 """The log of a light's life: each fact once, and no flood; parameters follow meanwhile."""
 
 from collections.abc import Callable
+import socket
 from typing import Any
 
 from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat
 import pytest
 from std_msgs.msg import Bool, Float64
 from support.fake_light import status_message
+from support.frames import heartbeat_frame
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
-from support.ros import Parameters, Ros, running_bridge
+from support.processes import ended
+from support.ros import Parameters, Ros, running_bridge, start_bridge
 from support.slow import CLOCK, pass_time_until
 from support.waiting import eventually
 
@@ -161,3 +164,21 @@ def test_flood_of_frames_is_not_a_flood_of_lines(
         eventually(lambda: len(bridge.lines) > before)
 
         assert len(bridge.lines) - before < 40
+
+
+def test_tcp_server_that_closes_each_connection_after_a_frame_causes_no_flood_of_lines(
+    own_ros: Ros, port: int,
+) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        url = f'tcp://127.0.0.1:{server.getsockname()[1]}'
+        with ended(start_bridge(own_ros.domain, port, connection_url=url)) as bridge:
+            for number in range(30):
+                connection, _ = server.accept()
+                with connection:
+                    # What is unread when it closes would reset the connection.
+                    assert connection.recv(1000)
+                    connection.sendall(heartbeat_frame(sequence=number))
+                    connection.shutdown(socket.SHUT_WR)
+
+            assert 0 < bridge.count('link lost') < 15
+            assert len(bridge.lines) < 40
