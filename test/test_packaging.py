@@ -52,7 +52,8 @@ def imported(folder: Path) -> set[str]:
                 names |= {alias.name.partition('.')[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 names.add(str(node.module).partition('.')[0])
-    return names - sys.stdlib_module_names
+    # _typeshed is a name of type checkers only.
+    return names - sys.stdlib_module_names - {'_typeshed'}
 
 
 def output(folder: Path, *arguments: str) -> str:

@@ -140,7 +140,7 @@ def test_lost_frames_are_a_warning_unless_the_light_has_restarted() -> None:
     reported.status(lost=60)
     reported.link.run(2.0)
     link = reported.statuses()['link']
-    assert found(link) == (WARN, '95 % of the frames lost')
+    assert found(link) == (WARN, '98 % of the frames lost')
     assert value(link, 'frames_lost') == '60'
 
 
