@@ -370,9 +370,8 @@ class GimbalManager(Payload):
         attitude = self._sent and self._sent.attitude or Quaternion()
         heading = self.vehicle.heading(now)
         self._report(GimbalDeviceAttitudeStatus(
-            0, 0, _boot_time(now), int(MountFlags.YAW_IN_VEHICLE_FRAME),
-            (attitude.w, attitude.x, attitude.y, attitude.z), math.nan, math.nan, math.nan, 0,
-            math.nan if heading is None else heading, math.nan), now)
+            0, 0, _boot_time(now), int(MountFlags.YAW_IN_VEHICLE_FRAME), attitude, math.nan,
+            math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan), now)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take the attitude of the device, from the link or of a device without MAVLink."""
@@ -681,9 +680,8 @@ class GimbalManager(Payload):
 
 
 def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttitude:
-    attitude = setpoint.attitude
-    q = UNSET_QUATERNION if attitude is None else (attitude.w, attitude.x, attitude.y, attitude.z)
-    return GimbalDeviceSetAttitude(*device, setpoint.device_flags, q, *setpoint.rates)
+    return GimbalDeviceSetAttitude(
+        *device, setpoint.device_flags, setpoint.attitude or UNSET_QUATERNION, *setpoint.rates)
 
 
 def _params(command: AnyCommand) -> tuple[Sequence[float], int]:

@@ -212,10 +212,10 @@ class SimulatedMount:
         turning = motion.vehicle.rate if known else math.nan
         roll_rate, pitch_rate, yaw_rate = motion.rates
         return GimbalDeviceAttitudeStatus(
-            0, 0, self.uptime_ms(now), int(flags), (q.w, q.x, q.y, q.z),
-            roll_rate, pitch_rate, yaw_rate + (turning if frame is YawFrame.EARTH else 0.0),
-            failures | behaviour.false_flags,
-            motion.vehicle.yaw if known else math.nan, turning, self._device_id)
+            0, 0, self.uptime_ms(now), int(flags), q, roll_rate, pitch_rate,
+            yaw_rate + (turning if frame is YawFrame.EARTH else 0.0),
+            failures | behaviour.false_flags, motion.vehicle.yaw if known else math.nan, turning,
+            self._device_id)
 
     def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
         """Return the fields roll_min to yaw_max of an INFORMATION message."""

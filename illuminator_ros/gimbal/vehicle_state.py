@@ -117,7 +117,6 @@ class VehicleState:
             return None
         yaw_rate = self._yaw_rate.get(now)
         return AutopilotStateForGimbalDevice(
-            *device, int(now * 1e6), (attitude.w, attitude.x, attitude.y, attitude.z), 0,
-            *(velocity or (math.nan,) * 3), 0, math.nan,
+            *device, int(now * 1e6), attitude, 0, *(velocity or (math.nan,) * 3), 0, math.nan,
             ESTIMATES_ATTITUDE | (ESTIMATES_VELOCITY if velocity else 0), 0,
             math.nan if yaw_rate is None else yaw_rate)

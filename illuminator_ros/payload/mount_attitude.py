@@ -109,8 +109,7 @@ def from_mavlink(q: Components, frame: YawFrame) -> Quaternion:
 
 def to_mavlink(rotation: Quaternion, frame: YawFrame) -> Components:
     """Return the quaternion in MAVLink of a rotation in ROS."""
-    q = ned_frd(rotation) if frame is YawFrame.EARTH else flip(rotation)
-    return q.w, q.x, q.y, q.z
+    return ned_frd(rotation) if frame is YawFrame.EARTH else flip(rotation)
 
 
 @dataclass(frozen=True, slots=True)

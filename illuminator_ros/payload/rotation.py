@@ -19,8 +19,8 @@ ROS has ENU for the earth and FLU for bodies (REP-103), MAVLink has NED and FRD.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 Vector = tuple[float, float, float]
 
@@ -28,10 +28,11 @@ Vector = tuple[float, float, float]
 _SINGULAR = 1.0 - 1e-12
 
 
-@dataclass(frozen=True, slots=True)
-class Quaternion:
+class Quaternion(NamedTuple):
     """
     A rotation: :meth:`rotate` takes the coordinates of a vector from a body's frame to another.
+
+    The field ``q`` of a message can hold it.
 
     All methods but :meth:`normalized` expect the norm 1.
     """
@@ -59,7 +60,7 @@ class Quaternion:
 
         At a pitch of +-pi/2 only the sum or the difference of roll and yaw is defined: roll is 0.
         """
-        w, x, y, z = self.w, self.x, self.y, self.z
+        w, x, y, z = self
         sine = 2 * (w * y - z * x)
         if abs(sine) > _SINGULAR:
             return 0.0, math.copysign(math.pi / 2, sine), math.atan2(
@@ -69,13 +70,13 @@ class Quaternion:
         return (math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
                 math.atan2(sine, math.hypot(up, ahead)), math.atan2(ahead, up))
 
-    def __mul__(self, other: Quaternion) -> Quaternion:
+    # Replaces the repetition of tuples.
+    def __mul__(self, other: Quaternion) -> Quaternion:  # type: ignore[override]
         """Return the composition: first ``other``, then this rotation."""
-        return Quaternion(
-            self.w * other.w - self.x * other.x - self.y * other.y - self.z * other.z,
-            self.w * other.x + self.x * other.w + self.y * other.z - self.z * other.y,
-            self.w * other.y - self.x * other.z + self.y * other.w + self.z * other.x,
-            self.w * other.z + self.x * other.y - self.y * other.x + self.z * other.w)
+        w, x, y, z = self
+        a, b, c, d = other
+        return Quaternion(w * a - x * b - y * c - z * d, w * b + x * a + y * d - z * c,
+                          w * c - x * d + y * a + z * b, w * d + x * c - y * b + z * a)
 
     def inverse(self) -> Quaternion:
         """Return the inverse rotation."""
@@ -88,7 +89,7 @@ class Quaternion:
         :raises ValueError: if a component is not finite, or the norm is too small to have a
             direction.
         """
-        norm = math.hypot(self.w, self.x, self.y, self.z)
+        norm = math.hypot(*self)
         if not (math.isfinite(norm) and norm > 1e-6):
             raise ValueError(f'({self.x:g}, {self.y:g}, {self.z:g}, {self.w:g}) is not a rotation')
         return Quaternion(self.w / norm, self.x / norm, self.y / norm, self.z / norm)

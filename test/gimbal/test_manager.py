@@ -309,7 +309,7 @@ def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
     message, angles, rates, flags = SETPOINTS[case]
     rig = in_control()
     q = Quaternion.from_euler(0.05, 0.15, 0.25)
-    rig.report((q.w, q.x, q.y, q.z))
+    rig.report(q)
 
     sent, = of(GimbalDeviceSetAttitude, rig.give(PILOT, message))
 
@@ -610,7 +610,7 @@ def test_the_device_learns_the_vehicle_from_ros_where_no_autopilot_tells_it(
     sent = rig.messages(AutopilotStateForGimbalDevice)
     assert len(sent) == (not autopilot_sends)
     for one in sent:
-        assert one.q == (Q.w, Q.x, Q.y, Q.z)
+        assert one.q == Q
         assert (one.vx, one.vy, one.vz, one.angular_velocity_z) == (1.0, 2.0, 3.0, 0.4)
 
 

@@ -63,7 +63,7 @@ class Bench:
     def heading(self, degrees: float, source: Address = MANAGER) -> None:
         q = Quaternion.from_euler(0.0, 0.0, math.radians(degrees))
         self.give(gimbal.AutopilotStateForGimbalDevice(
-            1, 154, 0, (q.w, q.x, q.y, q.z), 0, NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5), source)
+            1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5), source)
 
     def point(
         self, *degrees: float, flags: int = FOLLOW | YawFrame.VEHICLE.flag,
@@ -73,8 +73,7 @@ class Bench:
         if self._announced:
             self.announce()
         q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
-        self.give(gimbal.GimbalDeviceSetAttitude(
-            *target, flags, (q.w, q.x, q.y, q.z), *rates), source)
+        self.give(gimbal.GimbalDeviceSetAttitude(*target, flags, q, *rates), source)
 
     def after(self, seconds: float) -> GimbalDeviceAttitudeStatus:
         """Let time pass, and return the status."""
@@ -188,8 +187,7 @@ def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() ->
 def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
     bench = Bench()
     down = Quaternion.from_euler(0.0, -0.5, 0.0)
-    q = (down.w, down.x, down.y, down.z)
-    bench.give(gimbal.GimbalManagerSetAttitude(*DEVICE, FOLLOW, 154, q, NAN, NAN, NAN))
+    bench.give(gimbal.GimbalManagerSetAttitude(*DEVICE, FOLLOW, 154, down, NAN, NAN, NAN))
     bench.give(CommandLong(*DEVICE, 1000, 0, -20.0, 0.0, NAN, NAN, 0, 0, 154))
     assert bench.angles(1.0) == (0.0, 0.0, 0.0)
     (ack,) = [one for _, one in bench.endpoint.outgoing if isinstance(one, CommandAck)]
@@ -249,7 +247,7 @@ def test_pitch_is_held_against_the_horizon_or_follows_the_vehicle(
     bench.point(0.0, -10.0, 0.0, flags=flags | YawFrame.VEHICLE.flag)
     q = Quaternion.from_euler(0.0, math.radians(20.0), 0.0)
     bench.give(gimbal.AutopilotStateForGimbalDevice(
-        1, 154, 0, (q.w, q.x, q.y, q.z), 0, NAN, NAN, NAN, 0, NAN, 0, 0))
+        1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0))
     assert bench.angles(1.0) == (0.0, pitch, 0.0)
 
 

@@ -84,7 +84,7 @@ class Bench:
     ) -> None:
         q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
         self.endpoint.receive(source, gimbal.GimbalManagerSetAttitude(
-            *self.address, flags, device_id, (q.w, q.x, q.y, q.z), *rates), self.now)
+            *self.address, flags, device_id, q, *rates), self.now)
 
     def pitchyaw(
         self, *values: float, kind: Any = gimbal.GimbalManagerSetPitchyaw,

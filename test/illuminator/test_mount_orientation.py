@@ -46,8 +46,8 @@ def status(
 ) -> GimbalDeviceAttitudeStatus:
     """Return the status of a gimbal with roll, pitch and yaw in MAVLink, rad."""
     q = Quaternion.from_euler(*euler)
-    return GimbalDeviceAttitudeStatus(0, 0, 0, flags, (q.w, q.x, q.y, q.z), NAN, NAN, NAN, 0,
-                                      delta_yaw, NAN, number)
+    return GimbalDeviceAttitudeStatus(
+        0, 0, 0, flags, q, NAN, NAN, NAN, 0, delta_yaw, NAN, number)
 
 
 def vehicle(roll: float, pitch: float, yaw: float) -> Attitude:

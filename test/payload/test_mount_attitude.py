@@ -56,7 +56,7 @@ def status(
     delta_yaw: float = NAN,
 ) -> GimbalDeviceAttitudeStatus:
     return GimbalDeviceAttitudeStatus(
-        0, 0, 1000, flags, (q.w, q.x, q.y, q.z), *rates, 0, delta_yaw)
+        0, 0, 1000, flags, q, *rates, 0, delta_yaw)
 
 
 @pytest.mark.parametrize(('flags', 'frame'), [
@@ -77,7 +77,7 @@ def test_flags_that_name_both_frames_give_no_attitude() -> None:
 
 @given(attitudes, frames)
 def test_gm_4_axes_are_changed_as_by_matrices(q: Quaternion, frame: YawFrame) -> None:
-    ros = mount.from_mavlink((q.w, q.x, q.y, q.z), frame)
+    ros = mount.from_mavlink(q, frame)
 
     assert matrix(ros) == approx(AXES[frame] @ matrix(q) @ FLU_FRD, abs=1e-9)
     back = Quaternion(*mount.to_mavlink(ros, frame))
@@ -124,10 +124,9 @@ def test_quaternion_that_is_not_a_rotation_gives_no_attitude(
 
 @given(attitudes, st.floats(0.5, 2.0))
 def test_quaternion_is_normalised(q: Quaternion, norm: float) -> None:
-    scaled = Quaternion(*(norm * value for value in (q.w, q.x, q.y, q.z)))
+    scaled = Quaternion(*(norm * value for value in q))
 
     rotation = MountAttitude.from_status(status(scaled, EARTH)).rotation
 
-    assert math.hypot(rotation.w, rotation.x, rotation.y, rotation.z) == approx(1.0)
-    assert rotation.angle_to(mount.from_mavlink(
-        (q.w, q.x, q.y, q.z), YawFrame.EARTH)) == approx(0.0, abs=1e-6)
+    assert math.hypot(*rotation) == approx(1.0)
+    assert rotation.angle_to(mount.from_mavlink(q, YawFrame.EARTH)) == approx(0.0, abs=1e-6)

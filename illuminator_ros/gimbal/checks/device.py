@@ -92,8 +92,8 @@ class DeviceTester(GimbalTester):
         if self.heading is not None:
             q = Quaternion.from_euler(0.0, 0.0, math.radians(self.heading))
             self.session.send(gimbal.AutopilotStateForGimbalDevice(
-                *self.session.device, int(self.session.now * 1e6), (q.w, q.x, q.y, q.z), 0,
-                NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5), manager)
+                *self.session.device, int(self.session.now * 1e6), q, 0, NAN, NAN, NAN, 0, NAN, 0,
+                0, 1e-5), manager)
 
     async def prepare(self) -> None:
         """See :class:`GimbalTester`."""

@@ -334,8 +334,7 @@ def quaternion_of(pose: Pose | None) -> tuple[float, float, float, float]:
     """Return the quaternion of a pose for a message, NaN without one."""
     if pose is None:
         return (NAN,) * 4
-    q = Quaternion.from_euler(*map(math.radians, (pose.roll, pose.pitch, pose.yaw)))
-    return q.w, q.x, q.y, q.z
+    return Quaternion.from_euler(*map(math.radians, (pose.roll, pose.pitch, pose.yaw)))
 
 
 def radians(rates: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -199,12 +199,10 @@ class ManagerNode(ServedPayload):
         if self._manager.has_mavlink:
             return
         # Neutral and retracted are the same for a gimbal that has an attitude only.
-        attitude = setpoint.attitude or Quaternion()
+        attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
         header = Header(stamp=self._clock.now().to_msg(),
                         frame_id=self._frames.name(setpoint.frame))
-        self._interface.publish('device/setpoint', quaternion_message(
-            header, from_mavlink((attitude.w, attitude.x, attitude.y, attitude.z),
-                                 setpoint.frame)))
+        self._interface.publish('device/setpoint', quaternion_message(header, attitude))
 
     def _state_changed(self, event: StateChanged) -> None:
         device = f'gimbal {event.device or event.device_id}'
