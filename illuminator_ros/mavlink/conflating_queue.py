@@ -60,7 +60,7 @@ class ConflatingQueue:
             return False
         place, position = self._places[type(message)]
         held = self._held[place]
-        # One that does not follow the last one begins anew, also after the end of a group alone.
+        # A message that does not follow the last one begins a new set: the held one is dropped.
         if held and self._places[type(held[-1][1])][1] >= position:
             self.dropped += len(held)
             held.clear()
