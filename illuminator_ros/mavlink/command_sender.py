@@ -253,8 +253,10 @@ class RttEstimator:
 
     def least(self, now: float) -> float:
         """Return the time in which no answer comes, s; 0 while acknowledgements are certain."""
-        if now >= self.doubtful_until or not self._certain:
+        if now >= self.doubtful_until:
             return 0.0
+        if not self._certain:
+            return self.quantile(0.5) or 0.0
         return sorted(self._certain)[len(self._certain) // 4]
 
     def timeout(self, longest: float) -> float:
@@ -433,7 +435,8 @@ class CommandSender:
                 and request.state is not RequestState.WAITING]
         if not sent:
             self.counters.unexpected_acks += 1
-            self._doubt(source, now)
+            if source in self._round_trips:
+                self._doubt(source, now)
             return
         # A command in progress is not rejected: the rejection belongs to a command beside it.
         request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
@@ -469,8 +472,7 @@ class CommandSender:
         request.state = state
 
     def _doubt(self, target: Address, now: float) -> None:
-        if target in self._round_trips:
-            self._round_trips[target].doubtful_until = now + ACK_REACH
+        self._round_trips.setdefault(target, RttEstimator()).doubtful_until = now + ACK_REACH
 
     def poll(self, now: float) -> None:
         """Resend or end what is due."""

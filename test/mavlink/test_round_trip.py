@@ -71,6 +71,19 @@ def test_least_is_known_from_certain_samples_and_needed_while_others_are_doubtfu
     assert (estimator.least(4.9), estimator.least(5.0)) == (0.4, 0.0)
 
 
+def test_a_resend_before_the_first_sample_makes_that_doubtful() -> None:
+    rig = Rig()
+    rig.start()
+    rig.run(0.6)
+    rig.ack(ACCEPTED)
+    rig.start()
+    rig.run(0.01)
+    rig.ack(ACCEPTED)
+    estimator = rig.sender.round_trip(LIGHT)
+    assert (len(estimator), estimator.doubtful_until > rig.now) == (1, True)
+    assert estimator.least(rig.now) == pytest.approx(0.01)
+
+
 def taught(seconds: float, timeout: float) -> Rig:
     """Return a rig whose light has answered often enough after a time, s."""
     rig = Rig(timeout=timeout)
