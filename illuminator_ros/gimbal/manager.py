@@ -178,6 +178,7 @@ class GimbalManager(Payload):
     :param commands: sends everything, from the manager's address.
     :param draw: returns a random number, 0..1.
     :ivar events: each a :data:`ManagerEvent`.
+    :ivar tracker: its state, its device and other managers.
     :ivar control: who has which kind of control.
     :ivar vehicle: takes the vehicle's state from ROS.
     :ivar model: the abilities of the device.
@@ -201,9 +202,9 @@ class GimbalManager(Payload):
         self.control = ControlArbiter(settings.control)
         self.vehicle = VehicleState()
         self._commands = commands
-        self._tracker = StateTracker(
+        self.tracker = StateTracker(
             commands.address, settings.device_id, self._state_changed, draw)
-        self.model = (GimbalModel() if self._tracker.has_mavlink
+        self.model = (GimbalModel() if self.tracker.has_mavlink
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
         self._status: GimbalDeviceAttitudeStatus | None = None
@@ -227,36 +228,6 @@ class GimbalManager(Payload):
 
     # Snapshots
 
-    @property
-    def state(self) -> ManagerState:
-        """Return the manager's state."""
-        return self._tracker.state
-
-    @property
-    def device(self) -> Address | None:
-        """Return the address of the device, None if it is not known, or has none."""
-        return self._tracker.device
-
-    @property
-    def device_id(self) -> int:
-        """Return the id of the device, 0 while none is known."""
-        return self._tracker.device_id
-
-    @property
-    def has_mavlink(self) -> bool:
-        """Whether the device is a MAVLink component."""
-        return self._tracker.has_mavlink
-
-    @property
-    def other(self) -> Address | None:
-        """Return the other manager of the device that is heard, None if there is none."""
-        return self._tracker.other
-
-    @property
-    def obstacle(self) -> str:
-        """Return why the device is not managed, for people; '' if it is."""
-        return self._tracker.obstacle
-
     def status(self, now: float) -> GimbalManagerStatus:
         """Return the message that tells who is in control."""
         setpoint, device = self._setpoint, self._device_status(now)
@@ -265,17 +236,17 @@ class GimbalManager(Payload):
         primary, secondary = (self.control.holder(role) or Address(0, 0) for role in Role)
         return GimbalManagerStatus(
             _boot_time(now), int(flags | (accepts and MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)),
-            self.device_id, *primary, *secondary)
+            self.tracker.device_id, *primary, *secondary)
 
     # The payload
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        self._tracker.link_opened(now)
+        self.tracker.link_opened(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        self._tracker.link_closed(now)
+        self.tracker.link_closed(now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
@@ -286,21 +257,21 @@ class GimbalManager(Payload):
             self.control.heard(source, now)
             self._compare_identity(source, message, now)
             if message.type == MAV_TYPE_GIMBAL:
-                self._tracker.hear_device(source, now)
+                self.tracker.hear_device(source, now)
         elif isinstance(message, GimbalDeviceAttitudeStatus | GimbalDeviceInformation) and (
                 message.gimbal_device_id in NON_MAVLINK_IDS):
             # An autopilot reports a gimbal on its outputs, but is not a gimbal device.
             return
         elif isinstance(message, GimbalDeviceAttitudeStatus):
-            if self._tracker.hear_device(source, now):
+            if self.tracker.hear_device(source, now):
                 self.take_attitude(message, now)
         elif isinstance(message, GimbalDeviceInformation):
-            if self._tracker.hear_device(source, now):
+            if self.tracker.hear_device(source, now):
                 self._information = message
                 self._information_due = math.inf
                 self.model = GimbalModel.from_information(message)
         elif isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
-            self._tracker.hear_manager(source, message.gimbal_device_id, now)
+            self.tracker.hear_manager(source, message.gimbal_device_id, now)
         elif source == Address(self.address.system, mav.MAV_COMP_ID_AUTOPILOT1):
             if isinstance(message, AutopilotStateForGimbalDevice):
                 self._autopilot_at = now
@@ -311,7 +282,7 @@ class GimbalManager(Payload):
     def receive_conflicting(self, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive_conflicting`."""
         if isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
-            self._tracker.hear_manager(self.address, message.gimbal_device_id, now)
+            self.tracker.hear_manager(self.address, message.gimbal_device_id, now)
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """See :meth:`Payload.execute`."""
@@ -325,30 +296,30 @@ class GimbalManager(Payload):
         if handler is None:
             return None
         device_id = params[0] if command.command in _ROI_COMMANDS else params[6]
-        if device_id not in (0, self.device_id):
+        if device_id not in (0, self.tracker.device_id):
             return MavResult.DENIED
-        if self.state is not ManagerState.ACTIVE:
-            return (MavResult.DENIED if self.state is ManagerState.INACTIVE
+        if self.tracker.state is not ManagerState.ACTIVE:
+            return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
                     else MavResult.TEMPORARILY_REJECTED)
         return handler(source, params, frame, now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        self._tracker.poll(now)
+        self.tracker.poll(now)
         self._control_changed(self.control.poll(now), now)
         if now >= self._information_due:
             self._request_information(now)
         if now >= self._status_due:
             self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._commands.send(self.status(now))
-            if not self.has_mavlink and now >= self._measured_at + ATTITUDE_AGE:
+            if not self.tracker.has_mavlink and now >= self._measured_at + ATTITUDE_AGE:
                 self._report_commanded(now)
         if now >= self._send_due:
             self._follow(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min(self._tracker.next_deadline(), self.control.next_deadline(),
+        return min(self.tracker.next_deadline(), self.control.next_deadline(),
                    self._information_due, self._status_due, self._send_due)
 
     # The device and the vehicle, as ROS knows them
@@ -359,10 +330,10 @@ class GimbalManager(Payload):
             self._attitude = MountAttitude.from_status(status)
         except ValueError:
             self._attitude = None
-        if not self.has_mavlink and self.state is ManagerState.ACTIVE:
+        if not self.tracker.has_mavlink and self.tracker.state is ManagerState.ACTIVE:
             flags = 0 if self._setpoint is None else self._setpoint.operation
             self._commands.send(replace(
-                status, flags=int(status.flags | flags), gimbal_device_id=self.device_id,
+                status, flags=int(status.flags | flags), gimbal_device_id=self.tracker.device_id,
                 failure_flags=status.failure_flags | self._limits_reached))
 
     def _report_commanded(self, now: float) -> None:
@@ -380,11 +351,11 @@ class GimbalManager(Payload):
 
     def vehicle_changed(self, now: float) -> None:
         """Tell the device the vehicle's state, unless an autopilot does."""
-        if (self.device is None or self.state is not ManagerState.ACTIVE
+        if (self.tracker.device is None or self.tracker.state is not ManagerState.ACTIVE
                 or now < self._autopilot_at + AUTOPILOT_SILENCE
                 or now < self._state_sent_at + AUTOPILOT_INTERVAL):
             return
-        message = self.vehicle.for_device(self.device, now)
+        message = self.vehicle.for_device(self.tracker.device, now)
         if message is not None:
             self._state_sent_at = now
             self._commands.send(message)
@@ -423,7 +394,7 @@ class GimbalManager(Payload):
     def _is_for_us(self, message: AnySetpoint) -> bool:
         return (message.target_system in (0, self.address.system)
                 and message.target_component in (0, self.address.component)
-                and message.gimbal_device_id in (0, self.device_id))
+                and message.gimbal_device_id in (0, self.tracker.device_id))
 
     def _take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
         try:
@@ -456,8 +427,8 @@ class GimbalManager(Payload):
 
     def _demand(self, player: Address, demand: Demand, now: float) -> str:
         """Follow a player's demand; return why it is refused, or ''."""
-        if self.state is not ManagerState.ACTIVE:
-            return f'the manager is not active: {self.state.value}'
+        if self.tracker.state is not ManagerState.ACTIVE:
+            return f'the manager is not active: {self.tracker.state.value}'
         holder = self.control.holder(Role.PRIMARY)
         if holder == player:
             return self._set(demand, now)
@@ -478,7 +449,7 @@ class GimbalManager(Payload):
                 not self._accepts(demand.frame, now) and self._heading(now) is None):
             return 'the heading of the vehicle is unknown'
         self._place = None
-        self._setpoint = resolve(demand, current, now, turns=not self.has_mavlink)
+        self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
         self._send(now)
         return ''
 
@@ -515,7 +486,7 @@ class GimbalManager(Payload):
     def _send(self, now: float) -> None:
         """Give the device the setpoint, with everything mixed and clipped."""
         setpoint = self._setpoint
-        if setpoint is None or self.state is not ManagerState.ACTIVE:
+        if setpoint is None or self.tracker.state is not ManagerState.ACTIVE:
             self._send_due = math.inf
             return
         converts = not self._accepts(setpoint.frame, now)
@@ -538,8 +509,8 @@ class GimbalManager(Payload):
                 self._lose('heading', now)
                 return
             sent = in_vehicle_frame(sent, heading)
-        if self.device is not None:
-            self._commands.send(_device_message(self.device, sent))
+        if self.tracker.device is not None:
+            self._commands.send(_device_message(self.tracker.device, sent))
         self._sent = sent
         self.events.emit(SetpointSent(sent))
 
@@ -608,8 +579,8 @@ class GimbalManager(Payload):
             message = self._device_information(now)
         else:
             return None
-        if self.state is not ManagerState.ACTIVE or message is None:
-            return (MavResult.DENIED if self.state is ManagerState.INACTIVE
+        if self.tracker.state is not ManagerState.ACTIVE or message is None:
+            return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
                     else MavResult.TEMPORARILY_REJECTED)
         self._commands.send(message)
         return MavResult.ACCEPTED
@@ -618,7 +589,7 @@ class GimbalManager(Payload):
         # The manager computes what the device cannot.
         capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
         return GimbalManagerInformation(
-            _boot_time(now), int(capabilities), self.device_id, *self._range_values())
+            _boot_time(now), int(capabilities), self.tracker.device_id, *self._range_values())
 
     def _range_values(self) -> tuple[float, float, float, float, float, float]:
         (a, b), (c, d), (e, f) = (
@@ -628,18 +599,19 @@ class GimbalManager(Payload):
 
     def _device_information(self, now: float) -> GimbalDeviceInformation | None:
         """Return the message of the device, which clients ask of its manager."""
-        if self.has_mavlink:
+        if self.tracker.has_mavlink:
             return self._information and replace(
-                self._information, gimbal_device_id=self.device_id)
+                self._information, gimbal_device_id=self.tracker.device_id)
         return GimbalDeviceInformation(
             _boot_time(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
-            int(self.model.capabilities & 0xFFFF), 0, *self._range_values(), self.device_id)
+            int(self.model.capabilities & 0xFFFF), 0, *self._range_values(),
+            self.tracker.device_id)
 
     def _request_information(self, now: float) -> None:
         self._information_due = now + INFORMATION_INTERVAL
-        if self.device is not None:
+        if self.tracker.device is not None:
             self._commands.start(Command(
-                self.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
+                self.tracker.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
                 now, _ignore)
 
     def _state_changed(self, change: StateChanged, now: float) -> None:
@@ -655,9 +627,9 @@ class GimbalManager(Payload):
             self._commands.send(Command(
                 Address(0, 0), mav.MavCmd.REQUEST_MESSAGE,
                 (GimbalManagerInformation.id,)).message(0, as_int=False))
-            if self.has_mavlink and self._information is None:
+            if self.tracker.has_mavlink and self._information is None:
                 self._information_due = now
-        elif change.after is ManagerState.NO_DEVICE and self.has_mavlink:
+        elif change.after is ManagerState.NO_DEVICE and self.tracker.has_mavlink:
             self._information, self._information_due = None, math.inf
             self.model = GimbalModel()
         self.events.emit(change)

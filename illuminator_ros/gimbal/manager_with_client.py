@@ -79,7 +79,7 @@ class ManagerWithClient(Payload):
             self._own.acknowledge(source, message, now)
         else:
             self._manage(self.manager.receive, source, message, now)
-            if source == self.manager.device and type(message) in _FOR_CLIENT:
+            if source == self.manager.tracker.device and type(message) in _FOR_CLIENT:
                 self.client.receive(source, message, now)
         self._serve_client(now)
 

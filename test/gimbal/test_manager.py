@@ -645,7 +645,7 @@ def test_commands_are_rejected_for_now_until_the_manager_is_active() -> None:
     rig = ManagerRig(active=False)
     rig.run(1.0)
 
-    assert rig.manager.state is ManagerState.LISTENING
+    assert rig.manager.tracker.state is ManagerState.LISTENING
     assert rig.take(PILOT) is mav.MavResult.TEMPORARILY_REJECTED
     assert rig.messages(GimbalManagerStatus) == []
 
@@ -655,7 +655,7 @@ def test_the_manager_follows_a_device_that_is_exchanged() -> None:
     rig.points(PILOT)
     rig.device_is_there = False
     rig.run(3.5, each=rig.heartbeats(PILOT))
-    assert rig.manager.state is ManagerState.NO_DEVICE
+    assert rig.manager.tracker.state is ManagerState.NO_DEVICE
 
     rig.device_information = information(pitch_max=0.25)
     rig.device_is_there = True

@@ -44,7 +44,7 @@ class Rig:
         for _ in range(8):
             self.send(self.good, DEVICE, heartbeat(MAV_TYPE_GIMBAL))
             self.link.run(1.0)
-        assert self.manager.state is ManagerState.ACTIVE
+        assert self.manager.tracker.state is ManagerState.ACTIVE
 
     def send(self, codec: Codec, source: Address, message: Message, peer: object = GOOD) -> bytes:
         data = codec.frame(source, message, self.link.now)

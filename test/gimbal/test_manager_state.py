@@ -73,7 +73,7 @@ def reached(state: ManagerState) -> ManagerRig:
         rig.run(5.0)
         if state is ManagerState.INACTIVE:
             rig.give(OTHER, status())
-    assert rig.manager.state is state
+    assert rig.manager.tracker.state is state
     return rig
 
 
@@ -99,7 +99,7 @@ def test_each_input_leads_to_the_state_of_the_table(
     if (state, input_) == (ManagerState.LISTENING, ManagerInput.MANAGER_LOST):
         # Its time is over meanwhile.
         expected = ManagerState.ACTIVE
-    assert rig.manager.state is expected
+    assert rig.manager.tracker.state is expected
 
 
 @pytest.mark.parametrize('message', [
@@ -138,8 +138,8 @@ def test_gm_24_a_device_with_a_manager_of_its_own_keeps_ours_inactive() -> None:
 
     rig.give(DEVICE, status(1))
 
-    assert rig.manager.state is ManagerState.INACTIVE
-    assert rig.manager.other == DEVICE
+    assert rig.manager.tracker.state is ManagerState.INACTIVE
+    assert rig.manager.tracker.other == DEVICE
 
 
 @pytest.mark.parametrize(('source', 'device_id'), [
@@ -150,7 +150,7 @@ def test_gm_26_the_manager_of_another_device_leaves_ours_active(
 
     rig.give(source, status(device_id))
 
-    assert rig.manager.state is ManagerState.ACTIVE
+    assert rig.manager.tracker.state is ManagerState.ACTIVE
 
 
 def test_gm_18_ours_becomes_active_when_the_other_manager_is_gone() -> None:
@@ -158,7 +158,7 @@ def test_gm_18_ours_becomes_active_when_the_other_manager_is_gone() -> None:
 
     rig.run(MANAGER_TIMEOUT + 5.0)
 
-    assert rig.manager.state is ManagerState.ACTIVE
+    assert rig.manager.tracker.state is ManagerState.ACTIVE
 
 
 def test_gm_18_managers_that_send_no_status_are_asked_before_ours_announces_anything() -> None:
@@ -190,9 +190,9 @@ def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
                 (second, first)[index].give(rig.component.address, message)
             seen[index] = sent[index]
 
-    assert first.manager.state is ManagerState.ACTIVE
-    assert second.manager.state is ManagerState.INACTIVE
-    assert second.manager.other == first.component.address
+    assert first.manager.tracker.state is ManagerState.ACTIVE
+    assert second.manager.tracker.state is ManagerState.INACTIVE
+    assert second.manager.tracker.other == first.component.address
 
 
 def test_a_gimbal_of_another_system_is_not_managed() -> None:
@@ -200,7 +200,7 @@ def test_a_gimbal_of_another_system_is_not_managed() -> None:
 
     rig.give(Address(2, 154), attitude_status())
 
-    assert rig.manager.state is ManagerState.NO_DEVICE
+    assert rig.manager.tracker.state is ManagerState.NO_DEVICE
 
 
 @pytest.mark.parametrize('message', [
@@ -211,18 +211,19 @@ def test_an_autopilot_that_reports_a_gimbal_on_its_outputs_is_not_taken_for_a_de
 
     rig.give(AUTOPILOT, message)
 
-    assert rig.manager.device is None
+    assert rig.manager.tracker.device is None
 
 
 def test_manager_names_the_devices_that_are_heard_instead_of_its_own() -> None:
     rig = ManagerRig(device_id=171, active=False)
-    assert rig.manager.obstacle == 'gimbal device 171 has not been heard'
+    assert rig.manager.tracker.obstacle == 'gimbal device 171 has not been heard'
 
     rig.run(1.0)
 
-    assert rig.manager.obstacle == 'gimbal device 171 has not been heard; heard: 1/154'
+    assert rig.manager.tracker.obstacle == 'gimbal device 171 has not been heard; heard: 1/154'
 
 
 def test_inactive_manager_names_the_other_as_the_obstacle() -> None:
-    assert reached(ManagerState.ACTIVE).manager.obstacle == ''
-    assert reached(ManagerState.INACTIVE).manager.obstacle == '1/191 manages gimbal 1/154 too'
+    assert reached(ManagerState.ACTIVE).manager.tracker.obstacle == ''
+    assert reached(ManagerState.INACTIVE).manager.tracker.obstacle == (
+        '1/191 manages gimbal 1/154 too')

@@ -181,5 +181,5 @@ def test_gm_18_another_manager_with_our_own_address_makes_ours_inactive() -> Non
 
     rig.give(OURS, GimbalManagerStatus(0, 0, DEVICE.component, 0, 0, 0, 0))
 
-    assert rig.manager.state is ManagerState.INACTIVE
-    assert rig.manager.other == OURS
+    assert rig.manager.tracker.state is ManagerState.INACTIVE
+    assert rig.manager.tracker.other == OURS

@@ -97,7 +97,7 @@ class ManagerRig:
         self._device_due = self.now
         if active:
             self.run(5.0)
-            assert self.manager.state is ManagerState.ACTIVE
+            assert self.manager.tracker.state is ManagerState.ACTIVE
 
     def make(
         self, commands: CommandSender, settings: ManagerSettings,

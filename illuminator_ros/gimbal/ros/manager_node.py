@@ -123,10 +123,10 @@ class ManagerNode(ServedPayload):
         self._log = host.log
         self._frames = Frames.of(host.values)
         self._clock = host.node.get_clock()
-        self._gimbals = Gimbals(both.client, host, lambda: manager.obstacle)
+        self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.obstacle)
         self._interface = NodeInterface(
             host.node, host.link, host.log,
-            publications=() if manager.has_mavlink else (
+            publications=() if manager.tracker.has_mavlink else (
                 Publication('device/setpoint', QuaternionStamped, STREAM_QOS),),
             commands=tuple(self._topics()))
         self._source = DiagnosticsSource(
@@ -141,7 +141,7 @@ class ManagerNode(ServedPayload):
             CommandTopic('odometry', Odometry, self._take_odometry, _read_odometry),
             CommandTopic('fix', NavSatFix, self._take_place,
                          lambda message: _read_fix(message, separation))]
-        if not self._manager.has_mavlink:
+        if not self._manager.tracker.has_mavlink:
             topics.append(CommandTopic(
                 'device/attitude', QuaternionStamped, self._take_attitude,
                 self._frames.read_attitude))
@@ -196,7 +196,7 @@ class ManagerNode(ServedPayload):
 
     def _publish(self, event: gimbal_manager.SetpointSent) -> None:
         setpoint = event.setpoint
-        if self._manager.has_mavlink:
+        if self._manager.tracker.has_mavlink:
             return
         # Neutral and retracted are the same for a gimbal that has an attitude only.
         attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
@@ -241,10 +241,10 @@ def findings(manager: gimbal_manager.GimbalManager, ways: int) -> list[Finding]:
     :param ways: over how many peers the player in primary control is heard.
     """
     found: list[Finding] = []
-    if manager.state is ManagerState.INACTIVE:
-        found.append((ERROR, f'{manager.other} manages the gimbal too: inactive'))
-    elif manager.state is not ManagerState.ACTIVE:
-        found.append((WARN, manager.state.value))
+    if manager.tracker.state is ManagerState.INACTIVE:
+        found.append((ERROR, f'{manager.tracker.other} manages the gimbal too: inactive'))
+    elif manager.tracker.state is not ManagerState.ACTIVE:
+        found.append((WARN, manager.tracker.state.value))
     if ways > 1:
         found.append((WARN, f'{manager.control.holder(Role.PRIMARY)} has control and is heard '
                             f'over {ways} peers: another sender may use its address'))
@@ -262,12 +262,12 @@ def _values(manager: gimbal_manager.GimbalManager, now: float) -> dict[str, Valu
     control, settings = manager.control, manager.settings.control
     since = control.since(Role.PRIMARY)
     return {
-        'state': manager.state.value,
-        'gimbal_device_id': manager.device_id,
+        'state': manager.tracker.state.value,
+        'gimbal_device_id': manager.tracker.device_id,
         'policy': settings.policy.value,
         **{f'{role.value}_control': str(control.holder(role) or 'none') for role in Role},
         **({'control_s_ago': now - since} if math.isfinite(since) else {}),
-        'other_manager': str(manager.other or 'none')}
+        'other_manager': str(manager.tracker.other or 'none')}
 
 
 def _control_text(event: RoleHolderChanged, lease: float) -> str:
