@@ -36,8 +36,9 @@ from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 from support.fake_camera import FakeCamera, running_camera
 from support.frames import heartbeat_frame
-from support.processes import ended, Program, python, run
+from support.processes import ended, Program, python, run, slow_python
 from support.ros import Parameters, Ros, STREAM
+from support.slow import pass_time_until
 from support.waiting import eventually
 
 MODULE = 'illuminator_ros.rededge'
@@ -45,11 +46,13 @@ EXACT_LENGTHS = {0: 9, 2: 12, 4: 14, 24: 30, 25: 101, 30: 28, 33: 28, 155: 13, 1
 
 
 @contextlib.contextmanager
-def running_node(ros: Ros, camera: FakeCamera, **parameters: Any) -> Iterator[Program]:
+def running_node(
+    ros: Ros, camera: FakeCamera, start: Callable[..., Program] = python, **parameters: Any,
+) -> Iterator[Program]:
     """Run the node; it must end as it promises."""
     given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
-    with ended(python(MODULE, f'serial://{camera.device}:57600', '--ros-args', *given,
-                      env={'ROS_DOMAIN_ID': str(ros.domain)})) as node:
+    with ended(start(MODULE, f'serial://{camera.device}:57600', '--ros-args', *given,
+                     env={'ROS_DOMAIN_ID': str(ros.domain)})) as node:
         node.wait_for('/100 connected')
         yield node
 
@@ -161,7 +164,8 @@ def test_fused_position_goes_with_system_time_and_alone_re_17_re_19(own_ros: Ros
 
 def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) -> None:
     with (running_camera(feedback={'yaw': 90.0}) as camera,
-          running_node(own_ros, camera, geoid_separation=48.0)):
+          running_node(own_ros, camera, slow_python, geoid_separation=48.0,
+                       heartbeat_timeout=60.0)):
         connected = own_ros.subscribe(Bool, '/rededge/connected')
         fix = own_ros.subscribe(NavSatFix, '/rededge/image/fix', STREAM)
         attitude = own_ros.subscribe(geometry.QuaternionStamped, '/rededge/image/attitude', STREAM)
@@ -186,8 +190,10 @@ def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) ->
             0.707, 0.0, 0.707, 0.0]
 
         camera.answers = False
-        silent = [call(own_ros, name) for name in ('ping', 'capture')]
-        assert [(one.success, one.message) for one in silent] == [
+        silent = [own_ros.start(Trigger, f'/rededge/{name}', Trigger.Request(), '/rededge')
+                  for name in ('ping', 'capture')]
+        pass_time_until(lambda: all(one.answered for one in silent), step=0.25)
+        assert [(one.result().success, one.result().message) for one in silent] == [
             (False, 'no reply to 2 PINGs'), (False, 'no answer to DIGICAM_CONTROL within 5.00 s')]
 
 

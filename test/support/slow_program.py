@@ -18,18 +18,20 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
+from runpy import run_module
 import signal
 import sys
 from typing import Any
 
 # Where each of them has what it makes that has a clock: a link, or a monitor.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.bridge',
+          'illuminator_ros.rededge': 'illuminator_ros.ros.bridge',
           'illuminator_ros.simulator': 'illuminator_ros.cli.simulator.run',
           'illuminator_ros.monitor': 'illuminator_ros.cli.monitor.run'}
 
 
-def main(module: str) -> int:
-    """Run a module with the rest of the command line, and return its exit status."""
+def main(module: str) -> None:
+    """Run a module with the rest of the command line."""
     # As the module does before its imports: no thread that starts meanwhile may take a
     # signal.
     signal.pthread_sigmask(signal.SIG_BLOCK, (
@@ -45,8 +47,8 @@ def main(module: str) -> int:
     import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):
         place.OFF_LIMIT = PATIENCE / 2
-    return int(import_module(module).main())
+    run_module(module, run_name='__main__')
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv.pop(1)))
+    main(sys.argv.pop(1))
