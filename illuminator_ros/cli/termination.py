@@ -19,6 +19,7 @@ from __future__ import annotations
 import atexit
 from collections.abc import Callable, Iterable
 import contextlib
+import math
 import os
 import signal
 import sys
@@ -31,8 +32,10 @@ from .output_queue import OutputQueue
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, even if something hangs.
 LIMIT = 0.85
-# s in which queued output must be written, at an orderly and at an overdue exit.
-OUTPUT_LIMIT = 0.1
+# s in which queued output must be written: where no signal hurries, after an orderly end, for
+# which LIMIT leaves that much at least, and after one that hangs. A busy machine needs 0.1 s.
+OUTPUT_LIMIT = 1.0
+HURRIED_OUTPUT_LIMIT = 0.1
 OVERDUE_OUTPUT_LIMIT = 0.02
 
 
@@ -62,6 +65,8 @@ class Termination:
         self._end: Callable[[], None] | None = None
         self._last: Callable[[], None] | None = None
         self._signalled = False
+        # When the process must have ended, s.
+        self._deadline = math.inf
         atexit.register(self._write_output, OUTPUT_LIMIT)
         threading.Thread(target=self._wait, name='termination', daemon=True).start()
 
@@ -87,19 +92,20 @@ class Termination:
         and no thread could then enforce the limit.
         """
         if self._signalled:
-            self._exit(OUTPUT_LIMIT)
+            self._exit(max(self._deadline - time.monotonic() - HURRIED_OUTPUT_LIMIT,
+                           HURRIED_OUTPUT_LIMIT))
 
     def _wait(self) -> None:
         signal.sigwait(self._signals)
-        deadline = time.monotonic() + LIMIT
         with self._lock:
+            self._deadline = time.monotonic() + LIMIT
             self._signalled = True
             end = self._end
         # Without ``end`` nothing has been started.
         if end is not None:
             # In another thread, so that the deadline applies whatever it waits for.
             _run_in_thread(end)
-            time.sleep(max(deadline - time.monotonic(), 0.0))
+            time.sleep(max(self._deadline - time.monotonic(), 0.0))
             if self._last is not None:
                 with contextlib.suppress(Exception):
                     self._last()
@@ -110,11 +116,12 @@ class Termination:
         os._exit(0)
 
     def _write_output(self, limit: float) -> None:
+        until = time.monotonic() + limit
         # In another thread: a thread that is blocked in a write holds the lock of the stream.
         flushing = _run_in_thread(_flush)
         if flushing is not None:
             flushing.join(limit)
-        self._output.finish(limit)
+        self._output.finish(max(until - time.monotonic(), OVERDUE_OUTPUT_LIMIT))
 
 
 def _run_in_thread(function: Callable[[], None]) -> threading.Thread | None:

@@ -53,6 +53,30 @@ def hang(termination):
 run_program('program', hang)
 """
 
+# The thread that writes gets the processor late.
+BUSY = """
+import sys
+import time
+from illuminator_ros.cli.entry_point import run_program
+from illuminator_ros.cli.output_queue import OutputQueue
+
+write = OutputQueue._run
+
+
+def write_late(queue):
+    time.sleep(0.2)
+    write(queue)
+
+
+def fail(termination):
+    print('the reason', file=sys.stderr)
+    return 2
+
+
+OutputQueue._run = write_late
+sys.exit(run_program('program', fail, queued=[2]))
+"""
+
 
 def blocked(program: Program) -> set[signal.Signals]:
     """Return the signals that a program has blocked, in order to wait for them itself."""
@@ -134,6 +158,14 @@ def test_node_leaves_the_graph_at_once_and_further_signals_change_nothing(
     # A participant that only fell silent would be listed until its lease ends.
     eventually(lambda: 'leaving' not in ros.node.get_node_names(), within=LEASE / 2)
     assert (program.wait(), 'Traceback' in program.log) == (0, False)
+
+
+def test_last_line_is_written_on_a_busy_machine() -> None:
+    program = Program(sys.executable, '-c', BUSY)
+    try:
+        assert (program.wait(), program.log) == (2, 'the reason\n')
+    finally:
+        program.kill()
 
 
 def test_hanging_program_is_forced_to_end_within_a_second() -> None:
