@@ -18,6 +18,7 @@ import shlex
 import sys
 
 from support.processes import Program
+from support.waiting import PATIENCE
 
 # Without the flight, which has a test of its own.
 DEMO = """
@@ -32,7 +33,8 @@ sys.exit(run.main())
 def test_demo_says_that_ros2_is_missing_and_ends_with_three_commands_that_run() -> None:
     demo = Program(sys.executable, '-c', DEMO, env={'PATH': '/usr/bin:/bin'})
     try:
-        assert demo.wait() == 0, demo.log
+        # It waits for more than one event.
+        assert demo.wait(3 * PATIENCE) == 0, demo.log
     finally:
         demo.kill()
 
