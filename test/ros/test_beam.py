@@ -28,7 +28,7 @@ from support.light import Address, ServedLight
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, STREAM
-from support.slow import pass_time_until
+from support.slow import pass_time_until, SlowLink
 from visualization_msgs.msg import Marker
 
 
@@ -143,7 +143,8 @@ def test_gimbal_of_a_beam_that_is_not_heard_is_reported_with_those_that_are(
     absence = ('no attitude of gimbal device 154 of system 1 has been heard, so the beam is not '
                'shown; heard: 171 of system 1')
     with (running_bridge(own_ros.domain, port, beam_range=20.0, mounted_on=154) as bridge,
-          ServedLight(port, enable=1), served_gimbals(port, FakeManager(device_id=171))):
+          ServedLight(port, enable=1),
+          served_gimbals(port, FakeManager(device_id=171), link=SlowLink)):
         recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
         pass_time_until(lambda: bridge.count(f'{absence}; set mounted_on'))
 

@@ -266,15 +266,17 @@ class GimbalEndpoint(Endpoint):
 
 
 @contextlib.contextmanager
-def served_gimbals(port: int, *managers: FakeManager) -> Iterator[None]:
-    """Serve fake managers over UDP, by the clock of this machine."""
+def served_gimbals(
+    port: int, *managers: FakeManager, link: type[Link] = Link,
+) -> Iterator[None]:
+    """Serve fake managers over UDP, by the clock of this machine unless the link has another."""
     url = f'udpout://127.0.0.1:{port}'
-    link = Link(parse_url(url), GimbalEndpoint(managers), label=url)
-    link.start()
+    serving = link(parse_url(url), GimbalEndpoint(managers), label=url)
+    serving.start()
     try:
         yield
     finally:
-        link.stop()
+        serving.stop()
 
 
 def keys(rig: Rig) -> Sequence[GimbalKey]:
