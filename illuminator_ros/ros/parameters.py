@@ -281,7 +281,7 @@ def unknown_parameters(nodes: Sequence[Node], arguments: Sequence[str]) -> list[
     """
     known = {name for node in nodes for name in node.list_parameters([], 0).names}
     given = dict.fromkeys(name for node in nodes for name in given_parameters(node))
-    others = {name for _, section, values in _files(arguments)
+    others = {name.partition('.')[0] for _, section, values in _files(arguments)
               if not _WILDCARDS.keys().isdisjoint(section) and known.isdisjoint(values - _OF_RCLPY)
               for name in values}
     return [_unknown(name, close) for name in given if name not in known
@@ -342,8 +342,10 @@ def _files(arguments: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], Set
     """Return path, name in parts and parameters of each section of the parameter files."""
     for option, path in zip(arguments, arguments[1:], strict=False):
         if option == '--params-file':
-            content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-            yield from ((path, *section) for section in _sections(content))
+            # As rcl reads it: several documents, and no types but its own.
+            for content in yaml.load_all(
+                    Path(path).read_text(encoding='utf-8'), yaml.BaseLoader):
+                yield from ((path, *section) for section in _sections(content))
 
 
 def _sections(content: object) -> Iterator[tuple[tuple[str, ...], Set[str]]]:

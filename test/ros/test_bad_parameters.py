@@ -133,8 +133,11 @@ def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
     ros: Ros, tmp_path: Path,
 ) -> None:
     file = tmp_path / 'shared.yaml'
+    # Values that rcl reads as text, and PyYAML not at all.
     file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false,\n'
+                    '  day: 2026-02-30, equal: =, angle: !degrees 3, 12: 1, left.wheel: 1,\n'
                     '  qos_overrides: {/tf: {publisher: {depth: 1}}}}}\n'
+                    '---\n'
                     '/*: {ros__parameters: {status_interval: 1.0, azimuth: 3}}\n'
                     'illuminator: {ros__parameters: {elevation: 3}}\n'
                     'boat: {illuminator: {ros__parameters: {brightness: 40}}}\n'
