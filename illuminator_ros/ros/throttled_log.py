@@ -32,6 +32,8 @@ BURST = 10
 PERIOD = 10.0
 # Kinds that are limited each for itself.
 MAX_KINDS = 256
+# Characters of such a line, enough for a traceback: a frame_id may have megabytes.
+MAX_LENGTH = 8000
 
 
 @dataclass
@@ -79,6 +81,8 @@ class NodeLog:
             can cause must have one; '' is not limited.
         """
         if kind and severity > logging.DEBUG:
+            if len(text) > MAX_LENGTH:
+                text = f'{text[:MAX_LENGTH]}...'
             with self._lock:
                 note = self._admit(severity, text, kind)
             if note is None:

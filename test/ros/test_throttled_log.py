@@ -82,3 +82,12 @@ def test_kinds_beyond_the_limit_are_left_out_until_others_have_ended(
     node_log.flush()
     node_log.warning('text', 'one more')
     assert lines(capfd) == ['text']
+
+
+def test_line_that_another_program_can_cause_is_cut_to_a_length(
+    node_log: log.NodeLog, capfd: pytest.CaptureFixture[str],
+) -> None:
+    node_log.warning('x' * log.MAX_LENGTH, 'kind')
+    node_log.warning('x' * 2 * log.MAX_LENGTH, 'kind')
+
+    assert lines(capfd) == ['x' * log.MAX_LENGTH, 'x' * log.MAX_LENGTH + '...']
