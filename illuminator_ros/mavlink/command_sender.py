@@ -47,7 +47,7 @@ MAX_SAMPLES = 64
 # Before this many samples the given time-out holds.
 MIN_SAMPLES = 4
 # s for which an acknowledgement, or a copy of it, may be under way.
-ACK_REACH = 5.0
+ACK_LIFETIME = 5.0
 # COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
 GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
 DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
@@ -175,7 +175,7 @@ class CommandResult(NamedTuple):
         """Whether the target acknowledged with MAV_RESULT_ACCEPTED."""
         return self.status is CommandStatus.ANSWERED and self.result == MavResult.ACCEPTED
 
-    def may_answer_earlier(self, now: float, reach: float) -> bool:
+    def may_answer_earlier(self, now: float) -> bool:
         """
         Return whether the acknowledgement may be one of the earlier command of this kind.
 
@@ -183,11 +183,10 @@ class CommandResult(NamedTuple):
         still come; a status must then decide.
 
         :param now: when this command was answered.
-        :param reach: s for which an acknowledgement may be under way.
         """
         return (self.status is CommandStatus.ANSWERED and self.earlier is not None
                 and self.earlier.result in (None, self.result)
-                and now - self.earlier.ended_at <= reach)
+                and now - self.earlier.ended_at <= ACK_LIFETIME)
 
     def describe(self) -> str:
         """Return the outcome for people, with the name of the MAV_RESULT."""
@@ -221,15 +220,11 @@ def format_seconds(seconds: float) -> str:
 
 
 class RttEstimator:
-    """
-    The last :data:`MAX_SAMPLES` round-trip times of one target, s.
-
-    :ivar doubtful_until: s; until then acknowledgements may belong to earlier tries or be copies.
-    """
+    """The last :data:`MAX_SAMPLES` round-trip times of one target, s."""
 
     def __init__(self) -> None:
-        self.doubtful_until = -math.inf
-        self._certain: deque[float] = deque(maxlen=8)
+        self._ambiguous_until = -math.inf
+        self._unambiguous: deque[float] = deque(maxlen=8)
         self._samples: deque[float] = deque()
         self._sorted: list[float] = []
 
@@ -238,12 +233,16 @@ class RttEstimator:
 
     def add(self, seconds: float, now: float) -> None:
         """Add a sample, s."""
-        if now >= self.doubtful_until:
-            self._certain.append(seconds)
+        if now >= self._ambiguous_until:
+            self._unambiguous.append(seconds)
         self._samples.append(seconds)
         bisect.insort(self._sorted, seconds)
         if len(self._samples) > MAX_SAMPLES:
             del self._sorted[bisect.bisect_left(self._sorted, self._samples.popleft())]
+
+    def expect_ambiguous(self, now: float) -> None:
+        """Note that acknowledgements may belong to an earlier try or be copies from now on."""
+        self._ambiguous_until = now + ACK_LIFETIME
 
     def quantile(self, share: float) -> float | None:
         """Return the round-trip time that this share (0..1) does not exceed, None if unknown."""
@@ -251,13 +250,18 @@ class RttEstimator:
             return None
         return self._sorted[min(int(share * len(self._sorted)), len(self._sorted) - 1)]
 
-    def least(self, now: float) -> float:
-        """Return the time in which no answer comes, s; 0 while acknowledgements are certain."""
-        if now >= self.doubtful_until:
+    def shortest(self, now: float) -> float:
+        """
+        Return a time after a command within which no answer to it can come, s.
+
+        :return: a quartile of unambiguous samples, or the median of all if there are none; 0 while
+            acknowledgements are not ambiguous.
+        """
+        if now >= self._ambiguous_until:
             return 0.0
-        if not self._certain:
+        if not self._unambiguous:
             return self.quantile(0.5) or 0.0
-        return sorted(self._certain)[len(self._certain) // 4]
+        return sorted(self._unambiguous)[len(self._unambiguous) // 4]
 
     def timeout(self, longest: float) -> float:
         """
@@ -436,7 +440,7 @@ class CommandSender:
         if not sent:
             self.counters.unexpected_acks += 1
             if source in self._round_trips:
-                self._doubt(source, now)
+                self._round_trips[source].expect_ambiguous(now)
             return
         # A command in progress is not rejected: the rejection belongs to a command beside it.
         request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
@@ -471,8 +475,6 @@ class CommandSender:
             return
         request.state = state
 
-    def _doubt(self, target: Address, now: float) -> None:
-        self._round_trips.setdefault(target, RttEstimator()).doubtful_until = now + ACK_REACH
 
     def poll(self, now: float) -> None:
         """Resend or end what is due."""
@@ -492,7 +494,8 @@ class CommandSender:
             self._end(request, CommandStatus.NO_ANSWER, now)
         else:
             request.state = RequestState.SENT
-            self._doubt(request.command.target, now)
+            self._round_trips.setdefault(
+                request.command.target, RttEstimator()).expect_ambiguous(now)
             self._transmit(request, now)
 
     def next_deadline(self) -> float:

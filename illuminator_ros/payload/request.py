@@ -108,9 +108,9 @@ class Target:
     def _status_answered(self, result: command_sender.CommandResult, now: float) -> None:
         self._status_requested = False
 
-    def round_trip(self, now: float) -> float:
-        """Return the time in which no answer comes, s; 0 while acknowledgements are certain."""
-        return self._commands.round_trip(self.address).least(now)
+    def shortest_round_trip(self, now: float) -> float:
+        """See :meth:`~..mavlink.command_sender.RttEstimator.shortest`."""
+        return self._commands.round_trip(self.address).shortest(now)
 
     @property
     def status_delay(self) -> float:
@@ -322,7 +322,7 @@ class Request(Generic[S]):
             self.fail(OVERTAKEN, now)
         elif outcome.accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
-        elif outcome.accepted or outcome.may_answer_earlier(now, command_sender.ACK_REACH):
+        elif outcome.accepted or outcome.may_answer_earlier(now):
             self._step(Step.ACKNOWLEDGED)
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
@@ -344,7 +344,7 @@ class Request(Generic[S]):
             self._repeats = 0
             if (earlier is not None and earlier.result is None
                     and earlier.command.params != self._sent.params
-                    and outcome.may_answer_earlier(now, command_sender.ACK_REACH)):
+                    and outcome.may_answer_earlier(now)):
                 self._repeats = earlier.tries
         self._repeats -= 1
         self._was_repeated |= self._repeats >= 0
@@ -360,7 +360,7 @@ class Request(Generic[S]):
         self._has_status = True
         if not self.is_confirming:
             return
-        delay = (self._target.round_trip(now) if report.has_clock
+        delay = (self._target.shortest_round_trip(now) if report.has_clock
                  else self._target.status_delay)
         shown = self._sent.shown_by(report.status)
         if (shown and not self._was_repeated and self._before is not None

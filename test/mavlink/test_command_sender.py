@@ -368,11 +368,11 @@ def test_cancelled_command_ends_and_the_other_is_sent(place: int) -> None:
     assert (runs[1 - place].outcomes, len(runs[1 - place].frames)) == ([], 1)
 
 
-@pytest.mark.parametrize(('first', 'second', 'after', 'doubtful'), [
-    (DENIED, DENIED, 0.4, True), (DENIED, DENIED, 0.6, False), (ACCEPTED, DENIED, 0.4, False),
+@pytest.mark.parametrize(('first', 'second', 'after', 'ambiguous'), [
+    (DENIED, DENIED, 4.9, True), (DENIED, DENIED, 5.1, False), (ACCEPTED, DENIED, 0.4, False),
     (None, DENIED, 0.4, True), (None, ACCEPTED, 0.4, True)])
 def test_result_says_whether_it_may_be_that_of_the_command_before(
-        first: int | None, second: int, after: float, doubtful: bool) -> None:
+        first: int | None, second: int, after: float, ambiguous: bool) -> None:
     rig = Rig()
     before = rig.start()
     if first is None:
@@ -382,8 +382,8 @@ def test_result_says_whether_it_may_be_that_of_the_command_before(
     rig.now += after
     run = rig.start()
     rig.ack(second)
-    assert not before.outcome.may_answer_earlier(rig.now, 0.5)
-    assert run.outcome.may_answer_earlier(rig.now, 0.5) is doubtful
+    assert not before.outcome.may_answer_earlier(rig.now)
+    assert run.outcome.may_answer_earlier(rig.now) is ambiguous
 
 
 # Fields, arguments, texts and counters

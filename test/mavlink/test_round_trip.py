@@ -19,6 +19,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.command_sender import (
+    ACK_LIFETIME,
     MAX_SAMPLES,
     MIN_SAMPLES,
     MIN_TIMEOUT,
@@ -63,15 +64,15 @@ def test_quantile_of_no_sample_is_unknown() -> None:
     assert of().quantile(0.5) is None
 
 
-def test_least_is_known_from_certain_samples_and_needed_while_others_are_doubtful() -> None:
+def test_shortest_comes_from_unambiguous_samples_and_is_0_while_none_is_ambiguous() -> None:
     estimator = of(*[0.4] * 6)
-    assert estimator.least(0.0) == 0.0
-    estimator.doubtful_until = 5.0
-    estimator.add(0.001, 4.9)
-    assert (estimator.least(4.9), estimator.least(5.0)) == (0.4, 0.0)
+    assert estimator.shortest(0.0) == 0.0
+    estimator.expect_ambiguous(0.0)
+    estimator.add(0.001, ACK_LIFETIME - 0.1)
+    assert (estimator.shortest(ACK_LIFETIME - 0.1), estimator.shortest(ACK_LIFETIME)) == (0.4, 0.0)
 
 
-def test_a_resend_before_the_first_sample_makes_that_doubtful() -> None:
+def test_a_resend_before_the_first_sample_makes_that_ambiguous() -> None:
     rig = Rig()
     rig.start()
     rig.run(0.6)
@@ -80,8 +81,8 @@ def test_a_resend_before_the_first_sample_makes_that_doubtful() -> None:
     rig.run(0.01)
     rig.ack(ACCEPTED)
     estimator = rig.sender.round_trip(LIGHT)
-    assert (len(estimator), estimator.doubtful_until > rig.now) == (1, True)
-    assert estimator.least(rig.now) == pytest.approx(0.01)
+    assert len(estimator) == 1
+    assert estimator.shortest(rig.now) == pytest.approx(0.01)
 
 
 def taught(seconds: float, timeout: float) -> Rig:
