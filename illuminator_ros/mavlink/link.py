@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The link: the one thread that owns a transport and the endpoint that speaks over it."""
+"""The link: the one thread that owns a transport and the endpoint that uses it."""
 
 from __future__ import annotations
 
@@ -46,22 +46,23 @@ from .transport import Channel, Peer
 from .url import Url
 
 # s; the loop polls this often even where nothing is due.
-IDLE = 1.0
-# A turn costs as much as ten foreign frames. Where more than BUSY come per second, they collect
-# for REST s, or until COLLECTED are expected; a UDP socket has room for 250. A call ends the
-# rest, and there is none within HURRY s of a message that may be answered.
-BUSY = 1000.0
-REST = 0.02
-COLLECTED = 128
-HURRY = 1.0
+MAX_WAIT = 1.0
+# To wake the loop costs as much as ten foreign frames. Where more than BATCH_THRESHOLD come per
+# second, the loop lets them collect for BATCH_TIME s, or until BATCH_SIZE are expected; a UDP
+# socket has room for 250. A call ends that, and it does not begin within ANSWER_TIME s of a
+# message that may be answered.
+BATCH_THRESHOLD = 1000.0
+BATCH_TIME = 0.02
+BATCH_SIZE = 128
+ANSWER_TIME = 1.0
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
 # s that a channel stays open until it is proved without a frame.
-PROBATION = 1.0
+PROOF_TIME = 1.0
 # s for which the line may still be busy when the next group of a stream is written, so that it has
 # no gaps. The most urgent group may wait behind one more in the line.
-AHEAD = 0.002
-URGENT_AHEAD = 0.02
+WRITE_AHEAD = 0.002
+URGENT_WRITE_AHEAD = 0.02
 # s without a frame from any peer, longer than between heartbeats; and then between greetings. A
 # router that has restarted forwards nothing to us until it has heard us.
 SILENCE = 1.5
@@ -142,11 +143,11 @@ class Link:
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
         self._work_pending = False
-        # Foreign frames received until the last turn that had some, when that was, and until
-        # when an answer is expected, s.
+        # Foreign frames received until the last pass of the loop that had some, when that was, and
+        # until when an answer is expected, s.
         self._foreign_before = 0
         self._foreign_at = -math.inf
-        self._hurry_until = -math.inf
+        self._answer_expected_until = -math.inf
         self._snapshot_due = 0.0
         self._snapshot = self.snapshot(clock())
         self._calls: deque[Callable[[float], None]] = deque()
@@ -159,7 +160,7 @@ class Link:
         self._calls_only.register(self._wake_out, select.POLLIN)
         self._stopping = threading.Event()
         self._starting = threading.Lock()
-        # s that the next turn must wait at least: there was a fault.
+        # s that the loop must wait at least next time: there was a fault.
         self._pause = 0.0
         self._fault_log_due = -math.inf
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
@@ -222,9 +223,9 @@ class Link:
             status.openings, self._router.peer_count(now), self._traffic.snapshot(now),
             copy.copy(self._receiver.counters), copy.copy(self._signing.counters))
 
-    def way_count(self, source: Address, now: float) -> int:
+    def peer_count_of(self, source: Address, now: float) -> int:
         """Return over how many peers a component is heard, which may be several senders."""
-        return self._router.way_count(source, now)
+        return self._router.peer_count_of(source, now)
 
     def reset_loss(self, source: Address) -> None:
         """Forget recent losses of a component: its sequence numbers have restarted."""
@@ -256,7 +257,7 @@ class Link:
         """Wait for the transport, a call or a deadline, and do what follows."""
         due = min(self._due, self._receiver.next_deadline())
         now = self.clock()
-        wait = min(max(due - now, self._pause), IDLE)
+        wait = min(max(due - now, self._pause), MAX_WAIT)
         self._pause = 0.0
         for key, events in self._selector.select(wait):
             if key.fileobj is self._wake_out:
@@ -267,25 +268,25 @@ class Link:
         now = self.clock()
         if self._work_pending or self._calls or now >= due:
             self._work()
-        self._rest(now)
+        self._collect(now)
 
-    def _rest(self, now: float) -> None:
+    def _collect(self, now: float) -> None:
         """Let foreign frames collect on a busy link."""
         foreign = self._receiver.counters.foreign
         count, gap = foreign - self._foreign_before, now - self._foreign_at
         if not count or self._channel is None or self._channel.more:
             return
         self._foreign_before, self._foreign_at = foreign, now
-        if now >= self._hurry_until and count > BUSY * gap > 0:
-            rest = min(REST, COLLECTED * gap / count)
+        if now >= self._answer_expected_until and count > BATCH_THRESHOLD * gap > 0:
+            seconds = min(BATCH_TIME, BATCH_SIZE * gap / count)
             # poll() cannot wait for less than 1 ms.
-            if rest < 0.001:
-                time.sleep(rest)
+            if seconds < 0.001:
+                time.sleep(seconds)
             else:
-                self._calls_only.poll(1000 * rest)
+                self._calls_only.poll(1000 * seconds)
 
     def _work(self) -> None:
-        """Do what others asked for, and what is due."""
+        """Run the calls of other threads, send, and do what is due."""
         self._work_pending = False
         self._run_calls()
         self._flush()
@@ -430,7 +431,8 @@ class Link:
         """Return when messages of streams can be sent, infinity if the channel will tell."""
         if self._channel is None or self._channel.is_waiting or not self._streams:
             return math.inf
-        return self._line_free_at - (URGENT_AHEAD if self._streams.is_urgent else AHEAD)
+        return self._line_free_at - (
+            URGENT_WRITE_AHEAD if self._streams.is_urgent else WRITE_AHEAD)
 
     def _send_messages(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
         if self._channel is None:
@@ -441,7 +443,7 @@ class Link:
         peers: Sequence[Peer] = ()
         for source, message in messages:
             if getattr(message, 'target_system', 0):
-                self._hurry_until = now + HURRY
+                self._answer_expected_until = now + ANSWER_TIME
             towards = self._router.towards(message, all_peers, now)
             if frames and towards != peers:
                 self._send(frames, peers, now)
@@ -502,7 +504,7 @@ class Link:
             return
         self._channel = channel
         self._line_free_at = -math.inf
-        self._proven_at = now + PROBATION
+        self._proven_at = now + PROOF_TIME
         self._frame_received = False
         self._greet_at = now + GREETING_INTERVAL
         try:

@@ -22,55 +22,55 @@ import math
 from .messages import Address
 from .transport import Peer
 
-# Components whose way is remembered, and ways for each. Beyond that all peers get a message.
+# Components with a route, and peers of one route. Messages to other components go to all peers.
 MAX_ROUTES = 256
-MAX_WAYS = 4
-# s without a frame, after which a way is forgotten.
+MAX_ROUTE_PEERS = 4
+# s without a frame, after which a peer is removed from a route.
 EXPIRY = 10.0
-# s between looks for what has expired, where there is no room: a frame must not cost a look.
-LOOK_INTERVAL = 1.0
+# s between searches of a full table for expired routes, so that few frames cause one.
+EXPIRY_INTERVAL = 1.0
 
 
 class RoutingTable:
     """
-    The ways to components, learnt from what comes from them.
+    The routes to components, learnt from the frames that come from them.
 
-    A component that is heard over several peers is sent to over all of them: an impostor
-    diverts nothing from the real component.
+    A message to a component that is heard over several peers goes to all of them, so that an
+    impostor diverts nothing from the real component.
     """
 
     def __init__(self) -> None:
-        self._ways: dict[Address, dict[Peer, float]] = {}
-        # When a component was last heard over more peers than are remembered.
-        self._crowded: dict[Address, float] = {}
-        self._look_due = -math.inf
+        self._routes: dict[Address, dict[Peer, float]] = {}
+        # When a component was last heard over more peers than a route has.
+        self._overflowed: dict[Address, float] = {}
+        self._expiry_due = -math.inf
 
     def __len__(self) -> int:
-        return len(self._ways)
+        return len(self._routes)
 
     def peer_count(self, now: float) -> int:
-        """Return how many peers lead somewhere."""
-        return len({peer for ways in self._ways.values()
-                    for peer, heard in ways.items() if now - heard <= EXPIRY})
+        """Return how many peers lead to a component."""
+        return len({peer for route in self._routes.values()
+                    for peer, heard in route.items() if now - heard <= EXPIRY})
 
-    def way_count(self, source: Address, now: float) -> int:
-        """Return over how many peers a component is heard."""
-        return sum(now - heard <= EXPIRY for heard in self._ways.get(source, {}).values())
+    def peer_count_of(self, source: Address, now: float) -> int:
+        """Return over how many peers a component was heard in the last :data:`EXPIRY`."""
+        return sum(now - heard <= EXPIRY for heard in self._routes.get(source, {}).values())
 
     def heard(self, source: Address, peer: Peer, now: float) -> None:
         """Note that a component was heard over a peer."""
-        ways = self._ways.get(source)
-        if ways is None:
-            if len(self._ways) >= MAX_ROUTES and not self._expire(now):
+        route = self._routes.get(source)
+        if route is None:
+            if len(self._routes) >= MAX_ROUTES and not self._expire(now):
                 return
-            ways = self._ways[source] = {}
-        if peer not in ways and len(ways) >= MAX_WAYS:
-            for old in [way for way, heard in ways.items() if now - heard > EXPIRY]:
-                del ways[old]
-            if len(ways) >= MAX_WAYS:
-                self._crowded[source] = now
+            route = self._routes[source] = {}
+        if peer not in route and len(route) >= MAX_ROUTE_PEERS:
+            for old in [one for one, heard in route.items() if now - heard > EXPIRY]:
+                del route[old]
+            if len(route) >= MAX_ROUTE_PEERS:
+                self._overflowed[source] = now
                 return
-        ways[peer] = now
+        route[peer] = now
 
     def towards(self, message: object, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
         """Return those of the peers that lead to the message's target, all where none does."""
@@ -78,23 +78,23 @@ class RoutingTable:
         if not system or len(peers) < 2:
             return peers
         target = Address(system, getattr(message, 'target_component', 0))
-        if now - self._crowded.get(target, -math.inf) <= EXPIRY:
+        if now - self._overflowed.get(target, -math.inf) <= EXPIRY:
             return peers
-        ways = self._ways.get(target, {})
-        known = [peer for peer in peers if now - ways.get(peer, -math.inf) <= EXPIRY]
+        route = self._routes.get(target, {})
+        known = [peer for peer in peers if now - route.get(peer, -math.inf) <= EXPIRY]
         return known or peers
 
     def clear(self) -> None:
-        """Forget all: the link is closed."""
-        self._ways.clear()
-        self._crowded.clear()
+        """Remove all routes: the link is closed."""
+        self._routes.clear()
+        self._overflowed.clear()
 
     def _expire(self, now: float) -> bool:
-        """Forget what has not been heard for long, and return whether there is room."""
-        if now >= self._look_due:
-            self._look_due = now + LOOK_INTERVAL
-            for source, ways in list(self._ways.items()):
-                if all(now - heard > EXPIRY for heard in ways.values()):
-                    del self._ways[source]
-                    self._crowded.pop(source, None)
-        return len(self._ways) < MAX_ROUTES
+        """Remove expired routes, and return whether there is room for another."""
+        if now >= self._expiry_due:
+            self._expiry_due = now + EXPIRY_INTERVAL
+            for source, route in list(self._routes.items()):
+                if all(now - heard > EXPIRY for heard in route.values()):
+                    del self._routes[source]
+                    self._overflowed.pop(source, None)
+        return len(self._routes) < MAX_ROUTES

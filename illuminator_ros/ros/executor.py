@@ -44,10 +44,10 @@ from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1
-# Every client of a service gets the answers to all, and by default keeps the last 10 only. Where
-# more requests wait than this, their answers are sent this far apart, s.
-CROWD = 8
-CROWD_INTERVAL = 0.008
+# Each client of a service gets the answers to all clients, and by default keeps the last 10 only.
+# Where more requests wait than this, their answers are sent this far apart, s.
+MAX_UNSPACED = 8
+ANSWER_SPACING = 0.008
 
 Q = TypeVar('Q')
 A = TypeVar('A')
@@ -144,7 +144,7 @@ class NodeExecutor(SingleThreadedExecutor):
             super().spin_once(FALLBACK_PERIOD if timeout_sec is None else timeout_sec)
         else:
             services, subscriptions = self._entities.wait(
-                CROWD_INTERVAL if self._spaced else timeout_sec)
+                ANSWER_SPACING if self._spaced else timeout_sec)
             for service in services:
                 self._serve(service)
             for subscription in subscriptions:
@@ -192,11 +192,11 @@ class NodeExecutor(SingleThreadedExecutor):
         # must not hold up the link's thread.
         send = functools.partial(_send, service, header, response)
         with self._counting:
-            crowded = bool(self._spaced) or self._open[id(service)] > CROWD
+            spaced = bool(self._spaced) or self._open[id(service)] > MAX_UNSPACED
             self._open[id(service)] -= 1
-            if crowded:
+            if spaced:
                 self._spaced.append(send)
-        if crowded:
+        if spaced:
             self._wakeup.trigger()
         elif header.request_id.sequence_number <= 1:
             self.call(send)
@@ -206,7 +206,7 @@ class NodeExecutor(SingleThreadedExecutor):
     def _send_spaced(self) -> None:
         now = time.monotonic()
         if self._spaced and now >= self._spaced_due:
-            self._spaced_due = now + CROWD_INTERVAL
+            self._spaced_due = now + ANSWER_SPACING
             self._spaced.popleft()()
 
     @staticmethod

@@ -17,7 +17,7 @@ Attacks both sides of the protocol with hostile input for as long as is wanted.
 
 Everything between the socket and the observers takes part: channel, framing, signing, routes,
 controller or simulated lights, in all signing modes, while honest requests go on. What must hold
-is in test/support/siege.py. The same seed sends the same input.
+is in test/support/attacked_link.py. The same seed sends the same input.
 
     python3 test/fuzz/run.py --seconds 60 --seed 1
     python3 test/fuzz/run.py --only 1/17        one round again, as a finding names it
@@ -39,9 +39,9 @@ TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
 from illuminator_ros.mavlink.signing import SigningMode  # noqa: E402
-from support.siege import SIEGES  # noqa: E402
+from support.attacked_link import ATTACKED  # noqa: E402
 
-KINDS = list(itertools.product(SIEGES, SigningMode))
+KINDS = list(itertools.product(ATTACKED, SigningMode))
 # Datagrams of one round: enough to fill every table, few enough to find one of them again.
 ROUND = 10_000
 # Rounds after which memory must not grow any more, and by how much it may (MB).
@@ -58,22 +58,22 @@ def memory_mb() -> float:
 def play(seed: str, number: int, inputs: int = ROUND) -> bool:
     """Play one round; return whether there was no finding, and print the finding."""
     name, mode = KINDS[number % len(KINDS)]
-    siege = SIEGES[name]((seed, number), mode)
+    attacked = ATTACKED[name]((seed, number), mode)
     try:
-        while siege.inputs < inputs:
-            siege.attack()
-        siege.check_bounds()
-        siege.check_service()
+        while attacked.inputs < inputs:
+            attacked.attack()
+        attacked.check_bounds()
+        attacked.check_service()
     except Exception:
         print(f'\nFINDING in round {seed}/{number}: {name}, signing {mode.value}, after '
-              f'{siege.inputs} inputs')
+              f'{attacked.inputs} inputs')
         traceback.print_exc(file=sys.stdout)
-        for data, peer in siege.last:
+        for data, peer in attacked.last:
             print(f'last input from {peer}: {data.hex()}')
         print(f'again: python3 test/fuzz/run.py --only {seed}/{number}\n', flush=True)
         return False
     finally:
-        siege.close()
+        attacked.close()
     return True
 
 

@@ -23,43 +23,43 @@ from typing import Any
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
-from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.routing_table import MAX_ROUTE_PEERS, MAX_ROUTES
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.payload.discovery import MAX_DEVICES
 from illuminator_ros.payload.request import MAX_WAITING, Result
 import pytest
+from support.attacked_link import ATTACKED, AttackedBridge, AttackedLink, GENUINE
 from support.fake_light import status_message
 from support.frames import frame_of, heartbeat_frame, raw_v2
-from support.siege import BridgeSiege, GENUINE, Siege, SIEGES
 from support.simulated_link import SimulatedLink
 
 
-@pytest.mark.parametrize(('kind', 'mode'), list(itertools.product(sorted(SIEGES), SigningMode)))
+@pytest.mark.parametrize(('kind', 'mode'), list(itertools.product(sorted(ATTACKED), SigningMode)))
 def test_an_attack_breaks_nothing(kind: str, mode: SigningMode) -> None:
-    siege = SIEGES[kind](('test', kind, mode.value), mode)
-    while siege.inputs < 2000:
-        siege.attack()
-    siege.check_bounds()
-    siege.check_service()
-    siege.close()
+    attacked = ATTACKED[kind](('test', kind, mode.value), mode)
+    while attacked.inputs < 2000:
+        attacked.attack()
+    attacked.check_bounds()
+    attacked.check_service()
+    attacked.close()
 
 
 # Floods
 
 @pytest.fixture
-def bridge() -> Iterator[BridgeSiege]:
+def bridge() -> Iterator[AttackedBridge]:
     """Return the drone's side with its genuine light."""
-    siege = BridgeSiege('flood', SigningMode.OFF)
-    yield siege
-    siege.close()
+    attacked = AttackedBridge('flood', SigningMode.OFF)
+    yield attacked
+    attacked.close()
 
 
-def flood(siege: Siege, frames: Iterable[bytes], *, peers: int = 1) -> None:
+def flood(attacked: AttackedLink, frames: Iterable[bytes], *, peers: int = 1) -> None:
     """Send frames, at one moment, from so many peers in turn."""
     for number, frame in enumerate(frames):
-        siege.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
+        attacked.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
 
 
 def forged(count: int) -> list[mav.Address]:
@@ -76,8 +76,8 @@ def unknown_ids() -> Iterator[int]:
     ([heartbeat_frame(address, mav_type=2) for address in forged(3000)], 1,
      {'sources': MAX_SOURCES, 'routes': MAX_ROUTES}),
     ([heartbeat_frame(mav.Address(2, 1))] * 3000, 3000,
-     {'peers': MAX_PEERS, 'decoders': MAX_DECODERS, 'ways': MAX_WAYS}),
-    ([heartbeat_frame(GENUINE)] * 3000, 3000, {'ways': MAX_WAYS}),
+     {'peers': MAX_PEERS, 'decoders': MAX_DECODERS, 'route peers': MAX_ROUTE_PEERS}),
+    ([heartbeat_frame(GENUINE)] * 3000, 3000, {'route peers': MAX_ROUTE_PEERS}),
     ([raw_v2(message_id, b'x', crc_extra=0, source=mav.Address(9, 9))
       for message_id in itertools.islice(unknown_ids(), 5000)], 1, {'sources': 1}),
     ([frame_of(status_message(uptime_ms=number % 2 * 1_000_000), 0, GENUINE)
@@ -85,7 +85,7 @@ def unknown_ids() -> Iterator[int]:
 ], ids=['lights', 'components', 'peers', 'peers that claim to be the light', 'unknown messages',
         'restarts'])
 def test_a_flood_is_bounded_and_the_genuine_light_is_served(
-    bridge: BridgeSiege, frames: list[bytes], peers: int, full: dict[str, int],
+    bridge: AttackedBridge, frames: list[bytes], peers: int, full: dict[str, int],
 ) -> None:
     flood(bridge, frames, peers=peers)
     bridge.check_bounds()
@@ -121,7 +121,7 @@ class NeverEmpty(deque[Any]):
 ], ids=['heartbeats', 'unused messages', 'lights', 'statuses', 'noise'])
 @pytest.mark.parametrize('fault', ['', 'silence'])
 def test_a_set_ends_within_0_9_s_in_a_flood_that_never_ends(
-    bridge: BridgeSiege, frames: list[bytes], fault: str,
+    bridge: AttackedBridge, frames: list[bytes], fault: str,
 ) -> None:
     light, link = bridge.controller.lights[GENUINE], bridge.link
     ended: list[tuple[bool, float]] = []
@@ -140,16 +140,17 @@ def test_a_set_ends_within_0_9_s_in_a_flood_that_never_ends(
 
 
 def test_a_flood_of_signed_streams_is_bounded() -> None:
-    siege = BridgeSiege('streams', SigningMode.REQUIRE)
-    flood(siege, (siege.attacker.signed(mav.Heartbeat.id, bytes(9), 0, source, siege.link.now)
-                  for source in forged(20 * MAX_STREAMS)))
-    assert siege.sizes()['streams'] == MAX_STREAMS
-    siege.check_service()
-    siege.close()
+    attacked = AttackedBridge('streams', SigningMode.REQUIRE)
+    flood(attacked, (
+        attacked.attacker.signed(mav.Heartbeat.id, bytes(9), 0, source, attacked.link.now)
+        for source in forged(20 * MAX_STREAMS)))
+    assert attacked.sizes()['streams'] == MAX_STREAMS
+    attacked.check_service()
+    attacked.close()
 
 
 def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
-    bridge: BridgeSiege,
+    bridge: AttackedBridge,
 ) -> None:
     light = bridge.controller.lights[GENUINE]
     answers: list[list[Result]] = [[] for _ in range(10 * MAX_WAITING)]
@@ -167,13 +168,13 @@ def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
 
 # Values
 
-def send_status(bridge: BridgeSiege, later_ms: int = 10, **fields: Any) -> None:
+def send_status(bridge: AttackedBridge, later_ms: int = 10, **fields: Any) -> None:
     """Send a status in the name of the genuine light."""
     uptime_ms = bridge.controller.lights[GENUINE].status.uptime_ms + later_ms
     flood(bridge, [frame_of(status_message(uptime_ms, **{'enable': 1, **fields}), 0, GENUINE)])
 
 
-def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSiege) -> None:
+def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: AttackedBridge) -> None:
     # It compares equal to 0, but sent back to the light it would be denied for ever.
     light = bridge.controller.lights[GENUINE]
     send_status(bridge, strobe_period=1e-45)
@@ -182,7 +183,7 @@ def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: BridgeSie
 
 
 def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied(
-    bridge: BridgeSiege,
+    bridge: AttackedBridge,
 ) -> None:
     # Under external sync a light's output is not taken for its configuration.
     light = bridge.controller.lights[GENUINE]

@@ -19,9 +19,9 @@ from __future__ import annotations
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.routing_table import (
     EXPIRY,
-    LOOK_INTERVAL,
+    EXPIRY_INTERVAL,
+    MAX_ROUTE_PEERS,
     MAX_ROUTES,
-    MAX_WAYS,
     RoutingTable,
 )
 import pytest
@@ -65,7 +65,7 @@ def test_message_goes_over_all_peers_that_its_target_was_heard_over(router: Rout
 
 def test_component_on_more_peers_than_are_remembered_is_sent_to_over_all_meanwhile() -> None:
     # A light that restarts on another port each time must be reached on the newest.
-    router, peers = RoutingTable(), tuple(range(MAX_WAYS + 1))
+    router, peers = RoutingTable(), tuple(range(MAX_ROUTE_PEERS + 1))
     for peer in peers:
         router.heard(LIGHT, peer, 0.0)
     assert router.towards(to(LIGHT), peers, 1.0) == peers
@@ -87,7 +87,7 @@ def test_full_table_makes_room_for_silent_components_once_a_second(router: Routi
     for number in range(MAX_ROUTES - 1):
         router.heard(Address(2, number), 'a', 0.0)
     new, remembered = Address(3, 0), []
-    for now in (EXPIRY - 0.1, EXPIRY + 0.1, EXPIRY + LOOK_INTERVAL):
+    for now in (EXPIRY - 0.1, EXPIRY + 0.1, EXPIRY + EXPIRY_INTERVAL):
         router.heard(new, 'c', now)
         remembered.append(router.towards(to(new), PEERS, now) == ['c'])
     assert (remembered, len(router)) == ([False, False, True], 1)

@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.simulated_properties import FAULTS, Illuminator
 from illuminator_ros.mavlink.command_sender import MAX_WAITING
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
-from illuminator_ros.mavlink.routing_table import MAX_ROUTES, MAX_WAYS
+from illuminator_ros.mavlink.routing_table import MAX_ROUTE_PEERS, MAX_ROUTES
 from illuminator_ros.mavlink.signing import MAX_STREAMS, Signing, SigningMode
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
@@ -50,11 +50,11 @@ KEY = bytes(range(32))
 
 BOUNDS = {
     'peers': MAX_PEERS, 'decoders': MAX_DECODERS, 'sources': MAX_SOURCES, 'routes': MAX_ROUTES,
-    'crowded routes': MAX_ROUTES, 'ways': MAX_WAYS, 'streams': MAX_STREAMS, 'outgoing': 0,
-    'sequences': 8}
+    'overflowed routes': MAX_ROUTES, 'route peers': MAX_ROUTE_PEERS, 'streams': MAX_STREAMS,
+    'outgoing': 0, 'sequences': 8}
 
 
-class Siege:
+class AttackedLink:
     """
     A link and its attacker.
 
@@ -96,8 +96,8 @@ class Siege:
         return {
             'peers': len(link.udp._peers), 'decoders': len(link._receiver),
             'sources': len(link._traffic.sources), 'routes': len(link._router),
-            'crowded routes': len(link._router._crowded),
-            'ways': max(map(len, link._router._ways.values()), default=0),
+            'overflowed routes': len(link._router._overflowed),
+            'route peers': max(map(len, link._router._routes.values()), default=0),
             'streams': len(link._signing._streams), 'outgoing': len(link.endpoint.outgoing),
             'sequences': len(link._writer.sequences)}
 
@@ -126,7 +126,7 @@ class Siege:
         self.link.stop()
 
 
-class BridgeSiege(Siege):
+class AttackedBridge(AttackedLink):
     """The drone's side, with a genuine light that it is to serve all the time."""
 
     def make_endpoint(self) -> Any:
@@ -230,7 +230,7 @@ class BridgeSiege(Siege):
             assert (lamp.enabled, lamp.configuration.brightness) == (on, brightness)
 
 
-class LightSiege(Siege):
+class AttackedLights(AttackedLink):
     """Simulated lights, with a genuine drone that they are to obey all the time."""
 
     def make_endpoint(self) -> Any:
@@ -279,5 +279,5 @@ def _longest(queues: Iterable[Any]) -> int:
     return max(map(len, queues), default=0)
 
 
-SIEGES: dict[str, Callable[[object, SigningMode], Siege]] = {
-    'bridge': BridgeSiege, 'light': LightSiege}
+ATTACKED: dict[str, Callable[[object, SigningMode], AttackedLink]] = {
+    'bridge': AttackedBridge, 'light': AttackedLights}

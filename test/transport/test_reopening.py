@@ -80,9 +80,9 @@ def server() -> Iterator[Server]:
 
 
 @pytest.fixture
-def _endless_probation(monkeypatch: pytest.MonkeyPatch) -> None:
+def _unproven_without_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have no channel proved for the time alone that it was open."""
-    monkeypatch.setattr(link_module, 'PROBATION', 3600.0)
+    monkeypatch.setattr(link_module, 'PROOF_TIME', 3600.0)
 
 
 @pytest.fixture
@@ -128,7 +128,8 @@ def test_openings_and_losses_are_reported_once_each_with_reason_and_time(
 
 
 def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sends(
-        run: live_link.Run, server: Server, pauses: Log[float], _endless_probation: None) -> None:
+        run: live_link.Run, server: Server, pauses: Log[float],
+        _unproven_without_frame: None) -> None:
     server.listen()
     link = run(live_link.LiveLink(server.url))
     for _ in range(5):
@@ -141,11 +142,11 @@ def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sen
     assert link.state().is_open
 
 
-@pytest.mark.parametrize(('probation', 'pause'), [(0.0, 0.0), (3600.0, FIRST_PAUSE)])
+@pytest.mark.parametrize(('proof_time', 'pause'), [(0.0, 0.0), (3600.0, FIRST_PAUSE)])
 def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_after_a_pause(
         run: live_link.Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch,
-        probation: float, pause: float) -> None:
-    monkeypatch.setattr(link_module, 'PROBATION', probation)
+        proof_time: float, pause: float) -> None:
+    monkeypatch.setattr(link_module, 'PROOF_TIME', proof_time)
     server.listen()
     link = run(live_link.LiveLink(server.url))
     for count in (1, 2, 3):
@@ -190,7 +191,7 @@ def cycle(link: live_link.LiveLink, come: Callable[[], None], go: Callable[[], N
 @pytest.fixture
 def _many_events(monkeypatch: pytest.MonkeyPatch, pauses: Log[float]) -> None:
     monkeypatch.setattr(link_state, 'MAX_EVENTS', 10 * CYCLES)
-    monkeypatch.setattr(link_module, 'PROBATION', 0.0)
+    monkeypatch.setattr(link_module, 'PROOF_TIME', 0.0)
 
 
 def test_200_restarts_of_a_tcp_server_leak_nothing(

@@ -229,25 +229,25 @@ class ManagerNode(ServedPayload):
 
     def _look(self, now: float) -> MakeReports:
         holder = self._manager.control.holder(Role.PRIMARY)
-        ways = self._host.link.way_count(holder, now) if holder else 0
-        return functools.partial(_reports, findings=findings(self._manager, ways), values=_values(
+        peers = self._host.link.peer_count_of(holder, now) if holder else 0
+        return functools.partial(_reports, findings=findings(self._manager, peers), values=_values(
             self._manager, now))
 
 
-def findings(manager: gimbal_manager.GimbalManager, ways: int) -> list[Finding]:
+def findings(manager: gimbal_manager.GimbalManager, peers: int) -> list[Finding]:
     """
     Return the findings on a manager.
 
-    :param ways: over how many peers the player in primary control is heard.
+    :param peers: over how many peers the player in primary control is heard.
     """
     found: list[Finding] = []
     if manager.tracker.state is ManagerState.INACTIVE:
         found.append((ERROR, f'{manager.tracker.other} manages the gimbal too: inactive'))
     elif manager.tracker.state is not ManagerState.ACTIVE:
         found.append((WARN, manager.tracker.state.value))
-    if ways > 1:
+    if peers > 1:
         found.append((WARN, f'{manager.control.holder(Role.PRIMARY)} has control and is heard '
-                            f'over {ways} peers: another sender may use its address'))
+                            f'over {peers} peers: another sender may use its address'))
     return found
 
 
