@@ -43,7 +43,9 @@ MAX_WAITING = 32
 # s. A shorter time-out is unsafe on a 57,600 baud line, where another frame may be on the wire
 # for 49 ms before ours and another before the answer.
 MIN_TIMEOUT = 0.2
+# Round-trip times of one target, and targets with round-trip times.
 MAX_SAMPLES = 64
+MAX_TARGETS = 128
 # Before this many samples the given time-out holds.
 MIN_SAMPLES = 4
 # s for which an acknowledgement, or a copy of it, may be under way.
@@ -421,6 +423,16 @@ class CommandSender:
         """Return the round-trip times of a target's acknowledgements."""
         return self._round_trips.get(target) or RttEstimator()
 
+    def _estimator(self, target: Address) -> RttEstimator:
+        """Return the estimator of a target; a new one replaces the one not used for longest."""
+        estimator = self._round_trips.pop(target, None)
+        if estimator is None:
+            estimator = RttEstimator()
+            if len(self._round_trips) >= MAX_TARGETS:
+                del self._round_trips[next(iter(self._round_trips))]
+        self._round_trips[target] = estimator
+        return estimator
+
     def acknowledge(self, source: Address, ack: messages.CommandAck, now: float) -> None:
         """
         Receive a COMMAND_ACK.
@@ -440,7 +452,7 @@ class CommandSender:
         if not sent:
             self.counters.unexpected_acks += 1
             if source in self._round_trips:
-                self._round_trips[source].expect_ambiguous(now)
+                self._estimator(source).expect_ambiguous(now)
             return
         # A command in progress is not rejected: the rejection belongs to a command beside it.
         request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
@@ -450,8 +462,7 @@ class CommandSender:
     def _answered(self, request: _Request, ack: messages.CommandAck, now: float) -> None:
         if request.tries == 1 and request.result is None:
             # An acknowledgement after a resend may be that of either try: no measure (RFC 6298).
-            self._round_trips.setdefault(request.command.target, RttEstimator()).add(
-                now - request.last_sent, now)
+            self._estimator(request.command.target).add(now - request.last_sent, now)
         request.result = ack.result
         state = TRANSITIONS.get((request.state, ack.result))
         if state is RequestState.IN_PROGRESS:
@@ -475,7 +486,6 @@ class CommandSender:
             return
         request.state = state
 
-
     def poll(self, now: float) -> None:
         """Resend or end what is due."""
         for requests in list(self._requests.values()):
@@ -494,8 +504,7 @@ class CommandSender:
             self._end(request, CommandStatus.NO_ANSWER, now)
         else:
             request.state = RequestState.SENT
-            self._round_trips.setdefault(
-                request.command.target, RttEstimator()).expect_ambiguous(now)
+            self._estimator(request.command.target).expect_ambiguous(now)
             self._transmit(request, now)
 
     def next_deadline(self) -> float:

@@ -16,7 +16,6 @@
 
 from collections.abc import Callable
 import socket
-import time
 from typing import Any
 
 from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat
@@ -29,7 +28,7 @@ from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.processes import ended
 from support.ros import Parameters, Ros, running_bridge, start_bridge
 from support.slow import CLOCK, pass_time_until
-from support.waiting import eventually
+from support.waiting import eventually, stopwatch
 
 AUTOPILOT = 2
 FLOOD = 2000
@@ -173,17 +172,17 @@ def test_tcp_server_that_closes_each_connection_after_a_frame_causes_no_flood_of
 ) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server:
         url = f'tcp://127.0.0.1:{server.getsockname()[1]}'
-        begun = time.monotonic()
+        elapsed = stopwatch()
         with ended(start_bridge(own_ros.domain, port, connection_url=url)) as bridge:
             for number in range(30):
                 connection, _ = server.accept()
                 with connection:
-                    # What is unread when it closes would reset the connection.
+                    # Unread data would make the close reset the connection.
                     assert connection.recv(1000)
                     connection.sendall(heartbeat_frame(sequence=number))
                     connection.shutdown(socket.SHUT_WR)
 
             # The limit is one of real time.
-            periods = 1 + int((time.monotonic() - begun) / PERIOD)
+            periods = 1 + int(elapsed() / PERIOD)
             assert 0 < bridge.count('link lost') <= periods * (BURST + 1)
             assert len(bridge.lines) < periods * 40

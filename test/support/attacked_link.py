@@ -23,7 +23,7 @@ from typing import Any, cast
 
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
-from illuminator_ros.mavlink.command_sender import MAX_WAITING
+from illuminator_ros.mavlink.command_sender import MAX_TARGETS, MAX_WAITING
 from illuminator_ros.mavlink.frame_reader import MAX_DECODERS
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.mavlink.routing_table import MAX_ROUTE_PEERS, MAX_ROUTES
@@ -195,7 +195,7 @@ class AttackedBridge(AttackedLink):
         for what, size, bound in (
                 ('lights', len(lights), MAX_DEVICES),
                 ('commands', len(sender), 4 * MAX_DEVICES * (MAX_WAITING + 1)),
-                ('round trips', len(sender._round_trips), MAX_DEVICES),
+                ('round trips', len(sender._round_trips), MAX_TARGETS),
                 ('requests', _longest(light._switching for light in lights), MAX_REQUESTS),
                 ('changes', _longest(light._configuration._queue for light in lights),
                  MAX_REQUESTS)):
