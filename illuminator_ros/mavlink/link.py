@@ -45,7 +45,7 @@ from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
 
-# s; the loop polls this often even where nothing is due.
+# s of one wait: select() cannot wait for infinity.
 MAX_WAIT = 1.0
 # To wake the loop costs as much as ten foreign frames. Where more than BATCH_THRESHOLD come per
 # second, the loop lets them collect for BATCH_TIME s, or until BATCH_SIZE are expected; a UDP
@@ -491,6 +491,7 @@ class Link:
     def _connector_reports(self, outcome: Channel | str | None, now: float) -> None:
         if isinstance(outcome, str):
             self._status.failed(outcome)
+            self._snapshot_due = now
             return
         self._connecting = False
         if outcome is None:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import os
 import threading
 import time
@@ -66,6 +67,7 @@ class Talker(Endpoint):
         self.greetings.append(now)
 
     def link_closed(self, now: float, reason: str) -> None:
+        self.heartbeat.due = math.inf
         self.closings.append(now)
 
     def receive(self, source: Address, message: Message, now: float) -> None:

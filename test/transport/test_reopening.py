@@ -33,7 +33,7 @@ from support.frames import heartbeat_frame
 from support.open_channel import bound_socket, listening_socket
 from support.ports import free_port
 from support.ptys import PtyDevice
-from support.waiting import Log, PATIENCE
+from support.waiting import eventually, Log, PATIENCE
 
 CYCLES = 200
 
@@ -125,6 +125,18 @@ def test_openings_and_losses_are_reported_once_each_with_reason_and_time(
         f'link open: {name}']
     assert lost
     assert [int((later - times[0]) // 1000) for later in times] == [0, 1, 2, 3]
+
+
+def test_snapshot_of_a_lost_link_has_the_reason_of_the_last_try(
+        run: live_link.Run, server: Server) -> None:
+    server.listen()
+    link = run(live_link.LiveLink(server.url))
+    server.come()
+    link.endpoint.wait_heard()
+    server.go()
+    link.wait_lost()
+
+    eventually(lambda: link.link.state().reason.endswith('Connection refused'))
 
 
 def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sends(
