@@ -93,7 +93,7 @@ def usage(executable: Executable) -> str:
     return f"""\
 usage: {name} [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
 
-Makes {kind.summary} a ROS 2 node, /{kind.node_name}.
+Runs the ROS 2 node /{kind.node_name} for {kind.summary}.
 
 examples:
   ros2 run illuminator_ros {name}

@@ -184,7 +184,7 @@ class GimbalSnapshot:
 
     :param unreachable: why it is not connected, for people; '' if it is.
     :param managers: those that announce it and are heard; the first one is used.
-    :param capabilities: None if the manager has not told them.
+    :param capabilities: None if the manager has not sent them.
     :param attitude_at: when the last attitude status came, s; -inf if none has.
     :param attitude_problem: why that has no attitude, '' if it has one.
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.

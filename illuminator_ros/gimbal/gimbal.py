@@ -369,7 +369,7 @@ class Gimbal:
     def _active(self) -> _Manager | None:
         return self._managers.get(self._manager)
 
-    def obstacle(self, now: float) -> str:
+    def unavailable(self, now: float) -> str:
         """Return why the gimbal cannot be commanded now, for people; '' if it can."""
         if not self._manager_heard:
             return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
@@ -427,7 +427,7 @@ class Gimbal:
 
         manager = self._active
         if manager is None or not self._manager_heard:
-            done(request.Result(False, self.obstacle(now)), now)
+            done(request.Result(False, self.unavailable(now)), now)
         elif self._control is not None and (
                 self.in_control if take else not self.has_any_control):
             state = 'in control already' if take else 'not in control'
@@ -525,7 +525,7 @@ class Gimbal:
     ) -> None:
         self.was_commanded = True
         missing = self._missing(needed)
-        reason = self.obstacle(now) or missing
+        reason = self.unavailable(now) or missing
         manager = self._active
         if reason or manager is None:
             done(request.Result(False, reason), now)
@@ -580,7 +580,7 @@ class Gimbal:
                     result.status is CommandStatus.ANSWERED and not result.accepted)), now)
 
         self.was_commanded = True
-        if reason := self.obstacle(now):
+        if reason := self.unavailable(now):
             done(request.Result(False, reason), now)
             return False
         self._stop()
@@ -599,7 +599,7 @@ class Gimbal:
         """
         self.was_commanded = True
         absolute = (Capabilities.HAS_YAW_LOCK, Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
-        reason = self.obstacle(now) or (
+        reason = self.unavailable(now) or (
             self._missing(*absolute) if frame is YawFrame.EARTH else '')
         if not reason:
             message = self._message(setpoint_flags(frame), to_mavlink(rotation, frame),
@@ -620,7 +620,7 @@ class Gimbal:
         if not any(map(math.isnan, angles)):
             return self.set_attitude(Quaternion.from_euler(*angles), frame, now)
         self.was_commanded = True
-        if reason := self.obstacle(now):
+        if reason := self.unavailable(now):
             return reason
         base = None
         if self._setpoint and self._setpoint.attitude and self._setpoint.attitude[1] is frame:
@@ -641,7 +641,7 @@ class Gimbal:
         :return: why they were not sent, for people; '' if they were.
         """
         self.was_commanded = True
-        reason = self.obstacle(now)
+        reason = self.unavailable(now)
         if not reason:
             self._send_rates(rates, now)
         return reason

@@ -87,7 +87,7 @@ STATUS_INTERVAL = 0.2
 HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
 # s between statuses that are sent because control has changed.
-TOLD_INTERVAL = 0.1
+CHANGE_INTERVAL = 0.1
 # s between requests for GIMBAL_DEVICE_INFORMATION until it comes.
 INFORMATION_INTERVAL = 5.0
 # s after the last AUTOPILOT_STATE_FOR_GIMBAL_DEVICE of an autopilot in which ours is not sent,
@@ -98,7 +98,7 @@ AUTOPILOT_INTERVAL = 0.02
 ATTITUDE_AGE = 1.0
 # s within which two different heartbeats of one address show two senders.
 IDENTITY_TIME = 3.0
-# s between two reports of one kind, and kinds that are told apart.
+# s between two reports of one kind, and kinds that have a limit of their own.
 REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
 # A COMMAND_LONG has no frame: PX4 takes its altitude for one above mean sea level, too.
@@ -213,9 +213,9 @@ class GimbalManager(Payload):
         self._setpoint: Setpoint | None = None
         self._sent: Setpoint | None = None
         self._limits_reached = 0
-        self._told_at = -math.inf
+        self._changed_at = -math.inf
         self._offsets = STILL
-        self._place: GeoPoint | None = None
+        self._roi: GeoPoint | None = None
         self._send_due = self._status_due = self._information_due = math.inf
         self._autopilot_at = self._state_sent_at = -math.inf
         self._limits: dict[object, RateLimit] = {}
@@ -223,8 +223,8 @@ class GimbalManager(Payload):
         self._handlers: dict[int, Callable[[Address, Sequence[float], int, float], MavResult]] = {
             GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
             GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
-            GimbalCommand.DO_SET_ROI_LOCATION: self._set_place,
-            GimbalCommand.DO_SET_ROI_NONE: self._clear_place}
+            GimbalCommand.DO_SET_ROI_LOCATION: self._set_roi,
+            GimbalCommand.DO_SET_ROI_NONE: self._clear_roi}
 
     # Snapshots
 
@@ -235,7 +235,8 @@ class GimbalManager(Payload):
         accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
         primary, secondary = (self.control.holder(role) or Address(0, 0) for role in Role)
         return GimbalManagerStatus(
-            _boot_time(now), int(flags | (accepts and MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)),
+            mav.time_boot_ms(now),
+            int(flags | (accepts and MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)),
             self.tracker.device_id, *primary, *secondary)
 
     # The payload
@@ -341,7 +342,7 @@ class GimbalManager(Payload):
         attitude = self._sent and self._sent.attitude or Quaternion()
         heading = self.vehicle.heading(now)
         self._report(GimbalDeviceAttitudeStatus(
-            0, 0, _boot_time(now), int(MountFlags.YAW_IN_VEHICLE_FRAME), attitude, math.nan,
+            0, 0, mav.time_boot_ms(now), int(MountFlags.YAW_IN_VEHICLE_FRAME), attitude, math.nan,
             math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan), now)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
@@ -380,13 +381,13 @@ class GimbalManager(Payload):
                 self._offsets = STILL
             else:
                 # The gimbal stays where it points until the next player says more.
-                self._place = None
+                self._roi = None
                 self._setpoint = self._setpoint and stopped(self._setpoint, now)
                 self._send(now)
             self.events.emit(change)
-        if changes and self._status_due < math.inf and now >= self._told_at + TOLD_INTERVAL:
+        if changes and self._status_due < math.inf and now >= self._changed_at + CHANGE_INTERVAL:
             # Beside the regular ones, so that players need not wait for the next.
-            self._told_at = now
+            self._changed_at = now
             self._commands.send(self.status(now))
 
     # Setpoints
@@ -448,7 +449,7 @@ class GimbalManager(Payload):
         if current is None or (
                 not self._accepts(demand.frame, now) and self._heading(now) is None):
             return 'the heading of the vehicle is unknown'
-        self._place = None
+        self._roi = None
         self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
         self._send(now)
         return ''
@@ -490,7 +491,7 @@ class GimbalManager(Payload):
             self._send_due = math.inf
             return
         converts = not self._accepts(setpoint.frame, now)
-        follows = any(setpoint.turning) or self._place is not None or converts
+        follows = any(setpoint.turning) or self._roi is not None or converts
         self._send_due = now + (FOLLOW_INTERVAL if follows else HOLD_INTERVAL)
         attitude, heading = setpoint.at(now), self._heading(now)
         if attitude is not None:
@@ -520,7 +521,7 @@ class GimbalManager(Payload):
 
     # A region of interest
 
-    def _set_place(
+    def _set_roi(
         self, source: Address, params: Sequence[float], frame: int, now: float,
     ) -> MavResult:
         if self.control.holder(Role.PRIMARY) != source:
@@ -538,32 +539,32 @@ class GimbalManager(Payload):
             self._report_refusal(
                 source, 'the position or the heading of the vehicle is unknown', now)
             return MavResult.TEMPORARILY_REJECTED
-        self._place = GeoPoint(latitude, longitude, altitude + above)
+        self._roi = GeoPoint(latitude, longitude, altitude + above)
         self._follow(now)
         return MavResult.ACCEPTED
 
-    def _clear_place(
+    def _clear_roi(
         self, source: Address, params: Sequence[float], frame: int, now: float,
     ) -> MavResult:
         if self.control.holder(Role.PRIMARY) != source:
             return MavResult.DENIED
-        self._place = None
+        self._roi = None
         self._send(now)
         return MavResult.ACCEPTED
 
-    def _place_flags(self) -> MountFlags:
+    def _roi_flags(self) -> MountFlags:
         return LEVEL | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
                         else MountFlags.YAW_LOCK)
 
     def _follow(self, now: float) -> None:
-        """Send the setpoint, which follows a place if there is one."""
-        if self._place is not None:
+        """Send the setpoint, which follows the region of interest if there is one."""
+        if self._roi is not None:
             position = self.vehicle.position(now)
             if position is None:
                 self._lose('position', now)
-            elif (angles := direction(position, self._place)) is not None:
+            elif (angles := direction(position, self._roi)) is not None:
                 self._setpoint = Setpoint(
-                    self._place_flags(), YawFrame.EARTH, Quaternion.from_euler(0.0, *angles),
+                    self._roi_flags(), YawFrame.EARTH, Quaternion.from_euler(0.0, *angles),
                     since=now)
         self._send(now)
 
@@ -589,7 +590,8 @@ class GimbalManager(Payload):
         # The manager computes what the device cannot.
         capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
         return GimbalManagerInformation(
-            _boot_time(now), int(capabilities), self.tracker.device_id, *self._range_values())
+            mav.time_boot_ms(now), int(capabilities), self.tracker.device_id,
+            *self._range_values())
 
     def _range_values(self) -> tuple[float, float, float, float, float, float]:
         (a, b), (c, d), (e, f) = (
@@ -603,7 +605,7 @@ class GimbalManager(Payload):
             return self._information and replace(
                 self._information, gimbal_device_id=self.tracker.device_id)
         return GimbalDeviceInformation(
-            _boot_time(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
+            mav.time_boot_ms(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
             int(self.model.capabilities & 0xFFFF), 0, *self._range_values(),
             self.tracker.device_id)
 
@@ -620,7 +622,7 @@ class GimbalManager(Payload):
         self._send_due = now if active else math.inf
         if change.after in (ManagerState.INACTIVE, ManagerState.NO_DEVICE):
             # Another manager has moved the device, or the next device may be another one.
-            self._setpoint = self._place = None
+            self._setpoint = self._roi = None
             self._offsets = STILL
         if change.after is ManagerState.LISTENING:
             # A manager that sends no status answers a request.
@@ -663,10 +665,6 @@ def _params(command: AnyCommand) -> tuple[Sequence[float], int]:
                 command.y, command.z), command.frame
     return (command.param1, command.param2, command.param3, command.param4, command.param5,
             command.param6, command.param7), NO_FRAME
-
-
-def _boot_time(now: float) -> int:
-    return int(now * 1000) & 0xFFFFFFFF
 
 
 def _ignore(result: CommandResult, now: float) -> None:

@@ -344,10 +344,10 @@ def mix(attitude: Quaternion, offsets: Vector) -> Quaternion:
 
 
 class Clipped(NamedTuple):
-    """An angle beyond the range of its axis, rad: as asked for, and as set."""
+    """An angle beyond the range of its axis, rad: as requested, and the limit."""
 
     axis: str
-    asked: float
+    requested: float
     limit: float
 
 

@@ -125,7 +125,7 @@ class StateTracker:
         return self.device.component if self.device else self._wanted
 
     @property
-    def obstacle(self) -> str:
+    def inactive_reason(self) -> str:
         """Return why the device is not managed, for people; '' if it is."""
         if self.state is ManagerState.INACTIVE:
             return f'{self.other} manages gimbal {self.device or self.device_id} too'

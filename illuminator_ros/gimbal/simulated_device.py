@@ -35,7 +35,7 @@ from .manager_setpoint import Demand
 from .messages import Capabilities, ErrorFlags
 from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields
 from .. import __version__
-from ..mavlink.messages import Address, Message
+from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
@@ -159,7 +159,7 @@ class SimulatedMount:
 
     def uptime_ms(self, now: float) -> int:
         """Return the time since the start, ms, wrapping as the field does."""
-        return int((now - self._booted_at) * 1000) & 0xFFFFFFFF
+        return time_boot_ms(now - self._booted_at)
 
     def behave(self, behaviour: GimbalBehaviour, now: float) -> None:
         """Apply the faults of the axes."""

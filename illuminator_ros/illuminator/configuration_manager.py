@@ -409,7 +409,7 @@ class ConfigurationManager:
         self, status: Status, confirmed: Configuration, reported: Configuration,
         switched_at: float, now: float,
     ) -> None:
-        # Under external sync too: another sender may have changed what cannot be told apart.
+        # Under external sync too: another sender may have changed values that the signal hides.
         names = unexpected_differences(
             confirmed, reported, status.error_flags, step=False, external=False)
         if not names:

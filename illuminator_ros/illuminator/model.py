@@ -55,7 +55,7 @@ class ErrorFlag(IntFlag):
     THERMISTOR_FAILURE = 4
 
 
-# The flags under which a light is less bright than it was told to be. Plain ints: each operation
+# The flags under which a light is less bright than it was set. Plain ints: each operation
 # of an IntFlag takes 1 us, and since Python 3.11 its complement has no unknown bits.
 DIMMING_FLAGS = int(ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
 KNOWN_FLAGS = DIMMING_FLAGS | int(ErrorFlag.THERMISTOR_FAILURE)

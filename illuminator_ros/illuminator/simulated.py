@@ -133,7 +133,7 @@ class SimulatedIlluminator(SimulatedDevice):
 
     def uptime_ms(self, now: float) -> int:
         """Return the time since the start, ms, wrapping as the field does."""
-        return int((now - self._booted_at) * 1000) & 0xFFFFFFFF
+        return mav.time_boot_ms(now - self._booted_at)
 
     def status(self, now: float) -> IlluminatorStatus:
         """Return the ILLUMINATOR_STATUS of this moment."""

@@ -302,11 +302,11 @@ class AddressConflict:
         return self._senders(now).newest
 
     def senders(self, now: float) -> frozenset[int]:
-        """Return the lights that have sent lately, as far as they are told apart."""
+        """Return the lights that have sent lately, as far as they can be distinguished."""
         return self._senders(now).proved(now)
 
     def span(self, now: float) -> float:
-        """Return the time in which each light sends a status, s; 0 where they are told apart."""
+        """Return s in which each light sends a status; 0 where they can be distinguished."""
         if not self.detected or len(self.senders(now)) > 1:
             return 0.0
         return GAP_MARGIN * max(self._gaps, default=0.0)
@@ -388,9 +388,9 @@ class StatusTracker:
         restarted = meaning is Uptime.RESTARTED or meaning is Uptime.NO_CLOCK and was_lost
         if restarted:
             self._sending_times = SendingTimes()
-        sent_by, is_told = self._sending_times.take(status, now)
+        sent_by, has_clock = self._sending_times.take(status, now)
         newest = conflict.sender(now)
-        return Report(status, sent_by, is_told, sender=newest,
+        return Report(status, sent_by, has_clock, sender=newest,
                       senders=frozenset((newest,))), restarted
 
     def lost(self) -> None:

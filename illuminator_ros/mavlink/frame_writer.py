@@ -92,7 +92,7 @@ class FrameWriter:
             payload = payload[:message.base_size]
         sequence = self.sequences.get(source, -1)
         if sequence < 0:
-            # Two programs that were started together with one address are then told apart.
+            # Two programs that were started together with one address can then be distinguished.
             sequence = random.randrange(256)
         signs = self._signing.signs
         frame = encode_frame(

@@ -344,6 +344,11 @@ class ComponentInformationBasic(Message):
 INFORMATION_ID = ComponentInformationBasic.id
 
 
+def time_boot_ms(seconds: float) -> int:
+    """Return the field of a time since the start, s: ms, wrapping after 49.7 days."""
+    return int(seconds * 1000) & 0xFFFFFFFF
+
+
 def heartbeat(mav_type: int, *, state: int = MAV_STATE_ACTIVE) -> Heartbeat:
     """Return the HEARTBEAT of a component that is not an autopilot (heartbeat protocol)."""
     return Heartbeat(mav_type, MAV_AUTOPILOT_INVALID, 0, 0, state, MAVLINK_VERSION)

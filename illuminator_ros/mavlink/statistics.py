@@ -22,14 +22,14 @@ from typing import NamedTuple
 
 from .messages import Address
 
-# Sources that are told apart; frames of further ones are counted in the totals only.
+# Sources that are counted separately; frames of further ones are counted in the totals only.
 MAX_SOURCES = 256
 # How far back a late or repeated frame is still recognised. Two identical numbers further apart
 # are two frames: the number has 8 bits.
 WINDOW = 64
 _ALL_SEEN = (1 << WINDOW) - 1
-# Frames within which a sender must continue for another one with its address to be told from
-# it, and by how many numbers at most.
+# A sender is distinguished from another one with its address if its numbers continue within this
+# many frames, by at most this many.
 INTERLEAVED = 32
 CONTINUED = 4
 # s

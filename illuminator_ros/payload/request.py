@@ -128,9 +128,9 @@ class Report(Generic[S]):
     A status that is newer than all before.
 
     :param sent_by: the latest time at which it can have been sent, s.
-    :param has_clock: whether that was told from a time in the status.
+    :param has_clock: whether that was computed from a time in the status.
     :param shared_address: whether several devices send from the address.
-    :param sender: which of them has sent it, as far as they can be told apart.
+    :param sender: which of them has sent it, as far as they can be distinguished.
     :param senders: all senders of recent statuses.
     :param span: s for which all statuses must agree so that each device has sent one.
     """

@@ -94,7 +94,7 @@ class CameraSnapshot:
     image_index: int | None
 
     @property
-    def is_deaf(self) -> bool:
+    def is_unresponsive(self) -> bool:
         """Return whether the camera is heard, and does not answer."""
         return self.connected and self.unanswered_pings >= UNANSWERED_PINGS
 
@@ -116,7 +116,7 @@ class _Capture:
     done: Done
     index: int | None = None
     # Whether an image was seen that an earlier request may have caused.
-    doubtful: bool = False
+    ambiguous: bool = False
 
     @property
     def due(self) -> float:
@@ -303,7 +303,7 @@ class Camera:
             # It may be the late answer to an earlier request.
             self._late.popleft()
             if self._capture is not None:
-                self._capture.doubtful = True
+                self._capture.ambiguous = True
         elif self._capture is not None and self._capture.index is None:
             self._capture.index = index
 
@@ -323,7 +323,7 @@ class Camera:
         self._late.append(now + LATE_ANSWER)
         self._end_capture(False, f'no answer to DIGICAM_CONTROL within {limit}' + (
             '; an image was reported that an earlier request may have caused'
-            if capture.doubtful else ''))
+            if capture.ambiguous else ''))
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""

@@ -324,7 +324,7 @@ async def shot_values(tester: CameraTester) -> None:
 async def other_component(tester: CameraTester) -> None:
     """Command an image of another component."""
     if (await tester.capture(component=OTHER_COMPONENT, timeout=NO_IMAGE_TIME)).taken:
-        raise Failed(f'takes an image that component {OTHER_COMPONENT} was told to take')
+        raise Failed(f'takes an image that component {OTHER_COMPONENT} was requested to take')
 
 
 @with_consent('all-components', 'takes messages for all components', section='Communicating')

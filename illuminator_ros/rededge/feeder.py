@@ -32,7 +32,7 @@ from typing import NamedTuple
 from . import conversions
 from .conversions import FIRST_UTC, LAST_UTC, MountFrame, MountParent, Position
 from ..mavlink.command_sender import format_seconds
-from ..mavlink.messages import Address, Message
+from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload.rotation import Quaternion, Vector
 
 # s between messages about a fixed mount while there is no attitude; the camera forgets after 5 s.
@@ -312,7 +312,7 @@ class Feeder:
         elif velocity is None:
             raise ValueError('position_source fused needs ~/velocity, which is missing')
         else:
-            boot_ms = _boot_ms(now)
+            boot_ms = time_boot_ms(now)
             placed = conversions.global_position_int(
                 position, velocity, settings.geoid_separation, boot_ms)
             self._send(conversions.system_time(utc, boot_ms))
@@ -474,7 +474,7 @@ class Feeder:
         self._pair_time = time
         interval = 1 / self._settings.attitude_rate
         self._pair_due = max(self._pair_due + interval, now + interval / 2)
-        self._send(conversions.attitude(sample.rotation, sample.rates, _boot_ms(now)))
+        self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
         self._send_mount(angles, now)
         self._pairs += 1
 
@@ -535,11 +535,6 @@ class Feeder:
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
         return min(self._mount_due, *(one.next_change() for one in self._inputs.values()))
-
-
-def _boot_ms(now: float) -> int:
-    return int(now * 1000) & 0xFFFFFFFF
-
 
 def _check_age(stamp: Stamp, timeout: float) -> None:
     """Refuse what was measured long before it was received, or after."""

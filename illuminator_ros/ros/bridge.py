@@ -98,7 +98,7 @@ class Bridge:
                 mavlink_version=parameters.mavlink_version)
         except ValueError as error:
             raise ParameterError(f'mavlink_version: {error}') from None
-        self._told_of_signing = False
+        self._signing_reported = False
         # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()
@@ -228,9 +228,9 @@ class Bridge:
             self._wake.clear()
 
     def _poll(self, now: float) -> None:
-        if (not self._told_of_signing and self.component.commands.unanswering
+        if (not self._signing_reported and self.component.commands.unanswering
                 and self.link.snapshot(now).signing.unchecked):
-            self._told_of_signing = True
+            self._signing_reported = True
             self.log.warning(f'{SIGNING_NEEDED}: set signing_mode and signing_key_file')
         for payload in self._payloads:
             payload.poll(now)

@@ -15,7 +15,7 @@
 """
 Serialised messages (CDR): publishing bytes takes half the time, and reading them a third.
 
-A serialised message is the encapsulation header, which tells the byte order, and the values, each
+A serialised message is the encapsulation header, which names the byte order, and the values, each
 aligned to its size (DDS-RTPS 2.5, section 10; Extended CDR version 1).
 """
 
@@ -32,14 +32,14 @@ from types import SimpleNamespace
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 _HEADER = b'\0\1\0\0'
-# Of the values, by the first two bytes of the header.
+# The byte order of the values, by the first two bytes of the header.
 _BYTE_ORDERS = {b'\0\0': '>', b'\0\1': '<'}
-# Formats of struct; that of a string is the format of its length.
+# Formats of struct; a string has the format of its length.
 _STRING = 'L'
 _FORMATS = {
     'boolean': '?', 'int8': 'b', 'uint8': 'B', 'int16': 'h', 'uint16': 'H', 'int32': 'i',
     'uint32': 'I', 'int64': 'q', 'uint64': 'Q', 'float': 'f', 'double': 'd', 'string': _STRING}
-# Takes the values of a field, in the order of the message, and returns that of the field.
+# Takes the values of a message in their order, and returns the value of the next field.
 _Build = Callable[[Iterator[object]], object]
 # Returns the types of the fields of a message class, by name.
 _field_types = operator.methodcaller('get_fields_and_field_types')

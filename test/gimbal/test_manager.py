@@ -124,7 +124,7 @@ def test_gm_10_the_status_is_sent_five_times_a_second() -> None:
             for one in statuses[1:]} == {(DEVICE.component, *PILOT, 0, 0)}
 
 
-def test_a_change_of_control_is_told_at_once_and_seldom() -> None:
+def test_a_change_of_control_is_sent_at_once_and_at_a_limited_rate() -> None:
     rig = ManagerRig()
 
     changes = [rig.give(PILOT, configure(*player)) for player in (PILOT, (-3, -3), PILOT)]
@@ -407,7 +407,7 @@ def test_gm_9_limits_are_applied_after_mixing_and_reported() -> None:
 
     assert euler(message) == (0.0, 0.5, -0.1)
     [[clipped]] = [one.clipped for one in of(gimbal_manager.SetpointClipped, rig.events)]
-    assert (clipped.axis, round(clipped.asked, 4), clipped.limit) == ('pitch', 0.6, 0.5)
+    assert (clipped.axis, round(clipped.requested, 4), clipped.limit) == ('pitch', 0.6, 0.5)
 
 
 def test_gm_5_an_axis_that_the_device_lacks_is_not_turned() -> None:

@@ -216,14 +216,15 @@ def test_an_autopilot_that_reports_a_gimbal_on_its_outputs_is_not_taken_for_a_de
 
 def test_manager_names_the_devices_that_are_heard_instead_of_its_own() -> None:
     rig = ManagerRig(device_id=171, active=False)
-    assert rig.manager.tracker.obstacle == 'gimbal device 171 has not been heard'
+    assert rig.manager.tracker.inactive_reason == 'gimbal device 171 has not been heard'
 
     rig.run(1.0)
 
-    assert rig.manager.tracker.obstacle == 'gimbal device 171 has not been heard; heard: 1/154'
+    assert rig.manager.tracker.inactive_reason == (
+        'gimbal device 171 has not been heard; heard: 1/154')
 
 
-def test_inactive_manager_names_the_other_as_the_obstacle() -> None:
-    assert reached(ManagerState.ACTIVE).manager.tracker.obstacle == ''
-    assert reached(ManagerState.INACTIVE).manager.tracker.obstacle == (
+def test_inactive_manager_names_the_other_as_the_reason() -> None:
+    assert reached(ManagerState.ACTIVE).manager.tracker.inactive_reason == ''
+    assert reached(ManagerState.INACTIVE).manager.tracker.inactive_reason == (
         '1/191 manages gimbal 1/154 too')

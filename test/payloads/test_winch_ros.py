@@ -90,7 +90,7 @@ def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help() ->
 
     lines = [' '.join(line.split()) for line in shown.lines]
     assert lines[0].startswith('usage: winch ')
-    assert 'Makes a winch a ROS 2 node, /winch.' in lines
+    assert 'Runs the ROS 2 node /winch for a winch.' in lines
     assert [line for line in lines if line.startswith(('payloads', 'component_id'))] == [
         "payloads ['winch'] kinds of devices that the bridge serves",
         'component_id 195 our MAVLink component id (1 to 255)']

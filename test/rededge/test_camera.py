@@ -192,11 +192,11 @@ def test_a_lost_ping_is_sent_again_with_another_number_re_12() -> None:
 def test_a_camera_that_hears_nothing_is_noticed() -> None:
     rig = Rig()
     rig.run(4.9, beats=True)
-    assert not rig.state.is_deaf
+    assert not rig.state.is_unresponsive
     rig.run(3.0, beats=True)
-    assert rig.state.is_deaf
+    assert rig.state.is_unresponsive
     rig.hear(reply(rig.ping()))
-    assert not rig.state.is_deaf
+    assert not rig.state.is_unresponsive
 
 
 def test_no_request_waits_without_a_link() -> None:

@@ -294,7 +294,7 @@ def test_a_wrong_start_is_refused_in_one_line(ros: Ros, arguments: str, text: st
 def test_help_names_the_device_and_its_own_defaults() -> None:
     shown = ' '.join(run(MODULE, '--help').stdout.split())
     assert 'usage: rededge ' in shown
-    assert 'Makes a MicaSense camera (RedEdge, RedEdge-MX, RedEdge-P, Altum) a ROS 2 node' in shown
+    assert 'node /rededge for a MicaSense camera (RedEdge, RedEdge-MX, RedEdge-P, Altum)' in shown
     for text in ('connection_url udpin://127.0.0.1:14592', 'mavlink_version 1 ',
                  'component_id 191 ', 'mount_yaw yaw of a fixed camera'):
         assert text in shown

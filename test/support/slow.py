@@ -117,7 +117,7 @@ class SlowClock:
 
 
 def _runs(pid: int) -> bool:
-    """Return whether a process runs; one that has ended and is not waited for does not."""
+    """Return whether a process runs; a zombie does not."""
     if pid in (0, os.getpid()):
         return pid != 0
     with contextlib.suppress(OSError):

@@ -211,9 +211,9 @@ class Conformance:
         report = Report(
             checks.payload, checks.device, options.url, self._describe_device(),
             tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
-        # A failure has told why there is no device.
-        told = missing and any(one.verdict is Verdict.FAIL for one in report.results)
-        self._write_line('', *(() if told else (report.device,)), report.summary)
+        # A failure has given the reason why there is no device.
+        explained = missing and any(one.verdict is Verdict.FAIL for one in report.results)
+        self._write_line('', *(() if explained else (report.device,)), report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
             try:
                 if path is not None:

@@ -48,7 +48,7 @@ from .tester import (
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ..messages import Capabilities, GimbalCommand
-from ...mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message
+from ...mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message, time_boot_ms
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
     Conditions,
@@ -150,7 +150,7 @@ class ManagerTester(GimbalTester):
     async def pause(self, seconds: float) -> None:
         """See :class:`GimbalTester`."""
         if self.vehicle is not None:
-            milliseconds = int(self.session.now * 1000) & 0xFFFFFFFF
+            milliseconds = time_boot_ms(self.session.now)
             self.session.send(Attitude(
                 milliseconds, 0.0, 0.0, math.radians(HEADING), 0.0, 0.0, 0.0), self.vehicle)
             self.session.send(GlobalPositionInt(

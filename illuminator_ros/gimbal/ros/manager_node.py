@@ -35,7 +35,7 @@ from ..manager_setpoint import GeoPoint
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
 from ...mavlink.command_sender import CommandSender
-from ...mavlink.messages import Address
+from ...mavlink.messages import Address, time_boot_ms
 from ...payload.arbitration import Cause, Policy
 from ...payload.messages import GimbalDeviceAttitudeStatus
 from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
@@ -123,7 +123,7 @@ class ManagerNode(ServedPayload):
         self._log = host.log
         self._frames = Frames.of(host.values)
         self._clock = host.node.get_clock()
-        self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.obstacle)
+        self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.inactive_reason)
         self._interface = NodeInterface(
             host.node, host.link, host.log,
             publications=() if manager.tracker.has_mavlink else (
@@ -165,7 +165,7 @@ class ManagerNode(ServedPayload):
         rotation, frame = value
         heading = self._manager.vehicle.heading(now)
         self._both.take_attitude(GimbalDeviceAttitudeStatus(
-            0, 0, int(now * 1000) & 0xFFFFFFFF, int(frame.flag), to_mavlink(rotation, frame),
+            0, 0, time_boot_ms(now), int(frame.flag), to_mavlink(rotation, frame),
             math.nan, math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan),
             now)
 
@@ -185,7 +185,7 @@ class ManagerNode(ServedPayload):
         elif isinstance(event, gimbal_manager.SetpointClipped):
             for one in event.clipped:
                 self._log.warning(
-                    f'the setpoint is clipped: {one.axis} {one.asked:.3f} rad in MAVLink is '
+                    f'the setpoint is clipped: {one.axis} {one.requested:.3f} rad in MAVLink is '
                     f'beyond the limit {one.limit:.3f} rad', f'clipped {one.axis}')
         elif isinstance(event, gimbal_manager.AddressShared):
             self._log.error(f'{event.player} has control, and two different senders use that '

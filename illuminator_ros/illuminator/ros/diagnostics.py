@@ -57,7 +57,7 @@ class FlagLog:
 
     def __init__(self) -> None:
         # By flag, the name in its last line and the time, s; '' where that said it is cleared.
-        self._told: dict[int, tuple[str, float]] = {}
+        self._reported: dict[int, tuple[str, float]] = {}
 
     def take(self, flags: int, now: float) -> list[diagnostics.Finding]:
         """
@@ -68,17 +68,17 @@ class FlagLog:
         """
         lines: list[diagnostics.Finding] = []
         found = flag_findings(flags)
-        for flag in {**self._told, **found}:
+        for flag in {**self._reported, **found}:
             name = ', '.join(flag_names(flags & flag))
-            told, told_at = self._told.get(flag, ('', -math.inf))
-            if name == told or now < told_at + FLAG_PAUSE:
+            reported, reported_at = self._reported.get(flag, ('', -math.inf))
+            if name == reported or now < reported_at + FLAG_PAUSE:
                 continue
-            self._told[flag] = (name, now)
+            self._reported[flag] = (name, now)
             if name:
                 severity, text = found[flag]
                 lines.append((severity, text if text == name else f'{name}: {text}'))
             else:
-                lines.append((diagnostics.OK, f'{told} cleared'))
+                lines.append((diagnostics.OK, f'{reported} cleared'))
         return lines
 
 

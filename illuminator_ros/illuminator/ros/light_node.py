@@ -74,7 +74,7 @@ class LightNode:
         self._log = log
         self._client = client
         self._started = self._bound_at = host.link.clock()
-        self._told_of_mount = False
+        self._mount_reported = False
         self._hardware_id = ''
         limits = client.settings.limits
         parameters = DeviceParameters(node, device_parameters(limits))
@@ -146,8 +146,8 @@ class LightNode:
         """Do what is due."""
         if self._beam is not None:
             self._beam.poll()
-        if not self._told_of_mount and (absence := self._mount_absence(self._host.link.clock())):
-            self._told_of_mount = True
+        if not self._mount_reported and (absence := self._mount_absence(self._host.link.clock())):
+            self._mount_reported = True
             self._log.warning(f'{absence}; set mounted_on')
 
     def close(self) -> None:

@@ -65,7 +65,7 @@ class Lights(ServedPayload):
         # By the addresses of their lights.
         self._nodes: dict[Address, LightNode] = {}
         self._wanted: set[Address] = set()
-        self._told_of_second = False
+        self._second_reported = False
         self._no_light_due = host.link.clock() + NO_LIGHT_DELAY
         self._names_due = math.inf
         host.diagnostics.add(self._first.source)
@@ -100,8 +100,8 @@ class Lights(ServedPayload):
             self._bind(self._first, address, now)
         elif address not in self._wanted:
             self._wanted.add(address)
-            if selected and not self._told_of_second:
-                self._told_of_second = True
+            if selected and not self._second_reported:
+                self._second_reported = True
                 self._host.log.info(
                     f'a second light, {address}, was found; {self._first.full_name} serves '
                     f'{self._first.address}. Set target_system and target_component to choose')

@@ -67,7 +67,7 @@ def camera_findings(camera: CameraSnapshot) -> list[Finding]:
     if camera.conflict:
         findings.append((ERROR, f'several components have id {MAV_COMP_ID_CAMERA}: give each '
                                 'camera a link of its own'))
-    if camera.is_deaf:
+    if camera.is_unresponsive:
         findings.append((WARN, f'{camera.unanswered_pings} PINGs without a reply: the camera does '
                                'not hear us; check the line to it'))
     return findings
