@@ -23,9 +23,9 @@ from ..payload.command_sources import Sources, SourceSettings
 
 
 @dataclass(frozen=True)
-class Wish:
+class DesiredState:
     """
-    The last values that a source has asked for, None for those that it has not.
+    The last values that a source has requested, None for values that it has not.
 
     :param brightness: %.
     """
@@ -35,28 +35,28 @@ class Wish:
 
 
 class LightSources(Sources):
-    """Decides which source holds a light, and remembers what each has asked for. No I/O."""
+    """Decides which source holds a light, and keeps the values that each has requested. No I/O."""
 
     def __init__(self, settings: SourceSettings | None) -> None:
         super().__init__(settings)
-        self._wishes: dict[str, Wish] = {}
+        self._desired: dict[str, DesiredState] = {}
 
     @property
-    def wish(self) -> Wish:
-        """Return what the holder has asked for."""
-        return self._wishes.get(self.holder or '', Wish())
+    def desired(self) -> DesiredState:
+        """Return the values that the holder has requested."""
+        return self._desired.get(self.holder or '', DesiredState())
 
     def claim(self, source: str, now: float) -> HolderChanged[str] | None:
         """Take a request of a source, which holds the light from then on if it may."""
         if not self.is_claimed_by(source):
-            self._wishes.pop(source, None)
+            self._desired.pop(source, None)
         return super().claim(source, now)
 
     def remember(self, source: str, *, enabled: bool | None = None,
                  brightness: float | None = None) -> None:
-        """Remember values that a source has asked for, as long as it claims the light."""
+        """Keep values that a source has requested, as long as it claims the light."""
         if self.is_claimed_by(source):
-            old = self._wishes.get(source, Wish())
-            self._wishes[source] = replace(
+            old = self._desired.get(source, DesiredState())
+            self._desired[source] = replace(
                 old, enabled=old.enabled if enabled is None else enabled,
                 brightness=old.brightness if brightness is None else brightness)

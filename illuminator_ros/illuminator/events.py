@@ -172,8 +172,8 @@ class LightHeld(LightEvent):
 
 
 @dataclass(frozen=True)
-class WishFailed(LightEvent):
-    """The light has not accepted the wish of the source that holds it now."""
+class DesiredStateFailed(LightEvent):
+    """The light has not accepted the values that its new holder had requested before."""
 
     source: str
     message: str

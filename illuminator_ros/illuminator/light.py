@@ -392,7 +392,7 @@ class Light:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
         elif change.cause is not Cause.CLAIM:
-            self._send_wish(now)
+            self._send_desired(now)
 
     def _end_requests(self, message: str, now: float) -> None:
         """End the requests of a source that no longer holds the light, and their resends."""
@@ -404,23 +404,24 @@ class Light:
             now, CommandStatus.CANCELLED, self.address, lambda command: command.command in (
                 MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
 
-    def _send_wish(self, now: float) -> None:
-        """Send what the source that holds the light now has asked for before."""
-        holder, wish = self._sources.holder, self._sources.wish
+    def _send_desired(self, now: float) -> None:
+        """Send the values that the source that holds the light now has requested before."""
+        holder, desired = self._sources.holder, self._sources.desired
 
         def done(result: Result, now: float) -> None:
             if not result.success:
-                self._emit(events.WishFailed(self.address, holder or '', result.message))
+                self._emit(events.DesiredStateFailed(self.address, holder or '', result.message))
 
         if not self._can_reach(now, done):
             return
         limit = self.settings.off_after_silence or math.inf
         # A light that went off after silence must not flash.
-        if wish.enabled is not None and (not wish.enabled or now < self._requested_at + limit):
+        if desired.enabled is not None and (
+                not desired.enabled or now < self._requested_at + limit):
             self._automatic = None
-            self._switch(wish.enabled, now, done, f'{holder}, which holds the light now')
-        if wish.brightness is not None:
-            self._configuration.set_brightness(wish.brightness, now)
+            self._switch(desired.enabled, now, done, f'{holder}, which holds the light now')
+        if desired.brightness is not None:
+            self._configuration.set_brightness(desired.brightness, now)
 
     def _switch(self, on: bool, now: float, done: Done, detail: str | None) -> None:
         """Submit a request; ``detail`` is None where its caller reports the change itself."""
@@ -479,7 +480,7 @@ class Light:
         :param brightness: %, checked.
         """
         def failed(result: Result, now: float) -> None:
-            # While another source holds the light, a setpoint is remembered.
+            # While another source holds the light, a setpoint is kept.
             if not self.is_held_by_other(source):
                 self._emit(events.SetpointFailed(self.address, result.message))
 

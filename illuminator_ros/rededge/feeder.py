@@ -536,6 +536,7 @@ class Feeder:
         """See :meth:`Payload.next_deadline`."""
         return min(self._mount_due, *(one.next_change() for one in self._inputs.values()))
 
+
 def _check_age(stamp: Stamp, timeout: float) -> None:
     """Refuse what was measured long before it was received, or after."""
     if stamp.age > timeout:

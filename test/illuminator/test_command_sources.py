@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sources share a light: the highest that claims it holds it, and only its wish is sent."""
+"""Sources share a light: the highest that claims it holds it, and only its requests are sent."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import random
 
-from illuminator_ros.illuminator.events import LightHeld, WishFailed
+from illuminator_ros.illuminator.events import DesiredStateFailed, LightHeld
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
@@ -93,7 +93,7 @@ ENDS: dict[Cause, Callable[[Shared], None]] = {
 
 
 @pytest.mark.parametrize(('cause', 'end'), ENDS.items())
-def test_the_wish_of_the_next_source_is_sent_once_when_the_hold_of_a_higher_one_ends(
+def test_the_state_that_the_next_source_requested_is_sent_once_when_the_hold_of_a_higher_one_ends(
         cause: Cause, end: Callable[[Shared], None]) -> None:
     shared = Shared()
     shared.enable('safety', False)
@@ -139,7 +139,7 @@ def test_a_takeover_ends_the_requests_of_the_lower_source_and_their_resends() ->
     assert set(shared.sent(CONFIGURE, taken_over_at + 0.01)) == {40.0}
 
 
-def test_a_wish_that_the_light_refuses_is_reported() -> None:
+def test_a_requested_state_that_the_light_refuses_is_reported() -> None:
     shared = Shared()
     shared.enable('safety', False)
     shared.pair.run(1.0)
@@ -148,8 +148,8 @@ def test_a_wish_that_the_light_refuses_is_reported() -> None:
     shared.release('safety')
     shared.pair.run(1.0)
 
-    assert [one.source for one in shared.pair.recorder.others if isinstance(one, WishFailed)] == [
-        'autonomy']
+    assert [one.source for one in shared.pair.recorder.others
+            if isinstance(one, DesiredStateFailed)] == ['autonomy']
 
 
 def test_the_last_switch_before_the_end_is_sent_whatever_holds_the_light() -> None:
@@ -180,14 +180,14 @@ class Model:
 
 
 @pytest.mark.parametrize('seed', range(60))
-def test_the_highest_source_wins_within_one_turn_and_only_its_wish_is_sent(seed: int) -> None:
+def test_the_highest_source_wins_within_one_turn_and_only_its_requests_are_sent(seed: int) -> None:
     draw = random.Random(seed)
     shared = Shared(seed=seed, drop=draw.choice((0.0, 0.3)), duplicate=draw.choice((0.0, 0.2)),
                     delay=draw.choice((0.0, 0.3)), reorder=0.1)
     pair, model = shared.pair, Model()
     # Each source has brightnesses of its own, by which its frames are known.
     of_source = {name: 10.0 * (index + 1) for index, name in enumerate(NAMES)}
-    wishes: dict[str, list[bool]] = {name: [] for name in NAMES}
+    desired: dict[str, list[bool]] = {name: [] for name in NAMES}
     alive = dict.fromkeys(NAMES, True)
     allowed, checked, last_heard = '', len(pair.near.sent), pair.now
 
@@ -205,7 +205,7 @@ def test_the_highest_source_wins_within_one_turn_and_only_its_wish_is_sent(seed:
             else:
                 model.heard[source] = pair.now
             if act == 'enable':
-                wishes[source].append(on := draw.random() < 0.5)
+                desired[source].append(on := draw.random() < 0.5)
                 shared.enable(source, on)
             elif act == 'dim':
                 shared.dim(source, of_source[source] + draw.randrange(9))
@@ -215,7 +215,7 @@ def test_the_highest_source_wins_within_one_turn_and_only_its_wish_is_sent(seed:
         while True:
             model.expire(pair.now)
             assert shared.holder == model.holder
-            # A light that no source holds keeps the wish of the last one.
+            # A light that no source holds keeps the state requested by the last one.
             allowed = model.holder or allowed
             for at, message in pair.near.sent[checked:]:
                 command = getattr(message, 'command', None)
@@ -223,7 +223,7 @@ def test_the_highest_source_wins_within_one_turn_and_only_its_wish_is_sent(seed:
                     assert message.param2 // 10 == of_source[allowed] // 10, (at, allowed)
                 elif command == ON_OFF:
                     silent = at >= last_heard + SILENCE and not message.param1
-                    assert silent or bool(message.param1) in wishes[allowed], (at, allowed)
+                    assert silent or bool(message.param1) in desired[allowed], (at, allowed)
             checked = len(pair.near.sent)
             if not pair.step(until):
                 break

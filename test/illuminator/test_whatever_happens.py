@@ -77,9 +77,9 @@ class Chaos:
 
     def configure(self) -> None:
         if light := self.light():
-            wish = {'brightness': self.draw.randrange(101),
-                    'strobe_period': self.draw.choice((0, 1))}
-            light.configure(wish, self.pair.now, self.answer(self.sets))
+            values = {'brightness': self.draw.randrange(101),
+                      'strobe_period': self.draw.choice((0, 1))}
+            light.configure(values, self.pair.now, self.answer(self.sets))
 
     def publish(self) -> None:
         if light := self.light():

@@ -78,10 +78,10 @@ class Witness:
         if (fields := self._fields()) != self._states[-1][1]:
             self._states.append((now, fields))
 
-    def matches(self, wish: Fields, since: float, until: float) -> list[bool]:
-        """Return for each state between two times whether it was as wished."""
+    def matches(self, values: Fields, since: float, until: float) -> list[bool]:
+        """Return for each state between two times whether it had these values."""
         ends = [*(at for at, _ in self._states[1:]), math.inf]
-        return [wish.items() <= fields.items() for (at, fields), end in zip(
+        return [values.items() <= fields.items() for (at, fields), end in zip(
             self._states, ends, strict=True) if at <= until and end >= since]
 
     def is_as(self, light: Light, now: float) -> bool:
@@ -93,11 +93,11 @@ class Witness:
 
 @dataclass
 class Request:
-    """A request to a light, and the wish with which it was made."""
+    """A request to a light, and the values that it requests."""
 
     light: Light
     kind: MavCmd
-    wish: Fields
+    values: Fields
     answer: Answer
 
     @property
@@ -142,15 +142,15 @@ class User:
     def act(self) -> None:
         """Ask for something."""
         if self.kind == ON_OFF:
-            wish: dict[str, Any] = {'enabled': self.draw.random() < 0.5}
-            answer = self.pair.ask_enable(wish['enabled'], self.light)
+            values: dict[str, Any] = {'enabled': self.draw.random() < 0.5}
+            answer = self.pair.ask_enable(values['enabled'], self.light)
         else:
             values = {'brightness': float(self.draw.randrange(101)),
                       'strobe_period': self.draw.choice((0.0, 0.5, 1.0, 2.0)),
                       'strobe_duty_cycle': float(self.draw.randrange(101))}
-            wish = {name: values[name] for name in self.draw.sample(sorted(values), 2)}
-            answer = self.pair.ask_configure(self.light, **wish)
-        self.requests.append(Request(self.light, self.kind, wish, answer))
+            values = {name: values[name] for name in self.draw.sample(sorted(values), 2)}
+            answer = self.pair.ask_configure(self.light, **values)
+        self.requests.append(Request(self.light, self.kind, values, answer))
         self.due = self.pair.now + self.draw.choice((0.001, 0.1, 0.3))
         self._waits = self.draw.random() >= self._impatience
 
@@ -210,7 +210,7 @@ class Run:
         """Return what is not true in the answer to a request, '' if all is."""
         answer, outcome = request.answer, request.outcome
         matches = self._witnesses[request.light.address].matches(
-            request.wish, answer.asked_at - UPTIME_ERROR * (outcome != CONFIRMED),
+            request.values, answer.asked_at - UPTIME_ERROR * (outcome != CONFIRMED),
             answer.ended_at)
         acks = [at for at, source, ack in self.pair.near.received
                 if isinstance(ack, CommandAck) and ack.command == request.kind
@@ -229,13 +229,13 @@ class Run:
                 shown = request.message.partition('shows ')[2]
                 # A command carries all fields, and a late copy may have changed another one.
                 is_other = request.kind == CONFIGURE and not any(
-                    name in shown for name in request.wish)
+                    name in shown for name in request.values)
                 return '' if acks and (is_other or not all(matches)) else 'always as wished'
             case 'refused':
                 return 'done' if matches[-1] and not matches[0] and not others else ''
             case 'overtaken':
-                is_overtaken = any(not other.wish.get('enabled', True) for other in others)
-                return '' if request.wish.get('enabled') and is_overtaken else 'not overtaken'
+                is_overtaken = any(not other.values.get('enabled', True) for other in others)
+                return '' if request.values.get('enabled') and is_overtaken else 'not overtaken'
             case '':
                 return 'an unknown outcome'
         return ''

@@ -111,8 +111,9 @@ class EventPublisher:
                 log.info(f'{light} {describe(change)}', 'holder')
                 self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
                 self._interface.publish('source', change.after or '')
-            case events.WishFailed(source=source, message=message):
-                log.warning(f'{light} is not as {source} has asked for before: {message}', 'wish')
+            case events.DesiredStateFailed(source=source, message=message):
+                log.warning(f'{light} does not have the state that {source} requested: {message}',
+                            'desired')
             case events.AutomaticSwitch(on=on, reason=reason, failure=''):
                 log.warning(f'{light} is switched {_state(on)} by {reason}', 'automatic')
             case events.AutomaticSwitch(on=on, failure=failure):

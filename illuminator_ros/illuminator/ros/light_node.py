@@ -215,7 +215,7 @@ class LightNode:
     ) -> None:
         def answer(success: bool, message: str) -> None:
             light = self._light()
-            # A source that repeats its wish while a higher one holds the light is not at fault.
+            # A source that repeats its request while a higher one holds the light is not at fault.
             if not success and not (light and light.is_held_by_other(source)):
                 topic = f'{prefix}cmd/enable'
                 self._log.warning(f'~/{topic}: {message}', topic)
