@@ -205,7 +205,7 @@ class GimbalClient(Payload):
         """See :meth:`Payload.poll`."""
         self._request_information(now)
         for key, gimbal in list(self._gimbals.items()):
-            if not gimbal.was_commanded and now >= gimbal.silent_since + FORGET_AFTER:
+            if now >= _forgotten_at(gimbal):
                 del self._gimbals[key]
                 self.limit_reached = False
                 self.events.emit(GimbalForgotten(key))
@@ -215,4 +215,9 @@ class GimbalClient(Payload):
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
         return min((max(self._next_query, self._queries.next_deadline()),
-                    *(gimbal.next_deadline() for gimbal in self._gimbals.values())))
+                    *(min(gimbal.next_deadline(), _forgotten_at(gimbal))
+                      for gimbal in self._gimbals.values())))
+
+
+def _forgotten_at(gimbal: Gimbal) -> float:
+    return math.inf if gimbal.was_commanded else gimbal.silent_since + FORGET_AFTER

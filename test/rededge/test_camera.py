@@ -65,7 +65,8 @@ class Rig:
     def run(self, seconds: float, beats: bool = False) -> None:
         end = round(self.now + seconds, 6)
         while True:
-            self.component.poll(self.now)
+            if self.now >= self.component.next_deadline():
+                self.component.poll(self.now)
             while self.component.outgoing:
                 source, message = self.component.outgoing.popleft()
                 assert source == OWN

@@ -180,7 +180,8 @@ class Pair:
             for data in wire.receive(self.now):
                 end.take(data, self.now)
         for end in (self.far, self.near):
-            end.endpoint.poll(self.now)
+            if self.now >= end.endpoint.next_deadline():
+                end.endpoint.poll(self.now)
             end.flush(self.now)
         wakes_at = self.controller.next_deadline()
         for light in self.controller.lights.values():

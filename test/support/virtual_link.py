@@ -70,7 +70,8 @@ class VirtualLink:
     def turn(self) -> None:
         """Do what both links' threads do in one turn."""
         for end in self.ends:
-            end.poll(self.now)
+            if self.now >= end.next_deadline():
+                end.poll(self.now)
         first, second = self.ends
         while first.outgoing or second.outgoing:
             self._carry(first, second, self.decoders[1])
