@@ -57,7 +57,7 @@ class Ranges:
 
     @classmethod
     def of(cls, message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:
-        """Return those of a message."""
+        """Return the ranges in a message."""
         return cls((message.roll_min, message.roll_max), (message.pitch_min, message.pitch_max),
                    (message.yaw_min, message.yaw_max))
 

@@ -542,7 +542,7 @@ class Gimbal:
         return Capabilities(manager.information.cap_flags)
 
     def _missing(self, *enough: Capabilities) -> str:
-        """Return that the gimbal has none of some capabilities, for people; '' if it has."""
+        """Return which of some capabilities is needed, for people; '' if the gimbal has one."""
         known = self._capabilities()
         if known is None or any(one in known for one in enough):
             return ''

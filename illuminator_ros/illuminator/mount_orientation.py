@@ -53,7 +53,7 @@ class MountOrientations:
         return False
 
     def absence(self, system: int, device_id: int) -> str:
-        """Return that a mount was never heard, and which ones were; '' if it was."""
+        """Return why the beam of a mount is not shown, for people; '' if the mount was heard."""
         if (system, device_id) in self._mounts:
             return ''
         heard = ', '.join(f'{number} of system {one}' for one, number in sorted(self._mounts))

@@ -138,7 +138,7 @@ class LinkSnapshot:
 
     @property
     def failure(self) -> str:
-        """Return what is not open and why, for people; '' while the link is open."""
+        """Return why the link is not open, for people; '' while it is."""
         return '' if self.is_open else f'{self.name} is not open: {self.reason}'
 
 

@@ -73,7 +73,7 @@ class RoutingTable:
         route[peer] = now
 
     def towards(self, message: object, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
-        """Return those of the peers that lead to the message's target, all where none does."""
+        """Return the peers that lead to the message's target, all peers if none does."""
         system = getattr(message, 'target_system', 0)
         if not system or len(peers) < 2:
             return peers

@@ -73,6 +73,6 @@ class Sources(Arbiter[str]):
 
 
 def describe(change: HolderChanged[str]) -> str:
-    """Return that a device has another holder, and why, for people."""
+    """Describe a change of the holder of a device and its cause, for people."""
     reason = _REASONS[change.cause].format(change.before) if change.before else ''
     return f'is held by {change.after or "no source"}{reason}'

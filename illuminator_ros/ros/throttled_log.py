@@ -107,7 +107,7 @@ class NodeLog:
         return self._logger.is_enabled_for(LoggingSeverity.DEBUG)
 
     def _admit(self, severity: int, text: str, name: str) -> str | None:
-        """Return what to add to the line, None if the line must be left out."""
+        """Return the text to add to the line, None if the line must be left out."""
         now = self._clock()
         kind = self._kinds.get(name)
         note = ''

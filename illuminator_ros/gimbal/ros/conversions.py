@@ -55,7 +55,7 @@ class Frames:
     @classmethod
     def of(cls, values: Values) -> Frames:
         """
-        Return those that parameters give.
+        Return the names that parameters give.
 
         :raises ParameterError: if they are equal or empty.
         """

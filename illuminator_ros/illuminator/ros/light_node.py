@@ -136,7 +136,7 @@ class LightNode:
             self.address.system, device_id, self._host.link.clock())
 
     def _mount_absence(self, now: float) -> str:
-        """Return that the gimbal which turns the beam was never heard; '' if it was."""
+        """Return why the beam is not shown, for people; '' if its gimbal was heard."""
         if (self._beam is None or not self._beam.device_id or self.address is None
                 or now < self._bound_at + DISCOVERY_GRACE):
             return ''

@@ -270,7 +270,7 @@ class Transaction:
         return 'no acknowledgement' if self.result is None else result_name(self.result)
 
     def expect(self, *, accepted: bool) -> None:
-        """Raise Failed where the command was not accepted, or was although it must not be."""
+        """Raise Failed unless the command was accepted, or not accepted, as expected."""
         if self.accepted is not accepted:
             raise self.failure()
 
@@ -457,7 +457,7 @@ class Session(Endpoint):
         return cast(History[tuple[float, M]], self._received.get(cls, History()))
 
     def idle(self, cls: type[M]) -> list[tuple[float, M]]:
-        """Return those that the device sent before the session sent a command."""
+        """Return the messages that the device sent before the session sent a command."""
         return [(at, one) for at, one in self.received(cls) if at <= self.idle_until]
 
     def send(self, message: Message, sender: Address | None = None) -> None:
