@@ -20,14 +20,10 @@ from dataclasses import dataclass
 import math
 
 from .axes import LEVEL
-from .messages import flag_names, GimbalCommand, GimbalManagerStatus
+from .messages import flag_names, GimbalCommand, GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
 from ..mavlink.messages import Address
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountFlags, YawFrame
-
-# MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE. -2, "set itself in control", is never sent: PX4 takes it
-# for the autopilot, ArduPilot for the sender.
-UNCHANGED, REMOVE_OWN = -1, -3
 
 
 @dataclass(frozen=True)
@@ -82,8 +78,9 @@ class Configure:
     @property
     def params(self) -> tuple[float, ...]:
         """See :class:`~..payload.request.Change`."""
-        primary = self.us if self.take else (REMOVE_OWN, REMOVE_OWN)
-        secondary = UNCHANGED if self.take else REMOVE_OWN
+        # Not SENDER: PX4 takes that for the autopilot, ArduPilot for the sender.
+        primary = self.us if self.take else (REMOVE_SENDER, REMOVE_SENDER)
+        secondary = UNCHANGED if self.take else REMOVE_SENDER
         return *primary, secondary, secondary, 0, 0, self.device_id
 
     @property

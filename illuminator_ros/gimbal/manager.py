@@ -48,6 +48,7 @@ from .manager_setpoint import (
 )
 from .manager_state import ManagerState, StateChanged, StateTracker
 from .messages import (
+    ABSOLUTE_FRAMES,
     AutopilotStateForGimbalDevice,
     Capabilities,
     GimbalCommand,
@@ -59,7 +60,9 @@ from .messages import (
     GimbalManagerSetPitchyaw,
     GimbalManagerStatus,
     MAV_TYPE_GIMBAL,
+    NO_COMPONENT,
     NON_MAVLINK_IDS,
+    RELATIVE_FRAMES,
 )
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
@@ -103,8 +106,6 @@ REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
 # A COMMAND_LONG has no frame: PX4 takes its altitude for one above mean sea level, too.
 NO_FRAME = -1
-# MAV_FRAMEs of altitudes above mean sea level, and above the home position.
-GLOBAL_FRAMES, RELATIVE_FRAMES = (0, 5, NO_FRAME), (3, 6)
 _ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
@@ -233,7 +234,7 @@ class GimbalManager(Payload):
         setpoint, device = self._setpoint, self._device_status(now)
         flags = 0 if setpoint is None else setpoint.device_flags
         accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
-        primary, secondary = (self.control.holder(role) or Address(0, 0) for role in Role)
+        primary, secondary = (self.control.holder(role) or NO_COMPONENT for role in Role)
         return GimbalManagerStatus(
             mav.time_boot_ms(now),
             int(flags | (accepts and MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)),
@@ -526,13 +527,13 @@ class GimbalManager(Payload):
     ) -> MavResult:
         if self.control.holder(Role.PRIMARY) != source:
             return MavResult.DENIED
-        if frame not in (*GLOBAL_FRAMES, *RELATIVE_FRAMES):
+        if frame not in (NO_FRAME, *ABSOLUTE_FRAMES, *RELATIVE_FRAMES):
             return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
         scale = 1.0 if frame == NO_FRAME else DEGREE_SCALE
         latitude, longitude, altitude = params[4] / scale, params[5] / scale, params[6]
         if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
             return MavResult.DENIED
-        above = 0.0 if frame in GLOBAL_FRAMES else self.vehicle.home_altitude
+        above = self.vehicle.home_altitude if frame in RELATIVE_FRAMES else 0.0
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
                 and not self._accepts(YawFrame.EARTH, now)):

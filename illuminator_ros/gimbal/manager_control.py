@@ -20,11 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from .messages import NO_PLAYER, REMOVE_SENDER, SENDER, UNCHANGED
 from ..mavlink.messages import Address
 from ..payload.arbitration import Arbiter, Cause, Policy
-
-# Params of MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, for system id and component id alike.
-NO_PLAYER, UNCHANGED, SENDER, REMOVE_SENDER = 0, -1, -2, -3
 
 
 class Role(Enum):

@@ -33,6 +33,12 @@ MAV_TYPE_GIMBAL = 26
 MAV_COMP_ID_GIMBAL = 154
 # Ids of devices that are not components of their own.
 NON_MAVLINK_IDS = range(1, 7)
+# The address in GIMBAL_MANAGER_STATUS where no component has control.
+NO_COMPONENT = mav.Address(0, 0)
+# Params of MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, for system id and component id alike.
+NO_PLAYER, UNCHANGED, SENDER, REMOVE_SENDER = 0, -1, -2, -3
+# MAV_FRAMEs with altitudes above mean sea level, and above the home position.
+ABSOLUTE_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
 
 
 class GimbalCommand(IntEnum):

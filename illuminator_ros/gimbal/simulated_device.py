@@ -96,8 +96,8 @@ class GimbalBehaviour(Behaviour):
 # The faults of devices and of managers.
 GIMBAL_FAULTS = FaultTable({
     **COMPONENT_FAULTS,
-    'obeys-everybody': Fault('enforces_control', 'obeys components that do not control it',
-                             default=False),
+    'obeys-others': Fault('enforces_control', 'obeys components that do not control it',
+                          default=False),
     'no-status': Fault('reports', 'sends no status', default=False),
     'stale-flags': Fault('frozen_flags', 'reports the flags of its start'),
     'frozen-axis': Fault('frozen_axis', 'an axis does not move', 'AXIS', one_of(AXES), 'pitch'),

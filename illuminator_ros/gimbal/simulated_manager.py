@@ -32,7 +32,13 @@ from typing import Any, NamedTuple
 from . import messages as gimbal
 from .axes import LEVEL, Range
 from .manager_setpoint import direction, GeoPoint, read_demand
-from .messages import Capabilities, GimbalCommand
+from .messages import (
+    ABSOLUTE_FRAMES,
+    Capabilities,
+    GimbalCommand,
+    NO_COMPONENT,
+    RELATIVE_FRAMES,
+)
 from .simulated_device import (
     COMMANDS,
     GIMBAL_FAULTS,
@@ -61,11 +67,8 @@ from ..payload.simulated_settings import geo_point, integer, number, one_of, Set
 STATUS_INTERVAL = 0.2
 # rad that secondary control may add to an angle.
 NUDGE_LIMIT = math.radians(20.0)
-NO_COMPONENT = Address(0, 0)
 MAV_TYPE_QUADROTOR = 2
 MAV_AUTOPILOT_PX4 = 12
-# MAV_FRAME_GLOBAL and its _INT, whose altitude is above mean sea level; those relative to home.
-ABSOLUTE_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ SEEDED = {
         'autopilot': {'heartbeat-autopilot'},
         'lie': {'setpoint', 'rate', 'neutral', 'retract', 'earth-frame', 'yaw-lock'},
         'frozen-axis': {'setpoint', 'rate', 'earth-frame', 'yaw-lock'},
-        'obeys-everybody': {'only-manager', 'one-manager'},
+        'obeys-others': {'only-manager', 'one-manager'},
         'no-status': {'status-stream', 'status-request'},
         'stale-flags': {'neutral', 'retract'},
         'false-north': {'north-needs-heading'},
@@ -88,7 +88,7 @@ SEEDED = {
         'lie': {'take', 'secondary', 'one-player', 'roi', 'neutral', 'retract',
                 'flags-shown', *POINTING, *TURNING},
         'frozen-axis': {'roi', *POINTING, *TURNING},
-        'obeys-everybody': {'no-control-command', 'no-control-messages', 'one-player'},
+        'obeys-others': {'no-control-command', 'no-control-messages', 'one-player'},
         'no-status': {'status-stream', 'status-request', 'attitude-stream'},
         'stale-flags': {'neutral', 'retract', 'flags-shown'},
         'stale-control': {'take', 'secondary', 'one-player'},
@@ -233,7 +233,7 @@ def test_every_fault_is_seeded_and_every_requirement_can_fail(kind: str) -> None
 # Consent and restoring
 
 @every_kind
-def test_without_consent_nothing_moves_and_nobody_gets_control(kind: str) -> None:
+def test_without_consent_nothing_moves_and_no_component_gets_control(kind: str) -> None:
     one = run(kind, consent=False)
     one.device.mount.motion.turn(-0.5, 0.4, one.link.now)
     one.finish()

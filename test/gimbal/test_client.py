@@ -214,7 +214,7 @@ def test_gm_18_second_manager_of_a_gimbal_is_told_and_takes_over_when_the_first_
     assert rig.gimbal.snapshot(rig.now).managers == (second,)
 
 
-def test_gm_20_attitude_is_taken_from_the_device_itself_whoever_manages_it() -> None:
+def test_gm_20_attitude_is_taken_from_the_device_itself_with_any_manager() -> None:
     rig = Rig(FakeManager(q=(NAN,) * 4)).run(3.0)
 
     assert rig.all_of(events.AttitudeReceived)[-1].attitude is None

@@ -21,8 +21,13 @@ import contextlib
 import math
 from typing import Any
 
-from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags, GimbalCommand
-from illuminator_ros.mavlink.messages import Address, CommandInt, MavResult
+from illuminator_ros.gimbal.messages import (
+    Capabilities,
+    ErrorFlags,
+    GimbalCommand,
+    NO_COMPONENT,
+)
+from illuminator_ros.mavlink.messages import CommandInt, MavResult
 from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
@@ -43,7 +48,6 @@ from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREA
 from support.slow import pass_time_until  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
-NOBODY = Address(0, 0)
 EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
 # 45 degrees down and 30 to the left of the vehicle, in ROS and in MAVLink.
 ROS_ANGLES = (0.0, math.radians(45), math.radians(30))
@@ -165,7 +169,7 @@ def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
     program.wait_for(LOST, count=lost + 1)
     ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
     take_control(ros, gimbal)
-    gimbal.primary = NOBODY
+    gimbal.primary = NO_COMPONENT
     program.wait_for('control of gimbal 1/154 ended: no component has primary control')
 
 
@@ -173,7 +177,7 @@ def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
 
 def test_gm_16_control_is_taken_and_released_by_services(
         ros: Ros, gimbal: FakeManager) -> None:
-    for name, primary in (('take_control', OURS), ('release_control', NOBODY)):
+    for name, primary in (('take_control', OURS), ('release_control', NO_COMPONENT)):
         answer = trigger(ros, name)
         assert answer.success, answer.message
         assert 'confirmed by GIMBAL_MANAGER_STATUS' in answer.message
@@ -376,10 +380,10 @@ def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
         assert 'exclusive control is not guaranteed' in report(own_ros, 'ArduPilot').message
         manager.secondary = OURS
         if primary_is_lost:
-            manager.primary = NOBODY
+            manager.primary = NO_COMPONENT
             own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
         assert program.end() == 0
-        assert (manager.primary, manager.secondary) == (NOBODY, NOBODY)
+        assert (manager.primary, manager.secondary) == (NO_COMPONENT, NO_COMPONENT)
         assert program.count('gimbal 1/154: control released') == 1
 
 

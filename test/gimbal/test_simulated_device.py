@@ -277,7 +277,7 @@ def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
 # Faults, and a person
 
 @pytest.mark.parametrize(('fault', 'source', 'degrees'), [
-    ('obeys-everybody', Address(255, 190), (0.0, -20.0, 30.0)),
+    ('obeys-others', Address(255, 190), (0.0, -20.0, 30.0)),
     ('frozen-axis', MANAGER, (0.0, 0.0, 30.0)),
     ('frozen-axis=yaw', MANAGER, (0.0, -20.0, 0.0)),
     ('lie', MANAGER, (0.0, 0.0, 0.0))])

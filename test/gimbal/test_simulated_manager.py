@@ -35,7 +35,7 @@ import pytest
 
 NAN = math.nan
 UNSET = (NAN, NAN, NAN)
-PLAYER, OTHER, NOBODY = mav.Address(1, 195), mav.Address(255, 190), mav.Address(0, 0)
+PLAYER, OTHER = mav.Address(1, 195), mav.Address(255, 190)
 ACCEPTED, DENIED, FAILED = mav.MavResult.ACCEPTED, mav.MavResult.DENIED, mav.MavResult.FAILED
 CONFIGURE, PITCHYAW = (GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE,
                        GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW)
@@ -75,7 +75,9 @@ class Bench:
         return next(mav.MavResult(message.result) for _, message in self.endpoint.outgoing
                     if isinstance(message, mav.CommandAck))
 
-    def take(self, source: mav.Address = PLAYER, secondary: mav.Address = NOBODY) -> mav.MavResult:
+    def take(
+        self, source: mav.Address = PLAYER, secondary: mav.Address = gimbal.NO_COMPONENT,
+    ) -> mav.MavResult:
         return self.command(CONFIGURE, *source, *secondary, source=source)
 
     def point(
@@ -171,7 +173,7 @@ def test_a_component_without_control_moves_it_only_where_the_profile_lets_it(
 
 
 @every_profile
-def test_nobody_in_control_means_that_only_ardupilot_obeys(profile: str) -> None:
+def test_while_no_component_has_control_only_ardupilot_obeys(profile: str) -> None:
     bench = Bench(profile, taken=False)
     result = bench.command(PITCHYAW, -10.0, 0.0, NAN, NAN, FOLLOW)
     assert result == (ACCEPTED if profile == 'ardupilot' else DENIED)

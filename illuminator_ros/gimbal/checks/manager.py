@@ -47,7 +47,7 @@ from .tester import (
 )
 from .. import messages as gimbal
 from ..axes import LEVEL
-from ..messages import Capabilities, GimbalCommand
+from ..messages import Capabilities, GimbalCommand, NO_COMPONENT
 from ...mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message, time_boot_ms
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
@@ -67,7 +67,6 @@ INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalMana
 PITCHYAW, CONFIGURE = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW,
                        GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE)
 VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
-NO_COMPONENT = Address(0, 0)
 # s from an acknowledgement to the status that shows the control.
 SHOWN_TIMEOUT = 1.5
 # Degrees 1e7 and mm: the vehicle that is played, which heads 15 degrees from north, and degrees
