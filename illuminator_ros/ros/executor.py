@@ -48,6 +48,8 @@ FALLBACK_PERIOD = 0.1
 # Where more requests wait than this, their answers are sent this far apart, s.
 MAX_UNSPACED = 8
 ANSWER_SPACING = 0.008
+# Answers that wait for that; more would fill the memory and come too late.
+MAX_SPACED = 250
 
 Q = TypeVar('Q')
 A = TypeVar('A')
@@ -88,7 +90,7 @@ class NodeExecutor(SingleThreadedExecutor):
         # Requests that were not answered, by service, and answers that are sent one by one.
         self._open: Counter[int] = Counter()
         self._counting = threading.Lock()
-        self._spaced: deque[Callable[[], None]] = deque()
+        self._spaced: deque[tuple[Service, Callable[[], None]]] = deque()
         self._spaced_due = 0.0
         self._stale = threading.Event()
         self._stale.set()
@@ -192,10 +194,11 @@ class NodeExecutor(SingleThreadedExecutor):
         # must not hold up the link's thread.
         send = functools.partial(_send, service, header, response)
         with self._counting:
-            spaced = bool(self._spaced) or self._open[id(service)] > MAX_UNSPACED
-            self._open[id(service)] -= 1
+            spaced = self._open[id(service)] > MAX_UNSPACED
             if spaced:
-                self._spaced.append(send)
+                self._spaced.append((service, send))
+            else:
+                self._open[id(service)] -= 1
         if spaced:
             self._wakeup.trigger()
         elif header.request_id.sequence_number <= 1:
@@ -205,9 +208,12 @@ class NodeExecutor(SingleThreadedExecutor):
 
     def _send_spaced(self) -> None:
         now = time.monotonic()
-        if self._spaced and now >= self._spaced_due:
+        while self._spaced and (now >= self._spaced_due or len(self._spaced) > MAX_SPACED):
             self._spaced_due = now + ANSWER_SPACING
-            self._spaced.popleft()()
+            service, send = self._spaced.popleft()
+            with self._counting:
+                self._open[id(service)] -= 1
+            send()
 
     @staticmethod
     def _deliver(subscription: Subscription) -> None:

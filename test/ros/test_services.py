@@ -16,14 +16,22 @@
 
 import re
 import socket
+import threading
 
+from illuminator_ros.ros import executor as executor_module
+from illuminator_ros.ros.executor import DeferredService, NodeExecutor, Respond
+from illuminator_ros.ros.node import PayloadNode, SERVICE_QOS
+from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
+from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
-from support.light import MavCmd, MavResult, ON_OFF, ServedLight
+from support.light import eventually, MavCmd, MavResult, ON_OFF, ServedLight
 from support.processes import Program
+from support.recording import Call
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import pass_time_until
+from support.waiting import Log
 
 STATUS, INFORMATION = 440.0, 396.0
 
@@ -127,3 +135,41 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
             assert no_light_messages(own_ros) == {
                 f'no light connected: udpin://127.0.0.1:{port} is not open: '
                 f'cannot listen on 127.0.0.1:{port}: Address already in use'}
+
+
+def test_spaced_answers_do_not_delay_other_services_and_are_bounded(
+    ros: Ros, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(executor_module, 'ANSWER_SPACING', 3600.0)
+    monkeypatch.setattr(executor_module, 'MAX_SPACED', 3)
+    node = PayloadNode('crowded', context=ros.context)
+    executor = NodeExecutor(ros.context, NodeLog(node.get_logger()))
+    waiting: Log[Respond[Trigger.Response]] = Log()
+
+    def take(request: Trigger.Request, respond: Respond[Trigger.Response]) -> None:
+        waiting.append(respond)
+
+    node.create_service(Trigger, '~/slow', DeferredService(take), qos_profile=SERVICE_QOS)
+    node.create_service(Trigger, '~/fast', lambda request, response: response)
+    slow, fast = (ros.node.create_client(
+        Trigger, f'/crowded/{name}', qos_profile=QoSProfile(depth=100)) for name in (
+        'slow', 'fast'))
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.run)
+    thread.start()
+    try:
+        eventually(lambda: slow.service_is_ready() and fast.service_is_ready())
+        calls = [Call(slow.call_async(Trigger.Request())) for _ in range(20)]
+        waiting.wait_for(lambda one: True, count=len(calls))
+
+        for respond in list(waiting):
+            respond(Trigger.Response())
+
+        Call(fast.call_async(Trigger.Request())).result()
+        eventually(lambda: sum(call.answered for call in calls) >= len(calls) - 3)
+    finally:
+        executor.end()
+        thread.join()
+        node.destroy_node()
+        ros.node.destroy_client(slow)
+        ros.node.destroy_client(fast)
