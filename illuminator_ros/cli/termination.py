@@ -32,8 +32,8 @@ from .output_queue import OutputQueue
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, even if something hangs.
 LIMIT = 0.85
-# s in which queued output must be written: where no signal hurries, after an orderly end, for
-# which LIMIT leaves that much at least, and after one that hangs. A busy machine needs 0.1 s.
+# s in which queued output must be written: at an exit without a signal, since a busy machine may
+# need more than 0.1 s; at least, after an orderly end by a signal; and after one that hangs.
 OUTPUT_LIMIT = 1.0
 HURRIED_OUTPUT_LIMIT = 0.1
 OVERDUE_OUTPUT_LIMIT = 0.02
