@@ -12,20 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages of ROS from and to attitudes, rates and places."""
+"""Attitudes, rates and places of gimbals in messages of ROS."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 import math
 
-from geometry_msgs.msg import Quaternion as QuaternionMessage
 from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Header
 
 from ...payload.mount_attitude import AXES, YawFrame
 from ...payload.rotation import Quaternion, Vector
+from ...ros.conversions import read_quaternion, read_vector
 from ...ros.parameters import ParameterError, ParameterSpec, Values
 
 FRAME_PARAMETERS = (
@@ -33,9 +33,6 @@ FRAME_PARAMETERS = (
     ParameterSpec('vehicle_frame', 'base_link_stabilized',
                   'frame_id of attitudes with a yaw relative to the vehicle'),
 )
-GEOID_SEPARATION = ParameterSpec(
-    'geoid_separation', 0.0, 'height of the geoid above the ellipsoid, where the vehicle is', 'm',
-    -150.0, 150.0)
 # Of roll, pitch and yaw, rad; a quaternion has no angles beyond. Rounded ones are accepted.
 ANGLE_LIMITS = (math.pi, math.pi / 2, math.pi)
 ANGLE_TOLERANCE = 0.001
@@ -86,8 +83,7 @@ class Frames:
 
         :raises ValueError: if the message has no known frame, or is not a rotation.
         """
-        q = message.quaternion
-        return Quaternion(q.w, q.x, q.y, q.z).normalized(), self.frame(message.header)
+        return read_quaternion(message.quaternion).normalized(), self.frame(message.header)
 
     def read_angles(self, message: Vector3Stamped) -> tuple[Vector, YawFrame]:
         """
@@ -96,15 +92,11 @@ class Frames:
         :raises ValueError: if the message has no known frame, or an angle is beyond
             :data:`ANGLE_LIMITS`.
         """
-        angles = _vector(message)
+        angles = read_vector(message.vector)
         for axis, angle, limit in zip(AXES, angles, ANGLE_LIMITS, strict=True):
             if abs(angle) > limit + ANGLE_TOLERANCE:
                 raise ValueError(f'{axis} {angle:g} rad is beyond {limit:.4f} rad')
         return angles, self.frame(message.header)
-
-
-def _vector(message: Vector3Stamped) -> Vector:
-    return message.vector.x, message.vector.y, message.vector.z
 
 
 def read_rates(message: Vector3Stamped) -> Vector:
@@ -113,7 +105,7 @@ def read_rates(message: Vector3Stamped) -> Vector:
 
     :raises ValueError: if one is NaN or beyond :data:`RATE_LIMIT`.
     """
-    rates = _vector(message)
+    rates = read_vector(message.vector)
     for axis, rate in zip(AXES, rates, strict=True):
         if not abs(rate) <= RATE_LIMIT:
             raise ValueError(f'{axis} rate {rate:g} rad/s is not within {RATE_LIMIT:.4f} rad/s')
@@ -133,12 +125,6 @@ def read_place(message: NavSatFix, geoid_separation: float) -> Vector:
         raise ValueError('latitude {:g}, longitude {:g}, altitude {:g} is not a place'.format(
             *place))
     return place[0], place[1], place[2] - geoid_separation
-
-
-def quaternion_message(header: Header, rotation: Quaternion) -> QuaternionStamped:
-    """Return the message of a rotation."""
-    return QuaternionStamped(header=header, quaternion=QuaternionMessage(
-        x=rotation.x, y=rotation.y, z=rotation.z, w=rotation.w))
 
 
 def vector_message(header: Header, vector: Vector) -> Vector3Stamped:

@@ -39,6 +39,7 @@ from ...payload.mount_attitude import MountFlags
 from ...payload.rotation import Vector
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
+from ...ros.conversions import quaternion_message
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.link_call import LatestOnly
 from ...ros.parameter_services import ParameterServices
@@ -186,7 +187,7 @@ class GimbalNode:
         if attitude is not None:
             header = Header(stamp=self._clock.now().to_msg(),
                             frame_id=self._frames.name(attitude.frame))
-            publish('attitude', conversions.quaternion_message(header, attitude.rotation))
+            publish('attitude', quaternion_message(header, attitude.rotation))
             publish('angles', conversions.vector_message(header, attitude.rotation.euler()))
             if attitude.rates is not None:
                 publish('angular_velocity', conversions.vector_message(header, attitude.rates))

@@ -23,13 +23,14 @@ import math
 
 from rclpy.node import Node
 
-from .conversions import FRAME_PARAMETERS, GEOID_SEPARATION
+from .conversions import FRAME_PARAMETERS
 from .gimbal_node import GimbalNode
 from ..client import GimbalClient
 from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
 from ..gimbal import GimbalSettings
 from ...payload.request import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
+from ...ros.conversions import GEOID_SEPARATION
 from ...ros.parameters import ignored_parameters, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.throttled_log import NodeLog

@@ -20,13 +20,12 @@ from collections.abc import Hashable, Mapping
 import functools
 import math
 
-from geometry_msgs.msg import Quaternion as QuaternionMessage
 from geometry_msgs.msg import QuaternionStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
-from .conversions import Frames, quaternion_message, read_place
+from .conversions import Frames, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
 from .. import manager as gimbal_manager
 from ..axes import Range
@@ -40,6 +39,7 @@ from ...payload.arbitration import Cause, Policy
 from ...payload.messages import GimbalDeviceAttitudeStatus
 from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
+from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
 from ...ros.diagnostics import ERROR, Finding, LinkSnapshot, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication, STREAM_QOS
@@ -279,23 +279,20 @@ def _control_text(event: RoleHolderChanged, lease: float) -> str:
 
 def _read_imu(message: Imu) -> tuple[Quaternion, float]:
     """Return the attitude and the yaw rate, NED and FRD; ValueError if there is none."""
-    if message.orientation_covariance[0] == -1:
+    orientation = read_orientation(message)
+    if orientation is None:
         raise ValueError('the message has no orientation')
-    return _read_rotation(message.orientation), -_within(
+    return ned_frd(orientation.normalized()), -_within(
         message.angular_velocity.z, VEHICLE_RATE_LIMIT)
 
 
 def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
     """Return attitude, yaw rate and velocity, NED and FRD; the twist has the child's frame."""
-    q, twist = message.pose.pose.orientation, message.twist.twist
-    x, y, z = (_within(value, VEHICLE_SPEED_LIMIT)
-               for value in (twist.linear.x, twist.linear.y, twist.linear.z))
-    velocity = enu_ned(Quaternion(q.w, q.x, q.y, q.z).normalized().rotate((x, y, z)))
-    return _read_rotation(q), -_within(twist.angular.z, VEHICLE_RATE_LIMIT), velocity
-
-
-def _read_rotation(q: QuaternionMessage) -> Quaternion:
-    return ned_frd(Quaternion(q.w, q.x, q.y, q.z).normalized())
+    attitude = read_quaternion(message.pose.pose.orientation).normalized()
+    twist = message.twist.twist
+    x, y, z = (_within(value, VEHICLE_SPEED_LIMIT) for value in read_vector(twist.linear))
+    return (ned_frd(attitude), -_within(twist.angular.z, VEHICLE_RATE_LIMIT),
+            enu_ned(attitude.rotate((x, y, z))))
 
 
 def _within(value: float, limit: float) -> float:

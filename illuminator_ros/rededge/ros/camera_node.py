@@ -22,7 +22,6 @@ import functools
 import logging
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Quaternion as QuaternionMessage
 from geometry_msgs.msg import QuaternionStamped
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header, UInt32
@@ -37,6 +36,7 @@ from ..feeder import FeederSettings, Input, InputChanged, InputState, PositionSo
 from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
 from ...mavlink.command_sender import CommandSender
 from ...payload.rotation import Vector
+from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, NodeInterface, Publication, RequestService, STREAM_QOS
 from ...ros.parameter_services import ParameterServices
@@ -56,8 +56,7 @@ PARAMETERS = (
     ParameterSpec('position_source', 'raw', 'messages that carry the position: GPS_RAW_INT, or '
                   'GLOBAL_POSITION_INT with SYSTEM_TIME',
                   choices=tuple(source.value for source in PositionSource)),
-    ParameterSpec('geoid_separation', 0.0, 'height of mean sea level above the WGS84 ellipsoid',
-                  'm', -120.0, 120.0),
+    GEOID_SEPARATION,
     ParameterSpec('mount_frame', 'camera', 'the camera in ~/mount: x out of the lens and z to the '
                   'top of the image, or z out of the lens',
                   choices=tuple(frame.value for frame in MountFrame)),
@@ -91,7 +90,7 @@ class CameraNode(ServedPayload):
         self._started = host.link.clock()
         if host.link_parameters.address.component == MAV_COMP_ID_CAMERA:
             raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is the id of the camera')
-        self._geoid_is_known = 'geoid_separation' in given_parameters(host.node)
+        self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
         self._interface = NodeInterface(
             host.node, host.link, host.log, publications=(
@@ -193,9 +192,8 @@ class CameraNode(ServedPayload):
         self._interface.publish('image/fix', fix)
         attitude = image_attitude(feedback, settings.mount_frame)
         if attitude is not None:
-            self._interface.publish('image/attitude', QuaternionStamped(
-                header=Header(stamp=stamp, frame_id=EARTH_FRAME), quaternion=QuaternionMessage(
-                    w=attitude.w, x=attitude.x, y=attitude.y, z=attitude.z)))
+            self._interface.publish('image/attitude', quaternion_message(
+                Header(stamp=stamp, frame_id=EARTH_FRAME), attitude))
         self._interface.publish('image/index', feedback.img_idx)
 
     def _look(self, now: float) -> MakeReports:

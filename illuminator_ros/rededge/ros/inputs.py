@@ -22,8 +22,7 @@ import math
 import time
 from typing import Any
 
-from geometry_msgs.msg import Quaternion as QuaternionMessage
-from geometry_msgs.msg import QuaternionStamped, TwistStamped, Vector3
+from geometry_msgs.msg import QuaternionStamped, TwistStamped
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -34,14 +33,13 @@ from ..conversions import Position, standard_deviations
 from ..feeder import Feeder, Input, Stamp, UNKNOWN
 from ...mavlink.link import Link
 from ...payload.rotation import Quaternion, Vector
+from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
 from ...ros.node import AnyCommand, CommandTopic
 
 # s by which the clock must differ from a steady one to have jumped. Simulated time may run fast
 # and in steps.
 JUMP = 0.5
 SIMULATED_JUMP = 5.0
-# The covariance of an Imu message that has no such value begins with this (sensor_msgs/Imu).
-NO_VALUE = -1.0
 
 
 class StampReader:
@@ -78,14 +76,6 @@ class StampReader:
         return Stamp(stamp, (now - stamp) / 1e9, simulated)
 
 
-def _vector(message: Vector3) -> Vector:
-    return message.x, message.y, message.z
-
-
-def _quaternion(message: QuaternionMessage) -> Quaternion:
-    return Quaternion(message.w, message.x, message.y, message.z)
-
-
 def position(message: NavSatFix) -> Position:
     """Return the position, with NaN for deviations that are not known."""
     horizontal = vertical = math.nan
@@ -97,11 +87,9 @@ def position(message: NavSatFix) -> Position:
 
 def orientation_and_rates(message: Imu) -> tuple[Quaternion | None, Vector]:
     """Return orientation and body rates: None and NaN where the message has none."""
-    return (
-        None if message.orientation_covariance[0] == NO_VALUE
-        else _quaternion(message.orientation),
+    return read_orientation(message), (
         UNKNOWN if message.angular_velocity_covariance[0] == NO_VALUE
-        else _vector(message.angular_velocity))
+        else read_vector(message.angular_velocity))
 
 
 def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand]:
@@ -125,14 +113,16 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
 
     return (
         topic(Input.FIX, NavSatFix, lambda one: (position(one),), feeder.take_fix),
-        topic(Input.VELOCITY, TwistStamped, lambda one: (_vector(one.twist.linear),),
+        topic(Input.VELOCITY, TwistStamped, lambda one: (read_vector(one.twist.linear),),
               feeder.take_velocity),
         CommandTopic(Input.SATELLITES.value, UInt32, feeder.take_satellites),
         topic(Input.IMU, Imu, orientation_and_rates, take_attitude(Input.IMU)),
         topic(Input.ATTITUDE, QuaternionStamped,
-              lambda one: (_quaternion(one.quaternion), UNKNOWN), take_attitude(Input.ATTITUDE)),
+              lambda one: (read_quaternion(one.quaternion), UNKNOWN),
+              take_attitude(Input.ATTITUDE)),
         topic(Input.MOUNT, QuaternionStamped,
-              lambda one: (_quaternion(one.quaternion), one.header.frame_id), feeder.take_mount),
+              lambda one: (read_quaternion(one.quaternion), one.header.frame_id),
+              feeder.take_mount),
         topic(Input.TIME_REFERENCE, TimeReference,
               lambda one: (one.time_ref.sec * 1_000_000_000 + one.time_ref.nanosec,),
               take_reference),
