@@ -41,6 +41,7 @@ from .manager_setpoint import (
     mix,
     nudge,
     read_demand,
+    read_roi,
     resolve,
     Setpoint,
     stopped,
@@ -48,7 +49,6 @@ from .manager_setpoint import (
 )
 from .manager_state import ManagerState, StateChanged, StateTracker
 from .messages import (
-    ABSOLUTE_FRAMES,
     AutopilotStateForGimbalDevice,
     Capabilities,
     GimbalCommand,
@@ -62,12 +62,11 @@ from .messages import (
     MAV_TYPE_GIMBAL,
     NO_COMPONENT,
     NON_MAVLINK_IDS,
-    RELATIVE_FRAMES,
 )
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand
-from ..mavlink.command_sender import Command, CommandResult, CommandSender, DEGREE_SCALE
+from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, MavResult
 from ..payload.listeners import Listeners
@@ -104,8 +103,6 @@ IDENTITY_TIME = 3.0
 # s between two reports of one kind, and kinds that have a limit of their own.
 REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
-# A COMMAND_LONG has no frame: PX4 takes its altitude for one above mean sea level, too.
-NO_FRAME = -1
 _ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
@@ -221,7 +218,7 @@ class GimbalManager(Payload):
         self._autopilot_at = self._state_sent_at = -math.inf
         self._limits: dict[object, RateLimit] = {}
         self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
-        self._handlers: dict[int, Callable[[Address, Sequence[float], int, float], MavResult]] = {
+        self._handlers: dict[int, Callable[[Address, AnyCommand, float], MavResult]] = {
             GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
             GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
             GimbalCommand.DO_SET_ROI_LOCATION: self._set_roi,
@@ -288,7 +285,7 @@ class GimbalManager(Payload):
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """See :meth:`Payload.execute`."""
-        params, frame = _params(command)
+        params = command.params
         if command.command == mav.MavCmd.REQUEST_MESSAGE:
             return self._send_requested(params[0], now)
         if command.command == mav.MavCmd.SET_MESSAGE_INTERVAL:
@@ -303,7 +300,7 @@ class GimbalManager(Payload):
         if self.tracker.state is not ManagerState.ACTIVE:
             return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
                     else MavResult.TEMPORARILY_REJECTED)
-        return handler(source, params, frame, now)
+        return handler(source, command, now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -364,11 +361,9 @@ class GimbalManager(Payload):
 
     # Control
 
-    def _configure(
-        self, source: Address, params: Sequence[float], frame: int, now: float,
-    ) -> MavResult:
+    def _configure(self, source: Address, command: AnyCommand, now: float) -> MavResult:
         try:
-            changes = self.control.configure(source, params, now)
+            changes = self.control.configure(source, command.params, now)
         except ValueError:
             return MavResult.DENIED
         if changes is None:
@@ -413,12 +408,11 @@ class GimbalManager(Payload):
         if unreported is not None:
             self.events.emit(DemandRefused(source, reason, unreported))
 
-    def _pitch_yaw(
-        self, source: Address, params: Sequence[float], frame: int, now: float,
-    ) -> MavResult:
+    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> MavResult:
+        *angles_and_rates, flags, _, _ = command.params
         try:
-            pitch, yaw, pitch_rate, yaw_rate = map(math.radians, params[:4])
-            flags = 0 if math.isnan(params[4]) else int(params[4])
+            pitch, yaw, pitch_rate, yaw_rate = map(math.radians, angles_and_rates)
+            flags = 0 if math.isnan(flags) else int(flags)
             demand = Demand.from_pitch_yaw(flags, pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
             return MavResult.DENIED
@@ -522,31 +516,25 @@ class GimbalManager(Payload):
 
     # A region of interest
 
-    def _set_roi(
-        self, source: Address, params: Sequence[float], frame: int, now: float,
-    ) -> MavResult:
+    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> MavResult:
         if self.control.holder(Role.PRIMARY) != source:
             return MavResult.DENIED
-        if frame not in (NO_FRAME, *ABSOLUTE_FRAMES, *RELATIVE_FRAMES):
-            return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
-        scale = 1.0 if frame == NO_FRAME else DEGREE_SCALE
-        latitude, longitude, altitude = params[4] / scale, params[5] / scale, params[6]
-        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
-            return MavResult.DENIED
-        above = self.vehicle.home_altitude if frame in RELATIVE_FRAMES else 0.0
+        read = read_roi(command)
+        if isinstance(read, MavResult):
+            return read
+        place, is_relative = read
+        above = self.vehicle.home_altitude if is_relative else 0.0
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
                 and not self._accepts(YawFrame.EARTH, now)):
             self._report_refusal(
                 source, 'the position or the heading of the vehicle is unknown', now)
             return MavResult.TEMPORARILY_REJECTED
-        self._roi = GeoPoint(latitude, longitude, altitude + above)
+        self._roi = place._replace(altitude=place.altitude + above)
         self._follow(now)
         return MavResult.ACCEPTED
 
-    def _clear_roi(
-        self, source: Address, params: Sequence[float], frame: int, now: float,
-    ) -> MavResult:
+    def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> MavResult:
         if self.control.holder(Role.PRIMARY) != source:
             return MavResult.DENIED
         self._roi = None
@@ -657,15 +645,6 @@ class GimbalManager(Payload):
 def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttitude:
     return GimbalDeviceSetAttitude(
         *device, setpoint.device_flags, setpoint.attitude or UNSET_QUATERNION, *setpoint.rates)
-
-
-def _params(command: AnyCommand) -> tuple[Sequence[float], int]:
-    """Return param1 to param7 of a command, and its MAV_FRAME."""
-    if isinstance(command, mav.CommandInt):
-        return (command.param1, command.param2, command.param3, command.param4, command.x,
-                command.y, command.z), command.frame
-    return (command.param1, command.param2, command.param3, command.param4, command.param5,
-            command.param6, command.param7), NO_FRAME
 
 
 def _ignore(result: CommandResult, now: float) -> None:

@@ -28,13 +28,18 @@ from typing import NamedTuple
 
 from .axes import HAS_AXIS, LEVEL, Range
 from .messages import (
+    ABSOLUTE_FRAMES,
     Capabilities,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
     GimbalManagerSetAttitude,
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
+    RELATIVE_FRAMES,
 )
+from ..mavlink.command_receiver import AnyCommand
+from ..mavlink.command_sender import DEGREE_SCALE
+from ..mavlink.messages import CommandInt, MavResult
 from ..payload.mount_attitude import (
     AXES,
     Components,
@@ -416,6 +421,26 @@ class GeoPoint(NamedTuple):
     latitude: float
     longitude: float
     altitude: float
+
+
+def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | MavResult:
+    """
+    Return the place of MAV_CMD_DO_SET_ROI_LOCATION.
+
+    :return: the place, and whether its altitude is above the home position; the result of the
+        command if it has no place.
+    """
+    *_, latitude, longitude, altitude = command.params
+    is_relative = False
+    # A COMMAND_LONG has no frame: PX4 takes its altitude for one above mean sea level, too.
+    if isinstance(command, CommandInt):
+        is_relative = command.frame in RELATIVE_FRAMES
+        if not is_relative and command.frame not in ABSOLUTE_FRAMES:
+            return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
+        latitude, longitude = latitude / DEGREE_SCALE, longitude / DEGREE_SCALE
+    if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
+        return GeoPoint(latitude, longitude, altitude), is_relative
+    return MavResult.DENIED
 
 
 def direction(origin: GeoPoint, target: GeoPoint) -> tuple[float, float] | None:

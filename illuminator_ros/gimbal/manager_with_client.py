@@ -141,7 +141,7 @@ class ManagerWithClient(Payload):
                       getattr(message, 'target_component', 0))
             if target != self._commands.address:
                 self._commands.send(message)
-            elif isinstance(message, mav.CommandLong | mav.CommandInt):
+            elif isinstance(message, AnyCommand):
                 ack = self._received.take(source, message, now, self._execute)
                 if ack is not None:
                     self._own.acknowledge(source, ack, now)

@@ -23,7 +23,7 @@ MAV_RESULT_DENIED; the angles of secondary control are added to those of primary
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 import math
@@ -31,14 +31,8 @@ from typing import Any, NamedTuple
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
-from .manager_setpoint import direction, GeoPoint, read_demand
-from .messages import (
-    ABSOLUTE_FRAMES,
-    Capabilities,
-    GimbalCommand,
-    NO_COMPONENT,
-    RELATIVE_FRAMES,
-)
+from .manager_setpoint import direction, GeoPoint, read_demand, read_roi
+from .messages import Capabilities, GimbalCommand, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
     GIMBAL_FAULTS,
@@ -48,9 +42,9 @@ from .simulated_device import (
     properties,
     SimulatedMount,
 )
+from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.messages import (
     Address,
-    CommandInt,
     MAV_AUTOPILOT_ARDUPILOTMEGA,
     MAV_COMP_ID_AUTOPILOT1,
     MavResult,
@@ -319,18 +313,16 @@ class SimulatedManager(simulated.SimulatedDevice):
     # Commands
 
     def execute(
-        self, source: Address, command: simulated.AnyCommand, now: float,
+        self, source: Address, command: AnyCommand, now: float,
     ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
-        first = (command.param1, command.param2, command.param3, command.param4)
-        last = ((command.x, command.y, command.z) if isinstance(command, CommandInt)
-                else (command.param5, command.param6, command.param7))
+        *first, flags, _, device_id = command.params
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
-            if not self._is_for_device(last[2]):
+            if not self._is_for_device(device_id):
                 return simulated.CommandReply(MavResult.DENIED)
-            return self._pitchyaw(source, first, last[0], now)
+            return self._pitchyaw(source, first, flags, now)
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
-            if not self._is_for_device(last[2]):
+            if not self._is_for_device(device_id):
                 return simulated.CommandReply(MavResult.DENIED)
             return self._configure(source, first)
         if command.command not in self.changes:
@@ -339,16 +331,18 @@ class SimulatedManager(simulated.SimulatedDevice):
             return simulated.CommandReply(MavResult.DENIED)
         change: simulated.Change = partial(self._clear_roi, now)
         if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
-            place = self._place(command, last)
-            if not isinstance(place, GeoPoint):
-                return simulated.CommandReply(place)
-            change = partial(self._set_roi, place, now)
+            read = read_roi(command)
+            if isinstance(read, MavResult):
+                return simulated.CommandReply(read)
+            place, is_relative = read
+            above = self.properties.position.altitude if is_relative else 0.0
+            change = partial(
+                self._set_roi, place._replace(altitude=place.altitude + above), now)
         allowed = not self.behaviour.enforces_roi or source == self.primary
         return simulated.CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, change)
 
     def _pitchyaw(
-        self, source: Address, values: tuple[float, float, float, float], flags: float,
-        now: float,
+        self, source: Address, values: Sequence[float], flags: float, now: float,
     ) -> simulated.CommandReply:
         pitch, yaw, pitch_rate, yaw_rate = map(math.radians, values)
         if not self.behaviour.rates_in_degrees:
@@ -369,7 +363,7 @@ class SimulatedManager(simulated.SimulatedDevice):
             partial(self._obey, source, complete, now))
 
     def _configure(
-        self, source: Address, values: tuple[float, float, float, float],
+        self, source: Address, values: Sequence[float],
     ) -> simulated.CommandReply:
         behaviour = self.behaviour
         if not all(value % 1 == 0 and -3 <= value <= 255 for value in values):
@@ -380,7 +374,7 @@ class SimulatedManager(simulated.SimulatedDevice):
             self._give_control, primary, secondary if behaviour.has_secondary else NO_COMPONENT))
 
     def _resolved(
-        self, current: Address, values: tuple[float, ...], source: Address,
+        self, current: Address, values: Sequence[float], source: Address,
     ) -> Address:
         """Return the component that the values of CONFIGURE give control to."""
         own = self.properties.gimbal.address if self.behaviour.own_is_manager else source
@@ -397,20 +391,6 @@ class SimulatedManager(simulated.SimulatedDevice):
         self.primary, self.secondary = primary, secondary
 
     # Region of interest
-
-    def _place(
-        self, command: simulated.AnyCommand, last: tuple[float, ...],
-    ) -> GeoPoint | MavResult:
-        latitude, longitude, altitude = last
-        if isinstance(command, CommandInt):
-            latitude, longitude = latitude / 1e7, longitude / 1e7
-            if command.frame in RELATIVE_FRAMES:
-                altitude += self.properties.position.altitude
-            elif command.frame not in ABSOLUTE_FRAMES:
-                return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
-        if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
-            return GeoPoint(latitude, longitude, altitude)
-        return MavResult.DENIED
 
     def _set_roi(self, place: GeoPoint, now: float) -> None:
         self._roi = place

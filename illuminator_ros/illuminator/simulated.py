@@ -36,10 +36,10 @@ from .simulated_properties import (
 )
 from .thermal import ThermalModel, ThermalProperties
 from ..mavlink import messages as mav
+from ..mavlink.command_receiver import AnyCommand
 from ..payload.faults import Behaviour
 from ..payload.identity import Identity
 from ..payload.simulated import (
-    AnyCommand,
     Change,
     CommandReply,
     ConsoleCommand,
@@ -178,8 +178,7 @@ class SimulatedIlluminator(SimulatedDevice):
                 mav.MavResult.ACCEPTED if valid else mav.MavResult.DENIED,
                 partial(self._switch, on))
         if command.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
-            return self._configuration_reply(
-                command.param1, command.param2, command.param3, command.param4)
+            return self._configuration_reply(*command.params[:4])
         return None
 
     def _configuration_reply(

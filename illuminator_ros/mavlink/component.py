@@ -29,8 +29,6 @@ from .frame import Frame
 from .messages import (
     Address,
     CommandAck,
-    CommandInt,
-    CommandLong,
     Heartbeat,
     heartbeat,
     MavResult,
@@ -227,7 +225,7 @@ class Component(Endpoint):
             return
         if isinstance(message, CommandAck):
             self.commands.acknowledge(source, message, now)
-        if isinstance(message, CommandLong | CommandInt):
+        if isinstance(message, AnyCommand):
             self._take_command(source, message, now)
             return
         for payload in self._receivers.get(type(message), ()):

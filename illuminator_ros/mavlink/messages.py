@@ -48,6 +48,8 @@ Char24 = Annotated[bytes, '24s']
 Char32 = Annotated[bytes, '32s']
 UInt8x20 = Annotated[tuple[int, ...], '20B']
 Float4 = Annotated[tuple[float, float, float, float], '4f']
+# param1 to param7 of a command.
+Params = tuple[float, float, float, float, float, float, float]
 _C_NAMES = {'B': 'uint8_t', 'H': 'uint16_t', 'I': 'uint32_t', 'Q': 'uint64_t', 'b': 'int8_t',
             'h': 'int16_t', 'i': 'int32_t', 'f': 'float', 's': 'char'}
 
@@ -294,6 +296,11 @@ class CommandInt(Message):
     y: Int32
     z: Float
 
+    @property
+    def params(self) -> Params:
+        """Return param1 to param7."""
+        return self.param1, self.param2, self.param3, self.param4, self.x, self.y, self.z
+
 
 @define(76, 'COMMAND_LONG')
 @dataclass(slots=True)
@@ -311,6 +318,12 @@ class CommandLong(Message):
     param5: Float
     param6: Float
     param7: Float
+
+    @property
+    def params(self) -> Params:
+        """Return param1 to param7."""
+        return (self.param1, self.param2, self.param3, self.param4, self.param5, self.param6,
+                self.param7)
 
 
 @define(77, 'COMMAND_ACK', extensions=4)

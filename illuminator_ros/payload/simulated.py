@@ -31,6 +31,7 @@ from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
 from .listeners import Listeners
 from .simulated_settings import integer, Setting, Values
 from ..mavlink import messages
+from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import Address, MavResult, Message
@@ -43,7 +44,6 @@ MAX_PEERS = 100
 PROGRESS_INTERVAL = 0.5
 
 Change = Callable[[], None]
-AnyCommand = messages.CommandLong | messages.CommandInt
 T_contra = TypeVar('T_contra', contravariant=True)
 R_co = TypeVar('R_co', covariant=True)
 

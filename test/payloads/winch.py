@@ -27,6 +27,7 @@ from functools import partial
 import math
 
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.command_receiver import AnyCommand
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.payload import request, simulated
@@ -206,7 +207,7 @@ class SimulatedWinch(simulated.SimulatedDevice):
                 if message_id == WinchStatus.id else None)
 
     def execute(
-        self, source: mav.Address, command: simulated.AnyCommand, now: float,
+        self, source: mav.Address, command: AnyCommand, now: float,
     ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
         if command.command != DO_WINCH:
