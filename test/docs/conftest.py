@@ -14,4 +14,4 @@
 
 """The fixtures of the tests that ask a running bridge."""
 
-from support.fixtures import domain, log_routes, ros, shared_bridge  # noqa: F401
+from support.fixtures import domain, log_routes, own_ros, private_home, ros  # noqa: F401

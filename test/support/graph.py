@@ -36,11 +36,7 @@ class Interface:
     clients: dict[str, str]
 
 
-# The last topics of a bridge: publishers and subscriptions are announced separately, in order.
-LAST = ('/diagnostics', '/illuminator/cmd/enable_all')
-
-
-def interface(ros: Ros, node: str = 'illuminator', last: Sequence[str] = LAST) -> Interface:
+def interface(ros: Ros, node: str, last: Sequence[str]) -> Interface:
     """
     Return what a node in the root namespace has.
 

@@ -12,7 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The tables of the documentation."""
+"""The tables of the documentation, and the parameter files."""
+
+from typing import Any
+
+from support.processes import ROOT
+import yaml
 
 
 def table(document: str, first_heading: str) -> list[list[str]]:
@@ -29,4 +34,11 @@ def table(document: str, first_heading: str) -> list[list[str]]:
         if not line.startswith('|'):
             break
         found.append([cell.strip() for cell in line.strip('|').split('|')])
+    return found
+
+
+def parameter_file(name: str) -> dict[str, Any]:
+    """Return the parameters in a file of config/, by its name without the suffix."""
+    content = yaml.safe_load((ROOT / 'config' / f'{name}.yaml').read_text())
+    found: dict[str, Any] = content['/**']['ros__parameters']
     return found

@@ -1,0 +1,79 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The pages about gimbals and the camera: their rules, poses and fields."""
+
+import math
+import re
+
+from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
+from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.rededge.conversions import FIELDS
+import pytest
+from support.processes import ROOT
+from support.tables import table
+
+GIMBAL, REDEDGE = ((ROOT / 'doc' / f'{page}.md').read_text() for page in ('gimbal', 'rededge'))
+TESTS = set(re.findall(r'^def (test_\w+)', '\n'.join(
+    path.read_text() for path in (ROOT / 'test').rglob('test_*.py')), re.MULTILINE))
+
+
+@pytest.mark.parametrize(('page', 'heading'), [
+    (GIMBAL, 'rule'), (GIMBAL, 'rule of the manager'), (REDEDGE, 'requirement')],
+    ids=['gimbal', 'manager', 'camera'])
+def test_each_rule_names_tests_that_exist_and_name_it(page: str, heading: str) -> None:
+    for rules, _, *cells in table(page, heading):
+        named = set(re.findall(r'`(test_\w+)`', ' '.join(cells)))
+        words = '|'.join(rules.lower().replace('-', '_').split(', '))
+        assert named, rules
+        assert named <= TESTS, rules
+        assert all(re.search(f'_({words})(_|$)', name) for name in named), rules
+
+
+def test_the_requirements_on_the_camera_are_numbered_without_a_gap() -> None:
+    assert [row[0] for row in table(REDEDGE, 'requirement')] == [
+        f'RE-{number}' for number in range(1, 31)]
+
+
+def test_the_page_of_the_camera_has_the_table_of_fields() -> None:
+    assert table(REDEDGE, 'message') == [
+        [cls.name, f'`{name}`', field.source, field.unit,
+         '' if field.scale is None else f'{field.scale:g}',
+         f'{field.low:.10g} to {field.high:.10g}',
+         '' if field.unknown is None else str(field.unknown)]
+        for cls, fields in FIELDS.items() for name, field in fields.items()]
+
+
+def numbers(cell: str) -> list[float]:
+    return [float(text) for text in cell.split(',')]
+
+
+def same(text: str, *q: float) -> bool:
+    """Return whether a quaternion of the page is this one, whatever its sign."""
+    return any(numbers(text) == pytest.approx([sign * value for value in q], abs=6e-4)
+               for sign in (1, -1))
+
+
+def test_the_page_of_gimbals_has_each_pose_in_both_conventions() -> None:
+    poses = table(GIMBAL, 'pose')
+
+    assert len(poses) == 6
+    for pose, frame, ros, q_ros, mavlink, q_mavlink in poses:
+        q = Quaternion.from_euler(*map(math.radians, numbers(ros)))
+        components = to_mavlink(q, YawFrame(frame))
+        assert same(q_ros, q.x, q.y, q.z, q.w), pose
+        assert same(q_mavlink, *components), pose
+        angles = Quaternion(*components).euler()
+        assert [math.degrees(one) for one in angles] == pytest.approx(numbers(mavlink)), pose
