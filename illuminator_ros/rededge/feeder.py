@@ -170,36 +170,57 @@ class FeederSnapshot:
                 if all(self.inputs[name].state is not InputState.OK for name in group)]
 
 
-@dataclass
 class _Tracker:
-    timeout: float
-    accepted_at: float = -math.inf
-    refused_at: float = -math.inf
-    refusal: str = ''
-    refused: int = 0
-    reported: InputState = InputState.MISSING
+    """Whether an input is missing, used, stale or refused."""
+
+    def __init__(self, name: Input, timeout: float) -> None:
+        self._name = name
+        self._timeout = timeout
+        self._accepted_at = -math.inf
+        self._refused_at = -math.inf
+        self._refusal = ''
+        self._refused = 0
+        self._reported = InputState.MISSING
+
+    def accept(self, at: float) -> None:
+        self._accepted_at = at
+
+    def refuse(self, reason: str, now: float) -> None:
+        self._refused += 1
+        self._refused_at, self._refusal = now, reason
 
     def state(self, now: float) -> InputState:
-        if now < self.accepted_at + self.timeout:
+        if now < self._accepted_at + self._timeout:
             return InputState.OK
-        if now < self.refused_at + self.timeout:
+        if now < self._refused_at + self._timeout:
             return InputState.REFUSED
-        if max(self.accepted_at, self.refused_at) > -math.inf:
+        if max(self._accepted_at, self._refused_at) > -math.inf:
             return InputState.STALE
         return InputState.MISSING
 
+    def change(self, now: float) -> InputChanged | None:
+        """Return the state if it is not the one that was returned last."""
+        state = self.state(now)
+        if state is self._reported:
+            return None
+        self._reported = state
+        text = {InputState.OK: 'received', InputState.REFUSED: self._refusal}.get(
+            state, f'nothing for {format_seconds(self._timeout)}')
+        return InputChanged(self._name, state, text)
+
     def next_change(self) -> float:
-        """Return when the reported state ends by itself, s."""
-        if self.reported is InputState.OK:
-            return self.accepted_at + self.timeout
-        return self.refused_at + self.timeout if self.reported is InputState.REFUSED else math.inf
+        """Return when the state ends by itself, s."""
+        if self._reported is InputState.OK:
+            return self._accepted_at + self._timeout
+        return (self._refused_at + self._timeout if self._reported is InputState.REFUSED
+                else math.inf)
 
     def snapshot(self, now: float) -> InputSnapshot:
         def age(at: float) -> float | None:
             return now - at if at > -math.inf else None
 
-        return InputSnapshot(self.state(now), age(self.accepted_at), self.refusal,
-                             age(self.refused_at), self.refused)
+        return InputSnapshot(self.state(now), age(self._accepted_at), self._refusal,
+                             age(self._refused_at), self._refused)
 
 
 class _Sample(NamedTuple):
@@ -260,7 +281,7 @@ class Feeder:
         self._send = send
         self._target = target
         self._emit = emit
-        self._inputs = {name: _Tracker(settings.timeout(name)) for name in Input}
+        self._inputs = {name: _Tracker(name, settings.timeout(name)) for name in Input}
         self._fix_time: int | None = None
         self._velocity: Vector | None = None
         self._velocity_time: int | None = None
@@ -496,23 +517,17 @@ class Feeder:
         try:
             take()
         except ValueError as error:
-            tracker.refused += 1
-            tracker.refused_at, tracker.refusal = now, str(error)
+            tracker.refuse(str(error), now)
             accepted = False
         else:
-            tracker.accepted_at, accepted = now - age, True
-        self._report(name, now)
+            tracker.accept(now - age)
+            accepted = True
+        self._report(tracker, now)
         return accepted
 
-    def _report(self, name: Input, now: float) -> None:
-        tracker = self._inputs[name]
-        state = tracker.state(now)
-        if state is tracker.reported:
-            return
-        tracker.reported = state
-        text = {InputState.OK: 'received', InputState.REFUSED: tracker.refusal}.get(
-            state, f'nothing for {format_seconds(tracker.timeout)}')
-        self._emit(InputChanged(name, state, text))
+    def _report(self, tracker: _Tracker, now: float) -> None:
+        if (change := tracker.change(now)) is not None:
+            self._emit(change)
 
     def link_opened(self, now: float) -> None:
         """Send the fixed mount soon."""
@@ -526,9 +541,9 @@ class Feeder:
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        for name, tracker in self._inputs.items():
+        for tracker in self._inputs.values():
             if now >= tracker.next_change():
-                self._report(name, now)
+                self._report(tracker, now)
         if now >= self._mount_due and self._fixed_mount is not None:
             self._send_mount(self._fixed_mount, now)
 
