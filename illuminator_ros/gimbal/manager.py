@@ -626,8 +626,10 @@ class GimbalManager(Payload):
         self.events.emit(change)
 
     def _compare_identity(self, source: Address, message: mav.Heartbeat, now: float) -> None:
-        if source not in (self.control.holder(role) for role in Role):
-            self._identities.pop(source, None)
+        holders = [self.control.holder(role) for role in Role]
+        self._identities = {
+            one: identity for one, identity in self._identities.items() if one in holders}
+        if source not in holders:
             return
         identity = message.type, message.autopilot
         before, at = self._identities.get(source, (identity, now))

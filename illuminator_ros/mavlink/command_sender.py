@@ -355,7 +355,8 @@ class CommandSender:
     :param timeout: s, > 0: the longest wait for the acknowledgement of one try.
     :param retries: resends after the first try, >= 0.
     :ivar outgoing: messages to send, each with the address that sends it.
-    :ivar unanswering: the targets whose last command got no acknowledgement.
+    :ivar unanswering: the targets whose last command got no acknowledgement, at most
+        :data:`MAX_TARGETS`.
     :raises ValueError: if one of the two is out of its range.
     """
 
@@ -364,9 +365,10 @@ class CommandSender:
     retries: int = 3
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
-    unanswering: set[Address] = field(default_factory=set)
+    unanswering: dict[Address, None] = field(default_factory=dict)
     # In the order of sending: the sent request first, then the waiting ones.
     _requests: dict[Address, list[_Request]] = field(default_factory=dict)
+    # In the order of their ends; those that ended more than ACK_LIFETIME ago do not matter.
     _earlier: dict[tuple[Address, int, float], EarlierCommand] = field(default_factory=dict)
     _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
 
@@ -445,7 +447,7 @@ class CommandSender:
         if (ack.target_system not in (0, ours.system)
                 or ack.target_component not in (0, ours.component)):
             return
-        self.unanswering.discard(source)
+        self.unanswering.pop(source, None)
         sent = [request for request in self._requests.get(source, ())
                 if request.command.command == ack.command
                 and request.state is not RequestState.WAITING]
@@ -566,13 +568,18 @@ class CommandSender:
             return
         result = CommandResult(
             status, request.result, request.tries, now - request.first_sent, request.progress,
-            result_param2, self._earlier.get(command.key))
+            result_param2, self._earlier.pop(command.key, None))
         answered = status is CommandStatus.ANSWERED
+        while self._earlier and now > (
+                oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
+            del self._earlier[oldest.command.key]
         self._earlier[command.key] = EarlierCommand(
             command, request.result if answered else None, now, request.tries)
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
-            self.unanswering.add(command.target)
+            self.unanswering[command.target] = None
+            if len(self.unanswering) > MAX_TARGETS:
+                del self.unanswering[next(iter(self.unanswering))]
         late = self._send_next(command.key, now)
         request.done(result, now)
         for other in late:

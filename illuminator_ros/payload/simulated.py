@@ -40,6 +40,8 @@ from ..mavlink.messages import Address, MavResult, Message
 SHORTEST_INTERVAL = 0.01
 # Addresses that are reported as peers.
 MAX_PEERS = 100
+# Messages and actions that a fault delays; further ones are dropped.
+MAX_DELAYED = 1000
 # s between reports of progress.
 PROGRESS_INTERVAL = 0.5
 
@@ -251,6 +253,9 @@ class _Schedule:
         self._entries: list[tuple[float, int, Callable[[float], None]]] = []
         self._order = itertools.count()
 
+    def __len__(self) -> int:
+        return len(self._entries)
+
     def add(self, due: float, action: Callable[[float], None]) -> None:
         heapq.heappush(self._entries, (due, next(self._order), action))
 
@@ -385,10 +390,10 @@ class SimulatedComponent(Generic[D]):
 
     def _after(self, delay: float, action: Callable[[float], None], now: float) -> None:
         """Act after some time, s, or at once."""
-        if delay:
-            self._schedule.add(now + delay, action)
-        else:
+        if not delay:
             action(now)
+        elif len(self._schedule) < MAX_DELAYED:
+            self._schedule.add(now + delay, action)
 
     def _consider(self, source: Address, message: AnyCommand, now: float) -> None:
         """Answer a command at once, or report its progress first."""

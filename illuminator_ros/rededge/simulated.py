@@ -43,6 +43,8 @@ DEFAULT_SYSTEM_ID = 255
 SHORTEST_INTERVAL = 0.05
 # s from an image to its CAMERA_FEEDBACK.
 FEEDBACK_DELAY = 0.2
+# Images that are kept, and those whose CAMERA_FEEDBACK is not sent yet.
+MAX_IMAGES = 1000
 # mm
 FOCAL_LENGTH = 5.4
 # fix_type of GPS_RAW_INT from which the camera takes a position.
@@ -308,7 +310,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     ) -> None:
         super().__init__(RedEdgeBehaviour(validity=validity))
         self.own_gps = own_gps
-        self.images: deque[Image] = deque(maxlen=1000)
+        self.images: deque[Image] = deque(maxlen=MAX_IMAGES)
         self._component = address.component
         self._first_interval = interval
         # Unix time at 0 on the link's clock.
@@ -324,7 +326,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self._mount: Injected[rededge.MountStatus] | None = None
         self._ground: float | None = None
         # The feedback of images, with its time.
-        self._pending: deque[tuple[float, rededge.CameraFeedback]] = deque()
+        self._pending: deque[tuple[float, rededge.CameraFeedback]] = deque(maxlen=MAX_IMAGES)
         self.set_interval(self._first_interval, now)
 
     def set_clock(self, unix_time: float, now: float) -> None:

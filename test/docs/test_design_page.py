@@ -76,3 +76,12 @@ def test_the_bounds_of_stores_are_those_of_the_code() -> None:
 
         assert values, bound
         assert values == [number * unit for number in numbers], bound
+
+
+def test_the_bounds_are_those_of_all_stores() -> None:
+    bounds = {f'{str(path.relative_to(PACKAGE).with_suffix("")).replace("/", ".")}.{constant}'
+              for path in PACKAGE.rglob('*.py') for constant in re.findall(
+                  r'(?:len\(self\._?\w+\) (?:>|>=|<) |maxlen=)(MAX_\w+)', path.read_text())}
+
+    assert len(bounds) > 20
+    assert {one for one in bounds if f'`{one}`' not in PAGE} == set()

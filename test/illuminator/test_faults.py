@@ -19,6 +19,7 @@ from typing import Any
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
 from illuminator_ros.payload.faults import FaultError
+from illuminator_ros.payload.simulated import MAX_DELAYED
 import pytest
 from support.light_bench import LightBench
 
@@ -54,6 +55,14 @@ def test_a_restart_drops_unfinished_commands_and_delayed_messages(fault: str) ->
     bench.sent.clear()
     bench.run(5.0)
     assert (acks(bench), bench.lamp.enabled) == ([], False)
+
+
+def test_commands_that_a_fault_delays_are_bounded() -> None:
+    bench = LightBench('slow=2', status_interval=0.0)
+    for _ in range(MAX_DELAYED + 1):
+        bench.command(*ON)
+    bench.run(3.0)
+    assert len(acks(bench)) == MAX_DELAYED
 
 
 def test_progress_is_reported_until_the_change_and_rejects_a_second_command() -> None:

@@ -21,11 +21,13 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import (
+    ACK_LIFETIME,
     Command,
     CommandResult,
     CommandSender,
     CommandStatus,
     format_seconds,
+    MAX_TARGETS,
     MAX_WAITING,
     Position,
     PROGRESS_TIMEOUT,
@@ -423,16 +425,40 @@ def test_durations_are_in_ms_below_a_second() -> None:
 def test_sender_counts_tries_and_silence_and_names_the_silent_target_until_it_answers() -> None:
     rig = Rig(retries=2)
     rig.ended()
-    assert rig.sender.unanswering == {LIGHT}
+    assert set(rig.sender.unanswering) == {LIGHT}
     for target in (OTHER, LIGHT):
         rig.start(target=target)
-        assert rig.sender.unanswering == {LIGHT}
+        assert set(rig.sender.unanswering) == {LIGHT}
         rig.ack(DENIED, source=target)
     rig.ack(ACCEPTED)
     counters = rig.sender.counters
     assert (counters.sent, counters.resent, counters.unanswered, counters.unexpected_acks) == (
         5, 2, 1, 1)
     assert not rig.sender.unanswering
+
+
+@pytest.mark.parametrize(('pause', 'remembered'), [
+    (ACK_LIFETIME - 2, True), (ACK_LIFETIME, False)])
+def test_an_ended_command_is_remembered_while_its_acknowledgement_may_come(
+        pause: float, remembered: bool) -> None:
+    rig = Rig(timeout=0.5, retries=0)
+    for target in (LIGHT, OTHER):
+        rig.start(target=target)
+        rig.run(1.0)
+        rig.run(pause)
+
+    run = rig.start()
+    rig.ack(ACCEPTED)
+    assert (run.outcome.earlier is not None) is remembered
+
+
+def test_targets_that_do_not_answer_are_bounded() -> None:
+    rig = Rig(retries=0)
+    targets = [Address(system, 1) for system in range(1, MAX_TARGETS + 3)]
+    for target in targets:
+        rig.ended(target=target)
+
+    assert list(rig.sender.unanswering) == targets[2:]
 
 
 def test_callback_may_end_all_other_commands() -> None:

@@ -37,6 +37,7 @@ from illuminator_ros.rededge.simulated import (
     COLUMNS,
     FAULTS,
     Image,
+    MAX_IMAGES,
     Place,
     SIMULATED,
     SimulatedRedEdge,
@@ -308,6 +309,13 @@ def test_fault_shows_after_a_capture(
     camera = Camera(fault)
     camera.tell(control(1))
     assert shown(camera.wait(1.0), camera)
+
+
+def test_feedback_that_waits_is_bounded() -> None:
+    camera = Camera('late')
+    for _ in range(MAX_IMAGES + 2):
+        camera.tell(control(1))
+    assert [one.img_idx for _, one in camera.wait(15.0)] == list(range(3, MAX_IMAGES + 3))
 
 
 @pytest.mark.parametrize(('line', 'effect'), [
