@@ -103,6 +103,7 @@ IDENTITY_TIME = 3.0
 # s between two reports of one kind, and kinds that have a limit of their own.
 REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
+_AHEAD = Quaternion()
 _ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
@@ -141,7 +142,7 @@ class SetpointClipped:
 
 @dataclass(frozen=True)
 class SetpointSent:
-    """The device got a setpoint; ``setpoint`` has everything mixed and clipped."""
+    """A device without MAVLink gets a setpoint, with everything mixed and clipped."""
 
     setpoint: Setpoint
 
@@ -250,8 +251,7 @@ class GimbalManager(Payload):
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, AnySetpoint):
-            if self._is_for_us(message):
-                self._take_setpoint(source, message, now)
+            self._take_setpoint(source, message, now)
         elif isinstance(message, mav.Heartbeat):
             self.control.heard(source, now)
             self._compare_identity(source, message, now)
@@ -388,12 +388,11 @@ class GimbalManager(Payload):
 
     # Setpoints
 
-    def _is_for_us(self, message: AnySetpoint) -> bool:
-        return (message.target_system in (0, self.address.system)
-                and message.target_component in (0, self.address.component)
-                and message.gimbal_device_id in (0, self.tracker.device_id))
-
     def _take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
+        if (message.target_system not in (0, self.address.system)
+                or message.target_component not in (0, self.address.component)
+                or message.gimbal_device_id not in (0, self.tracker.device_id)):
+            return
         try:
             demand = read_demand(message, self.model.ranges)
         except ValueError as error:
@@ -425,10 +424,10 @@ class GimbalManager(Payload):
         """Follow a player's demand; return why it is refused, or ''."""
         if self.tracker.state is not ManagerState.ACTIVE:
             return f'the manager is not active: {self.tracker.state.value}'
-        holder = self.control.holder(Role.PRIMARY)
+        holder = self.control.primary.holder
         if holder == player:
             return self._set(demand, now)
-        if self.control.holder(Role.SECONDARY) == player:
+        if self.control.secondary.holder == player:
             if demand.flags & (MountFlags.RETRACT | MountFlags.NEUTRAL) or not (
                     demand.attitude or any(map(math.isfinite, demand.angles))):
                 return 'secondary control adds angles only'
@@ -440,9 +439,8 @@ class GimbalManager(Payload):
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
             return f'the gimbal does not have {lacking.name}'
-        current = Quaternion() if demand.is_complete else self._pointing(demand.frame, now)
-        if current is None or (
-                not self._accepts(demand.frame, now) and self._heading(now) is None):
+        current = _AHEAD if demand.is_complete else self._pointing(demand.frame, now)
+        if current is None or self._converts(demand.frame, now) and self._heading(now) is None:
             return 'the heading of the vehicle is unknown'
         self._roi = None
         self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
@@ -465,9 +463,12 @@ class GimbalManager(Payload):
             return Quaternion()
         return None if heading is None else turned_by(Quaternion(), heading)
 
-    def _accepts(self, frame: YawFrame, now: float) -> bool:
+    def _converts(self, frame: YawFrame, now: float) -> bool:
+        """Return whether the device needs the other yaw frame."""
+        if frame is YawFrame.VEHICLE:
+            return False
         status = self._device_status(now)
-        return self.model.accepts(frame, status.flags if status else None)
+        return not self.model.accepts_earth_frame(status.flags if status else None)
 
     def _device_status(self, now: float) -> GimbalDeviceAttitudeStatus | None:
         return self._status if now < self._status_at + ATTITUDE_AGE else None
@@ -485,30 +486,36 @@ class GimbalManager(Payload):
         if setpoint is None or self.tracker.state is not ManagerState.ACTIVE:
             self._send_due = math.inf
             return
-        converts = not self._accepts(setpoint.frame, now)
-        follows = any(setpoint.turning) or self._roi is not None or converts
+        converts = self._converts(setpoint.frame, now)
+        # The direction from which the range of the yaw counts.
+        ahead = 0.0 if setpoint.frame is YawFrame.VEHICLE else self._heading(now)
+        attitude = setpoint.at(now)
+        follows = setpoint.turning != STILL or self._roi is not None or converts
         self._send_due = now + (FOLLOW_INTERVAL if follows else HOLD_INTERVAL)
-        attitude, heading = setpoint.at(now), self._heading(now)
         if attitude is not None:
             attitude, clipped = clip(
-                mix(attitude, self._offsets), self.model.ranges,
-                0.0 if setpoint.frame is YawFrame.VEHICLE else heading)
-            self._limits_reached = sum(
-                AT_LIMIT[AXES.index(one.axis)] for one in clipped)
-            if clipped and self._limit('clipped').take(now) is not None:
-                self.events.emit(SetpointClipped(tuple(clipped)))
+                mix(attitude, self._offsets), self.model.ranges, ahead)
+            self._limits_reached = 0
+            if clipped:
+                self._report_clipped(clipped, now)
         sent = setpoint
         if attitude is not setpoint.attitude:
             sent = setpoint._replace(attitude=attitude, turning=STILL)
         if converts:
-            if heading is None:
+            if ahead is None:
                 self._lose('heading', now)
                 return
-            sent = in_vehicle_frame(sent, heading)
-        if self.tracker.device is not None:
-            self._commands.send(_device_message(self.tracker.device, sent))
+            sent = in_vehicle_frame(sent, ahead)
         self._sent = sent
-        self.events.emit(SetpointSent(sent))
+        if self.tracker.device is None:
+            self.events.emit(SetpointSent(sent))
+        else:
+            self._commands.send(_device_message(self.tracker.device, sent))
+
+    def _report_clipped(self, clipped: list[Clipped], now: float) -> None:
+        self._limits_reached = sum(AT_LIMIT[AXES.index(one.axis)] for one in clipped)
+        if self._limit('clipped').take(now) is not None:
+            self.events.emit(SetpointClipped(tuple(clipped)))
 
     def _lose(self, reference: str, now: float) -> None:
         if self._limit(reference).take(now) is not None:
@@ -526,7 +533,7 @@ class GimbalManager(Payload):
         above = self.vehicle.home_altitude if is_relative else 0.0
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
-                and not self._accepts(YawFrame.EARTH, now)):
+                and self._converts(YawFrame.EARTH, now)):
             self._report_refusal(
                 source, 'the position or the heading of the vehicle is unknown', now)
             return MavResult.TEMPORARILY_REJECTED

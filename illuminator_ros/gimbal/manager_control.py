@@ -71,6 +71,8 @@ class ControlArbiter:
 
     Each role is held by at most one player. A player may also give a role that it may have to
     another player.
+
+    :ivar primary: who holds primary control, and ``secondary``; only this class changes them.
     """
 
     def __init__(self, settings: ControlSettings) -> None:
@@ -78,9 +80,10 @@ class ControlArbiter:
             ranks = settings.priority
             return ranks.index(player) if player in ranks else len(ranks)
 
-        self._arbiters = {role: Arbiter(
+        self.primary, self.secondary = (Arbiter(
             settings.policy, rank, lease=settings.lease, overruling=settings.overruling)
-            for role in Role}
+            for _ in Role)
+        self._arbiters = {Role.PRIMARY: self.primary, Role.SECONDARY: self.secondary}
 
     def holder(self, role: Role) -> Address | None:
         """Return the player that has a role, None if none has."""

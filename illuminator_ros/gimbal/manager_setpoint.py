@@ -59,6 +59,8 @@ POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
 _PASSED_BITS = int(POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
                    | MountFlags.RC_MIXED)
 _POSE_BITS = int(POSES)
+_EARTH_BIT, _VEHICLE_BIT = int(YawFrame.EARTH.flag), int(YawFrame.VEHICLE.flag)
+_NO_FLAGS = MountFlags(0)
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
 # The capability that a flag needs.
@@ -117,7 +119,7 @@ class GimbalModel:
 
     def lacks(self, flags: int) -> MountFlags:
         """Return those of the flags that the gimbal cannot follow."""
-        lacking = MountFlags(0)
+        lacking = _NO_FLAGS
         if not flags & _NEEDING:
             return lacking
         for flag, needed in _NEEDED.items():
@@ -125,13 +127,13 @@ class GimbalModel:
                 lacking |= flag
         return lacking
 
-    def accepts(self, frame: YawFrame, reported: int | None) -> bool:
+    def accepts_earth_frame(self, reported: int | None) -> bool:
         """
-        Return whether the gimbal can be given a yaw that is relative to a frame.
+        Return whether the gimbal can be given a yaw that is relative to north.
 
         :param reported: the flags that the device reports now, None if it does not.
         """
-        if frame is YawFrame.VEHICLE or not self.capabilities:
+        if not self.capabilities:
             return True
         if reported is not None and names_frame(reported):
             return bool(reported & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)
@@ -146,7 +148,7 @@ class Demand(NamedTuple):
     :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
     :param rates: of the axes, rad/s; NaN where none is given.
-    :param attitude: replaces the angles, None if none is given.
+    :param attitude: given, or that of the angles if none of them is NaN, else None.
     """
 
     flags: int = 0
@@ -158,13 +160,14 @@ class Demand(NamedTuple):
     @property
     def is_complete(self) -> bool:
         """Whether the attitude that follows depends on nothing else."""
-        return (bool(self.flags & _POSE_BITS) or self.attitude is not None
-                or all(map(math.isfinite, self.angles)))
+        return self.attitude is not None or bool(self.flags & _POSE_BITS)
 
     @property
     def target(self) -> Vector:
-        """Return roll, pitch and yaw of the attitude or the angles, rad; NaN where none is."""
-        return self.angles if self.attitude is None else self.attitude.euler()
+        """Return roll, pitch and yaw of the angles or the attitude, rad; NaN where none is."""
+        if self.attitude is None or not math.isnan(self.angles[0]):
+            return self.angles
+        return self.attitude.euler()
 
     @classmethod
     def _checked(
@@ -175,8 +178,10 @@ class Demand(NamedTuple):
 
         :raises ValueError: if they name both, or a value is infinite.
         """
-        if any(map(math.isinf, angles)) or any(map(math.isinf, rates)):
+        if math.inf in map(abs, (*angles, *rates)):
             raise ValueError('an angle or a rate is infinite')
+        if attitude is None and not math.isnan(sum(angles)):
+            attitude = _from_angles(angles)
         return cls(flags, yaw_frame(flags), angles, rates, attitude)
 
     @classmethod
@@ -270,14 +275,9 @@ class Setpoint(NamedTuple):
         """Whether a flag alone sets the attitude."""
         return bool(self.flags & _POSE_BITS)
 
-    @property
-    def moves(self) -> bool:
-        """Whether the gimbal turns on with it."""
-        return self.attitude is None or any(self.turning)
-
     def at(self, now: float) -> Quaternion | None:
         """Return the attitude at a time."""
-        if self.attitude is None or not any(self.turning):
+        if self.attitude is None or self.turning == STILL:
             return self.attitude
         return _from_angles(_each(
             lambda angle, rate: angle + rate * (now - self.since), self.attitude.euler(),
@@ -291,7 +291,8 @@ class Setpoint(NamedTuple):
     @property
     def device_flags(self) -> int:
         """Return the flags for the device."""
-        return self.flags & _PASSED_BITS | int(self.frame.flag)
+        return self.flags & _PASSED_BITS | (
+            _EARTH_BIT if self.frame is YawFrame.EARTH else _VEHICLE_BIT)
 
 
 def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> Setpoint:
@@ -309,8 +310,6 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
         return Setpoint(flags, frame, demand.attitude, demand.rates, since=now)
     given = [math.isfinite(angle) for angle in demand.angles]
     rates = demand.rates
-    if all(given):
-        return Setpoint(flags, frame, _from_angles(demand.angles), rates, since=now)
     only_rate = [not has_angle and math.isfinite(rate)
                  for has_angle, rate in zip(given, rates, strict=True)]
     if any(only_rate) and not any(given) and not turns:
@@ -343,7 +342,7 @@ def nudge(demand: Demand, limit: float) -> Vector:
 
 def mix(attitude: Quaternion, offsets: Vector) -> Quaternion:
     """Return an attitude with offsets added to its angles."""
-    if not any(offsets):
+    if offsets == STILL:
         return attitude
     return _from_angles(_each(lambda angle, offset: angle + offset, attitude.euler(), offsets))
 

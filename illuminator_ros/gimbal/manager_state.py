@@ -96,6 +96,7 @@ class StateTracker:
     :param changed: takes each change of the state.
     :param draw: returns a random number, 0..1.
     :ivar device: the address of the device, None while none is known.
+    :ivar has_mavlink: whether the device is a MAVLink component.
     :ivar other: the other manager, None if none is heard.
     """
 
@@ -105,6 +106,7 @@ class StateTracker:
     ) -> None:
         self.state = ManagerState.NO_DEVICE
         self.device: Address | None = None
+        self.has_mavlink = device_id not in NON_MAVLINK_IDS
         self.other: Address | None = None
         self._address = address
         self._wanted = device_id
@@ -113,11 +115,6 @@ class StateTracker:
         self._draw = draw
         self._device_heard = self._other_heard = -math.inf
         self._listening_until = math.inf
-
-    @property
-    def has_mavlink(self) -> bool:
-        """Whether the device is a MAVLink component."""
-        return self._wanted not in NON_MAVLINK_IDS
 
     @property
     def device_id(self) -> int:

@@ -196,8 +196,6 @@ class ManagerNode(ServedPayload):
 
     def _publish(self, event: gimbal_manager.SetpointSent) -> None:
         setpoint = event.setpoint
-        if self._manager.tracker.has_mavlink:
-            return
         # Neutral and retracted are the same for a gimbal that has an attitude only.
         attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
         header = Header(stamp=self._clock.now().to_msg(),
