@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 import sys
 import time
 from typing import NoReturn, TYPE_CHECKING, TypeVar
 
 from .entry_point import print_output
+from .. import __version__
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import keyed, TimestampStore
@@ -34,7 +35,26 @@ T = TypeVar('T')
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose error is one line without the usage."""
+    """
+    A parser whose error is one line without the usage.
+
+    Options cannot be abbreviated: scripts with abbreviations would break when an option is added.
+
+    :param prog: the name of the program.
+    :param parents: parsers whose options it has, too.
+    :param is_complete: whether it has ``--help`` and ``--version``.
+    """
+
+    def __init__(
+        self, prog: str, description: str = '', epilog: str = '', *,
+        parents: Sequence[argparse.ArgumentParser] = (), is_complete: bool = True,
+    ) -> None:
+        super().__init__(
+            prog=prog, description=description, epilog=epilog, parents=parents,
+            formatter_class=argparse.RawDescriptionHelpFormatter, add_help=is_complete,
+            allow_abbrev=False)
+        if is_complete:
+            self.add_argument('--version', action='version', version=__version__)
 
     def error(self, message: str) -> NoReturn:
         """See :meth:`argparse.ArgumentParser.error`."""

@@ -127,6 +127,17 @@ def test_help_that_cannot_be_written_is_one_line_with_status_1(
         1, f'{program}: standard output: No space left on device\n')
 
 
+@pytest.mark.parametrize('option', ['--hel', '--versio', '--payl=rededge'])
+@pytest.mark.parametrize('program', ['bridge', 'simulator', 'conformance', 'monitor'])
+def test_an_abbreviated_option_is_refused_with_status_2(program: str, option: str) -> None:
+    outcome = subprocess.run(
+        [sys.executable, '-m', f'illuminator_ros.{program}', option], text=True, timeout=30,
+        env=environment({}), stdin=subprocess.DEVNULL, capture_output=True, cwd=ROOT)
+
+    assert (outcome.returncode, outcome.stdout) == (2, '')
+    assert option in outcome.stderr
+
+
 def test_simulator_needs_no_ros(tmp_path: Path) -> None:
     assert run_without('rclpy', tmp_path, 'simulator', '--version').returncode == 0
 

@@ -45,7 +45,6 @@ from ..options import (
 )
 from ..payloads import PAYLOADS
 from ..termination import SIGNALS
-from ... import __version__
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent
 from ...mavlink.messages import Address
@@ -87,18 +86,16 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, AnyChecks]:
     :param args: the command line without the program's name, by default from ``sys.argv``.
     :raises SystemExit: if an argument is wrong, with status 2.
     """
-    payload = Parser(prog='conformance', add_help=False)
+    payload = Parser('conformance', is_complete=False)
     payload.add_argument(
         '--payload', default=DEFAULT_PAYLOAD, help='the kind of device (default: %(default)s)',
         choices=[one.name for one in PAYLOADS.values() if one.checks])
     checks: AnyChecks = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
     parser = Parser(
-        prog='conformance', formatter_class=argparse.RawDescriptionHelpFormatter, epilog=EPILOG,
-        description=f'Checks whether a {checks.device} follows its MAVLink protocols.',
+        'conformance', f'Checks whether a {checks.device} follows its MAVLink protocols.', EPILOG,
         parents=[payload])
     add = parser.add_argument
     add('url', nargs='?', help='connection URL: UDP, TCP or serial')
-    add('--version', action='version', version=__version__)
     add('--list', action='store_true', help='list the requirements and exit')
     add('--yes', action='store_true', help=f'allow it to {checks.risk}, without asking'.replace(
         '%', '%%'))

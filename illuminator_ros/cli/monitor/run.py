@@ -39,7 +39,6 @@ from .view import plain, screen, ViewState
 from ..entry_point import one_line, print_output
 from ..options import option, Parser
 from ..termination import Termination
-from ... import __version__
 from ...payload.simulated_settings import number
 from ...ros.executor import NodeExecutor
 from ...ros.throttled_log import NodeLog
@@ -95,15 +94,12 @@ class Monitor:
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    made = Parser(
-        prog='monitor', description=DESCRIPTION, epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    made = Parser('monitor', DESCRIPTION, EPILOG)
     made.add_argument('--once', action='store_true', help='print one table and end')
     made.add_argument('--wait', type=option(number(0.1, 3600)), default=6.0, metavar='S',
                       help='longest search for lights before that table, s (default: 6)')
     made.add_argument('--ascii', action='store_true',
                       help='draw with ASCII characters only')
-    made.add_argument('--version', action='version', version=__version__)
     return made
 
 

@@ -23,7 +23,6 @@ from .components import SettingError, Types
 from .console import describe_commands
 from ..options import add_mavlink_version, add_signing, option, Parser
 from ..payloads import PAYLOADS
-from ... import __version__
 from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer
 
@@ -32,7 +31,7 @@ DEFAULT_PAYLOAD = 'illuminator'
 
 def payload_types(args: Iterable[str] | None, payloads: Mapping[str, PayloadType]) -> Types:
     """Return the simulated sides that ``--payload`` names; the other options depend on them."""
-    names = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    names = Parser('simulator', is_complete=False)
     names.add_argument('--payload', default=DEFAULT_PAYLOAD)
     listed = names.parse_known_args(None if args is None else list(args))[0].payload.split(',')
     for name in listed:
@@ -73,14 +72,13 @@ def parser(
     default = types[0].address({})
     profile = "the profile's, mostly " if types[0].profiles else ''
     result = Parser(
-        prog='simulator', formatter_class=argparse.RawDescriptionHelpFormatter,
-        description=f'MAVLink {" and ".join(plurals)} without hardware.\n'
-                    'Without a URL it finds the node that was started without one.',
-        epilog=_epilog(types))
+        'simulator',
+        f'MAVLink {" and ".join(plurals)} without hardware.\n'
+        'Without a URL it finds the node that was started without one.',
+        _epilog(types))
     result.add_argument('url', nargs='?',
                         help='the link to a bridge, router or autopilot: UDP, TCP or serial '
                              f'(default: {types[0].url})')
-    result.add_argument('--version', action='version', version=__version__)
     result.add_argument('--payload', metavar='NAME,...',
                         help=f'what is simulated: {", ".join(payloads)} '
                              f'(default: {DEFAULT_PAYLOAD})')
