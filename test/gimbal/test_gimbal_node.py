@@ -37,13 +37,12 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
 from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped  # noqa: E402
-from rclpy.qos import DurabilityPolicy  # noqa: E402
 from sensor_msgs.msg import NavSatFix  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbals import ALL, FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import ended, Program, python, run  # noqa: E402
+from support.processes import ended, Program, python  # noqa: E402
 from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM  # noqa: E402
 from support.slow import pass_time_until  # noqa: E402
 from support.waiting import eventually  # noqa: E402
@@ -143,15 +142,6 @@ def test_gm_2_attitude_is_flu_and_its_frame_tells_what_yaw_is_relative_to(
     rates.clear()
     angles.wait(count=4)
     assert not rates.messages
-
-
-def test_state_topics_give_late_subscribers_the_last_value(
-        ros: Ros, gimbal: FakeManager) -> None:
-    for name, type_ in (('connected', Bool), ('yaw_lock', Bool), ('in_control', Bool),
-                        ('controller', String)):
-        assert ros.subscribe(type_, f'/gimbal/{name}').wait()
-        [info] = ros.node.get_publishers_info_by_topic(f'/gimbal/{name}')
-        assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
 
 
 def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
@@ -254,17 +244,6 @@ def test_gm_4_attitude_and_angles_are_the_same_setpoint(
 
     assert from_mavlink(sent.q, frame).angle_to(TURNED) == pytest.approx(0, abs=1e-6)
     assert sent.flags & frame.flag
-
-
-def test_angle_that_is_nan_is_left_as_it_is(
-        ros: Ros, gimbal: FakeManager) -> None:
-    take_control(ros, gimbal)
-    publish(ros, 'cmd/angles', Vector3Stamped(header=VEHICLE, vector=Vector3(x=NAN, y=0.1, z=NAN)))
-
-    sent = eventually(lambda: gimbal.received)[0]
-
-    assert from_mavlink(sent.q, YawFrame.VEHICLE).euler() == pytest.approx(
-        (0.0, 0.1, ROS_ANGLES[2]), abs=1e-6)
 
 
 def test_rate_is_sent_and_zero_follows_once_after_the_time_out(
@@ -452,13 +431,3 @@ def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:
             assert not answer.success
             assert answer.message.startswith(
                 'no gimbal connected: no component announces a gimbal: nothing is received')
-
-
-@pytest.mark.parametrize(('parameter', 'text'), [
-    ('earth_frame:=base_link_stabilized', 'two different names'),
-    ('gimbal_device_id:=256', 'out of range'), ('setpoint_timeout:=0', 'out of range')])
-def test_wrong_parameter_is_refused(parameter: str, text: str) -> None:
-    done = run('illuminator_ros.gimbal', '--ros-args', '-p', parameter)
-
-    assert done.returncode == 2
-    assert text in done.stderr

@@ -26,13 +26,10 @@ from unittest.mock import Mock
 from illuminator_ros.gimbal.manager import DemandRefused, GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role, RoleHolderChanged
 from illuminator_ros.gimbal.manager_state import ManagerState, StateChanged
-from illuminator_ros.gimbal.messages import GimbalManagerStatus
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.component import Endpoint, HEARTBEAT_INTERVAL
-from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.component import HEARTBEAT_INTERVAL
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.arbitration import Cause
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 import pytest
@@ -59,6 +56,8 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbal_manager import DEVICE, OURS  # noqa: E402
+from support.gimbals import FakeManager, served_gimbals  # noqa: E402
+from support.live_link import EndpointLink  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program  # noqa: E402
 from support.ros import Ros, start_bridge, STREAM  # noqa: E402
@@ -72,19 +71,9 @@ VEHICLE = Header(frame_id='base_link_stabilized')
 def device(port: int) -> Iterator[SimulatedGimbal]:
     """Serve a simulated gimbal over UDP."""
     gimbal = SimulatedGimbal(GimbalProperties(DEVICE))
-    with served(port, SimulatedComponents([Description(DEVICE, gimbal)], 0.0)):
+    with EndpointLink(f'udpout://127.0.0.1:{port}', SimulatedComponents([
+            Description(DEVICE, gimbal)], 0.0)):
         yield gimbal
-
-
-@contextlib.contextmanager
-def served(port: int, endpoint: Endpoint) -> Iterator[None]:
-    url = f'udpout://127.0.0.1:{port}'
-    link = Link(parse_url(url), endpoint, label=url)
-    link.start()
-    try:
-        yield
-    finally:
-        link.stop()
 
 
 @contextlib.contextmanager
@@ -231,36 +220,11 @@ def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
         assert trigger(own_ros, 'release_control').success
 
 
-class Other(Endpoint):
-    """Another manager of the device."""
-
-    messages = ()
-    sends = (GimbalManagerStatus,)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._due = 0.0
-
-    def link_opened(self, now: float) -> None:
-        self._due = now
-
-    def receive(self, source: Address, message: object, now: float) -> None:
-        raise AssertionError
-
-    def poll(self, now: float) -> None:
-        if now >= self._due:
-            self._due = now + 0.2
-            self.outgoing.append((
-                Address(1, 191), GimbalManagerStatus(0, 0, DEVICE.component, 0, 0, 0, 0)))
-
-    def next_deadline(self) -> float:
-        return self._due
-
-
 @pytest.mark.timeout(180)
 def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:
     port = free_port()
-    with manager(own_ros, port) as program, device(port), served(port, Other()):
+    other = FakeManager(Address(1, 191), device_alive=False)
+    with manager(own_ros, port) as program, device(port), served_gimbals(port, other):
         program.wait_for('[ERROR]')
         program.wait_for('1/191 manages gimbal 1/154 too: this manager is inactive')
         assert report(own_ros, '1/191 manages').level == DiagnosticStatus.ERROR

@@ -12,68 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Invalid arguments end the start with status 2 and one line that says what is wrong."""
+"""Invalid parameters are refused with the reason, and unknown ones are warned about."""
 
-from concurrent.futures import ThreadPoolExecutor
 import math
 from pathlib import Path
 import re
-import subprocess
 from typing import Any, cast
 
 from illuminator_ros.ros.parameters import ignored_sections
 import pytest
 from support.embedded import refusal
 from support.ports import free_port
-from support.processes import run
 from support.ros import Ros, running_bridge
 import yaml
 
-# The arguments behind --ros-args, and the content of the line; KEYS is a folder of bad files.
-COMMAND_LINES = {
-    ('-p', 'brightness:=.nan'): 'parameter brightness nan is not a finite number',
-    ('-p', 'mode:=disco'): "mode 'disco' is none of internal_control, external_sync",
-    ('-p', 'connection_url:=http://x'):
-        "parameter connection_url: connection URL 'http://x': unknown scheme 'http'",
-    ('-p', 'names:=[belly]'): "parameter names: 'belly' is not of the form 1/244=belly",
-    ('-p', 'mavlink_version:=1'):
-        'parameter mavlink_version: 1, but illuminator needs 2; a link sends one version',
-    ('-p', 'signing_mode:=require', '-p', 'signing_key_file:=KEYS/open'):
-        'can be read by others (mode 0644); make it private: chmod 600 KEYS/open',
-    ('--params-file', '/nonexistent.yaml'): "params file: '--params-file /nonexistent.yaml'",
-    ('--params-file', 'KEYS/broken.yaml'): 'KEYS/broken.yaml',
-    ('-p', 'brightness'): "Couldn't parse parameter override rule: '-p brightness'",
-    ('-r', '__node:=spot', '-p', 'names:=["1/244=spot"]'):
-        "parameter names: '1/244=spot' is the name of the first node",
-    ('-r', '__node:=1st'): "Couldn't parse remap rule: '-r __node:=1st'",
-    ('--banana',): "wrong ROS arguments: ['--banana']",
-    ('-p', 'use_sim_time:=maybe'): "Trying to set parameter 'use_sim_time' to 'maybe'",
-}
 NUMBER, INTEGER, STRING, BOOLEAN = (
     rf'is (no|not an?) {kind}' for kind in ('number', 'integer', 'string', 'boolean'))
-
-
-def test_invalid_command_line_ends_the_start_with_status_2_and_one_line(
-    domain: int, tmp_path: Path,
-) -> None:
-    (tmp_path / 'open').write_text('a long passphrase')
-    (tmp_path / 'open').chmod(0o644)
-    (tmp_path / 'broken.yaml').write_text('illuminator: [')
-
-    def start(arguments: tuple[str, ...]) -> subprocess.CompletedProcess[str]:
-        return run('illuminator_ros.bridge', '--ros-args',
-                   *(argument.replace('KEYS', str(tmp_path)) for argument in arguments),
-                   env={'ROS_DOMAIN_ID': str(domain)})
-
-    with ThreadPoolExecutor(2) as pool:
-        outcomes = list(pool.map(start, COMMAND_LINES))
-
-    for outcome, (arguments, text) in zip(outcomes, COMMAND_LINES.items(), strict=True):
-        # rcl may warn before.
-        [line] = [line for line in outcome.stderr.splitlines() if not line.startswith('[WARN]')]
-        assert line.startswith('bridge: '), arguments
-        assert text.replace('KEYS', str(tmp_path)) in line, arguments
-        assert (outcome.returncode, outcome.stdout) == (2, ''), arguments
 
 
 @pytest.mark.parametrize(('given', 'reason'), [

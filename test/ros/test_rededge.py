@@ -272,25 +272,6 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
         eventually(lambda: 'PINGs without a reply: the camera does not hear us' in newest())
 
 
-@pytest.mark.parametrize(('arguments', 'text'), [
-    ('udpin:nowhere', "connection URL 'udpin:nowhere'"),
-    ('-p mavlink_version:=2', 'parameter mavlink_version: 2, but rededge needs 1'),
-    ('-p payloads:=[rededge,illuminator]',
-     'parameter mavlink_version: 1, but rededge needs 1, illuminator needs 2'),
-    ('-p component_id:=100', 'parameter component_id: 100 is the id of the camera'),
-    ('-p mount_pitch:=200', 'mount_pitch: 200.0 degrees is out of range: -180 to 180 degrees'),
-    ('-p mount_frame:=lens', "mount_frame: 'lens' is not one of camera, optical"),
-    ('-p signing_mode:=sign', 'parameter signing_key_file: no key file is given')])
-def test_a_wrong_start_is_refused_in_one_line(ros: Ros, arguments: str, text: str) -> None:
-    given = arguments.split()
-    outcome = run(MODULE, *(['--ros-args'] if given[0] == '-p' else []), *given,
-                  env={'ROS_DOMAIN_ID': str(ros.domain)})
-    [line] = [line for line in outcome.stderr.splitlines() if not line.startswith('[')]
-    assert line.startswith('rededge: ')
-    assert text in line
-    assert outcome.returncode == 2
-
-
 def test_help_names_the_device_and_its_own_defaults() -> None:
     shown = ' '.join(run(MODULE, '--help').stdout.split())
     assert 'usage: rededge ' in shown

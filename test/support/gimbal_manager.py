@@ -44,7 +44,7 @@ from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.rotation import Quaternion
 
 OURS, DEVICE, AUTOPILOT = mav.Address(1, 194), mav.Address(1, 154), mav.Address(1, 1)
-PILOT, GUEST, OWNER = mav.Address(255, 190), mav.Address(255, 191), mav.Address(1, 191)
+PILOT, GUEST = mav.Address(255, 190), mav.Address(255, 191)
 NAN = float('nan')
 FULL = (Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL | Capabilities.HAS_ROLL_AXIS
         | Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK

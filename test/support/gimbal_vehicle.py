@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-import contextlib
 import math
 from typing import Any
 
@@ -26,9 +24,7 @@ from illuminator_ros.gimbal.manager_control import ControlSettings
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint, HeartbeatTimer
-from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address, CommandAck, Message
-from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from support.gimbal_manager import AUTOPILOT, DEVICE, OURS
@@ -124,18 +120,3 @@ def managed_vehicle(
     device = SimulatedGimbal(GimbalProperties(DEVICE))
     devices = SimulatedComponents([Description(DEVICE, device)], now)
     return manager, device, Vehicle(Component(commands, [manager]), Autopilot(), devices)
-
-
-@contextlib.contextmanager
-def managed_gimbal(
-    port: int, control: ControlSettings | None = None, **settings: Any,
-) -> Iterator[tuple[GimbalManager, SimulatedGimbal, Vehicle]]:
-    """Serve such a vehicle to UDP peers."""
-    url = f'udpin://127.0.0.1:{port}'
-    manager, device, vehicle = managed_vehicle(control or ControlSettings(), 0.0, **settings)
-    link = Link(parse_url(url), vehicle, label=url)
-    link.start()
-    try:
-        yield manager, device, vehicle
-    finally:
-        link.stop()

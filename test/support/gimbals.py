@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-import contextlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 from typing import Any, TypeVar
@@ -30,10 +29,10 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.request import Result
+from support.live_link import EndpointLink
 
 OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (194, 1, 154, 195))
 NAN = math.nan
@@ -267,18 +266,11 @@ class GimbalEndpoint(Endpoint):
         return self._due
 
 
-@contextlib.contextmanager
 def served_gimbals(
     port: int, *managers: FakeManager, link: type[Link] = Link,
-) -> Iterator[None]:
+) -> EndpointLink[GimbalEndpoint]:
     """Serve fake managers over UDP, by the clock of this machine unless the link has another."""
-    url = f'udpout://127.0.0.1:{port}'
-    serving = link(parse_url(url), GimbalEndpoint(managers), label=url)
-    serving.start()
-    try:
-        yield
-    finally:
-        serving.stop()
+    return EndpointLink(f'udpout://127.0.0.1:{port}', GimbalEndpoint(managers), kind=link)
 
 
 def keys(rig: Rig) -> Sequence[GimbalKey]:

@@ -185,14 +185,6 @@ class ServedLight:
         """Send an acknowledgement of its own accord."""
         self.send(CommandAck(command, result, progress, 0, 0, 0), source)
 
-    def lose_frames(self, count: int) -> None:
-        """Have the next frame look as if ``count`` before it had been lost."""
-        def act(now: float) -> None:
-            assert self._link is not None
-            sequences = self._link._writer.sequences
-            sequences[self.fake.source] = (sequences.get(self.fake.source, 0) + count) & 0xFF
-        self.do(act)
-
     def release(self, command: int) -> None:
         """Take now what ``delays`` has held back, and hold back no more."""
         def act(now: float) -> None:

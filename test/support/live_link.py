@@ -40,6 +40,7 @@ from support.waiting import eventually, Log, PATIENCE
 BRIDGE = Address(1, 194)
 CONNECTOR = 'mavlink-open'
 E = TypeVar('E', bound=Endpoint)
+L = TypeVar('L', bound='EndpointLink[Any]')
 T = TypeVar('T')
 
 
@@ -87,15 +88,17 @@ class Talker(Endpoint):
 
 class EndpointLink(Generic[E]):
     """
-    A link and its events.
+    A link and its events; as a context it ends with that.
 
     :param on_event: called with each event, after it was noted.
+    :param kind: of the link, such as one that lives by another clock.
     :ivar events: the events that the link has reported.
     """
 
     def __init__(
         self, url: str | Url, endpoint: E, *,
-        on_event: Callable[[LinkEvent], object] = lambda event: None, **options: Any,
+        on_event: Callable[[LinkEvent], object] = lambda event: None, kind: type[Link] = Link,
+        **options: Any,
     ) -> None:
         self.endpoint = endpoint
         self.events: Log[LinkEvent] = Log()
@@ -104,7 +107,7 @@ class EndpointLink(Generic[E]):
             self.events.append(event)
             on_event(event)
 
-        self.link = Link(parse_url(url) if isinstance(url, str) else url, endpoint,
+        self.link = kind(parse_url(url) if isinstance(url, str) else url, endpoint,
                          label=str(url), on_event=note, **options)
         self.link.start()
 
@@ -133,6 +136,12 @@ class EndpointLink(Generic[E]):
     def stop(self) -> None:
         """End it, and wait for its threads."""
         self.link.stop(PATIENCE)
+
+    def __enter__(self: L) -> L:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.stop()
 
 
 class LiveLink(EndpointLink[Talker]):
@@ -183,9 +192,6 @@ class Bridge(EndpointLink[Client]):
         one = light or self.wait_connected()
         self.link.call(lambda now: one.enable(on, now, lambda result, now: results.append(result)))
         return results.wait_for(lambda result: True)
-
-
-L = TypeVar('L', bound=EndpointLink[Any])
 
 
 class Run:

@@ -110,19 +110,6 @@ def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it
         assert (bridge.count(came), bridge.count(went)) == (1, 1)
 
 
-@pytest.mark.parametrize(('arguments', 'line'), [
-    (['-r', '~/enable:=/x', '-r', '~/refresh:=/x'], 'cannot create the node: '),
-    (['-r', '~/enabled:=/x', '-r', '~/mode:=/x'], 'cannot create the node: '),
-    (['-r', f'__node:={"a" * 230}'], 'node name and namespace have 231 characters together'),
-    (['-p', 'payloads:=[kite]'], "parameter payloads: 'kite' is not one of illuminator"),
-])
-def test_wrong_start_is_refused_in_one_line(arguments: list[str], line: str) -> None:
-    bridge = python(BRIDGE, '--ros-args', *arguments)
-
-    assert bridge.wait() == 2
-    assert [text.startswith(f'bridge: {line}') for text in bridge.lines] == [True]
-
-
 def test_directory_for_log_files_that_cannot_be_written_is_named() -> None:
     bridge = python(BRIDGE, env={'ROS_LOG_DIR': '/proc/none'})
 

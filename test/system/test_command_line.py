@@ -16,6 +16,7 @@
 
 from pathlib import Path
 import re
+import shlex
 import subprocess
 import sys
 
@@ -62,12 +63,51 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
         assert (action.option_strings or [action.dest])[-1] in simulator
 
 
+# The arguments of a program, and the content of the line; KEYS is a folder of bad files.
 @pytest.mark.parametrize(('name', 'arguments', 'text'), [
     ('bridge', '--banana', "unknown argument '--banana'; parameters go behind --ros-args"),
     ('bridge', '--ros-args -p brightness:=60 -- udpin://127.0.0.1:1 more', "argument 'more'"),
     ('bridge', 'http://x', "unknown scheme 'http'"),
     ('bridge', 'udpin://127.0.0.1:1 --ros-args -p connection_url:=udpin://127.0.0.1:2',
      "'udpin://127.0.0.1:2', but the argument is 'udpin://127.0.0.1:1': give one of them only"),
+    *(('bridge', f'--ros-args {arguments}', text) for arguments, text in (
+        ('-p brightness:=.nan', 'parameter brightness nan is not a finite number'),
+        ('-p mode:=disco', "mode 'disco' is none of internal_control, external_sync"),
+        ('-p connection_url:=http://x',
+         "parameter connection_url: connection URL 'http://x': unknown scheme 'http'"),
+        ('-p names:=[belly]', "parameter names: 'belly' is not of the form 1/244=belly"),
+        ('-p mavlink_version:=1',
+         'parameter mavlink_version: 1, but illuminator needs 2; a link sends one version'),
+        ('-p payloads:=[kite]', "parameter payloads: 'kite' is not one of illuminator"),
+        ('-p signing_mode:=require -p signing_key_file:=KEYS/open',
+         'can be read by others (mode 0644); make it private: chmod 600 KEYS/open'),
+        ('--params-file /nonexistent.yaml', "params file: '--params-file /nonexistent.yaml'"),
+        ('--params-file KEYS/broken.yaml', 'KEYS/broken.yaml'),
+        ('-p brightness', "Couldn't parse parameter override rule: '-p brightness'"),
+        ("-r __node:=spot -p 'names:=[\"1/244=spot\"]'",
+         "parameter names: '1/244=spot' is the name of the first node"),
+        ('-r __node:=1st', "Couldn't parse remap rule: '-r __node:=1st'"),
+        (f'-r __node:={"a" * 230}', 'node name and namespace have 231 characters together'),
+        ('-r ~/enable:=/x -r ~/refresh:=/x', 'cannot create the node: '),
+        ('-r ~/enabled:=/x -r ~/mode:=/x', 'cannot create the node: '),
+        ('--banana', "wrong ROS arguments: ['--banana']"),
+        ('-p use_sim_time:=maybe', "Trying to set parameter 'use_sim_time' to 'maybe'"))),
+    ('rededge', 'udpin:nowhere', "connection URL 'udpin:nowhere'"),
+    *(('rededge', f'--ros-args -p {arguments}', text) for arguments, text in (
+        ('mavlink_version:=2', 'parameter mavlink_version: 2, but rededge needs 1'),
+        ('payloads:=[rededge,illuminator]',
+         'parameter mavlink_version: 1, but rededge needs 1, illuminator needs 2'),
+        ('component_id:=100', 'parameter component_id: 100 is the id of the camera'),
+        ('mount_pitch:=200', 'mount_pitch: 200.0 degrees is out of range: -180 to 180 degrees'),
+        ('mount_frame:=lens', "mount_frame: 'lens' is not one of camera, optical"),
+        ('signing_mode:=sign', 'parameter signing_key_file: no key file is given'))),
+    *(('gimbal', f'--ros-args -p {arguments}', text) for arguments, text in (
+        ('earth_frame:=base_link_stabilized', 'two different names'),
+        ('gimbal_device_id:=256', 'out of range'), ('setpoint_timeout:=0', 'out of range'))),
+    ('monitor', '--banana', 'unrecognized arguments: --banana'),
+    ('monitor', '--wait 0', 'argument --wait: 0 is outside 0.1 to 3600'),
+    ('monitor', '--ros-args --banana', "wrong ROS arguments: ['--banana']"),
+    ('monitor', '--ros-args -r 1st:=x', "Couldn't parse remap rule: '-r 1st:=x'"),
     ('simulator', '--banana', 'unrecognized arguments: --banana'),
     ('simulator', 'udpin://127.0.0.1:0', 'port 0 is outside 1..65535'),
     ('simulator', '--count 0', 'argument --count: 0 is outside 1 to 200'),
@@ -81,12 +121,19 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',
      "key file '/nonexistent': No such file or directory"),
 ])
-def test_wrong_argument_is_one_line_with_status_2(name: str, arguments: str, text: str) -> None:
-    outcome = run(f'illuminator_ros.{name}', *arguments.split())
+def test_wrong_argument_is_one_line_with_status_2(
+    domain: int, tmp_path: Path, name: str, arguments: str, text: str,
+) -> None:
+    (tmp_path / 'open').write_text('a long passphrase')
+    (tmp_path / 'open').chmod(0o644)
+    (tmp_path / 'broken.yaml').write_text('illuminator: [')
+    outcome = run(f'illuminator_ros.{name}', *shlex.split(
+        arguments.replace('KEYS', str(tmp_path))), env={'ROS_DOMAIN_ID': str(domain)})
 
-    [line] = outcome.stderr.splitlines()
+    # rcl may warn before.
+    [line] = [line for line in outcome.stderr.splitlines() if not line.startswith('[WARN]')]
     assert line.startswith(f'{name}: ')
-    assert text in line
+    assert text.replace('KEYS', str(tmp_path)) in line
     assert (outcome.returncode, outcome.stdout) == (2, '')
 
 

@@ -146,20 +146,3 @@ def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error
         capture_output=True, timeout=60)
 
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (1, '', error)
-
-
-@pytest.mark.parametrize(('arguments', 'text'), [
-    (['--banana'], 'unrecognized arguments: --banana'),
-    (['--wait', '0'], 'argument --wait: 0 is outside 0.1 to 3600'),
-    (['--ros-args', '--banana'], "wrong ROS arguments: ['--banana']"),
-    (['--ros-args', '-r', '1st:=x'], "Couldn't parse remap rule: '-r 1st:=x'"),
-])
-def test_wrong_argument_is_reported_in_one_line(
-    arguments: list[str], text: str,
-) -> None:
-    outcome = run(MONITOR, *arguments)
-
-    [line] = outcome.stderr.splitlines()
-    assert line.startswith('monitor: ')
-    assert text in line
-    assert (outcome.returncode, outcome.stdout) == (2, '')
