@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Our other programs against our gimbal manager: conformance, and the client over a link."""
+"""The checks of conformance against our gimbal manager."""
 
 from __future__ import annotations
 
@@ -20,18 +20,11 @@ from typing import Any
 
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.checks.manager import CHECKS
-from illuminator_ros.gimbal.client import GimbalClient
-from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
-from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Policy
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
 from illuminator_ros.payload.checks.runner import CheckRunner
-from illuminator_ros.payload.mount_attitude import YawFrame
-from illuminator_ros.payload.request import Result
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import OURS
 from support.gimbal_vehicle import managed_vehicle
@@ -62,26 +55,4 @@ def test_the_manager_conforms_with_and_without_a_mavlink_device(
     assert {name for name, verdict in verdicts.items() if verdict is Verdict.FAIL} == set()
     assert {'take', 'one-player', 'set-attitude', 'roi', 'no-control-messages'} <= {
         name for name, verdict in verdicts.items() if verdict is Verdict.PASS}
-    assert manager.control.holder(Role.PRIMARY) is None
-
-
-def test_our_client_takes_control_points_and_releases_over_the_link() -> None:
-    manager, device, vehicle = managed_vehicle(ControlSettings(), START)
-    commands = CommandSender(Address(1, 191))
-    client = GimbalClient(commands, GimbalSettings())
-    link = VirtualLink(Component(commands, [client]), vehicle)
-    link.run(8.0)
-    [gimbal] = client.gimbals.values()
-    results: list[Result] = []
-
-    gimbal.take_control(link.now, lambda result, now: results.append(result))
-    link.run(1.0)
-    assert gimbal.set_attitude(
-        Quaternion.from_euler(0.0, 0.2, 0.0), YawFrame.VEHICLE, link.now) == ''
-    link.run(2.0)
-    assert device.mount.motion.angles[1] == pytest.approx(-0.2, abs=0.01)
-    gimbal.release_control(link.now, lambda result, now: results.append(result))
-    link.run(1.0)
-
-    assert [result.success for result in results] == [True, True]
     assert manager.control.holder(Role.PRIMARY) is None

@@ -21,7 +21,6 @@ import math
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags
 from illuminator_ros.gimbal.simulated_device import (
-    FAULTS,
     GimbalBehaviour,
     GimbalProperties,
     MANAGER_TIMEOUT,
@@ -45,10 +44,8 @@ UNSET = (NAN, NAN, NAN)
 class Bench:
     """A simulated device with a manager; angles in degrees, time as it is told."""
 
-    def __init__(self, *faults: str, announced: bool = True, **settings: object) -> None:
+    def __init__(self, *, announced: bool = True, **settings: object) -> None:
         device: SimulatedGimbal = SIMULATED.make(settings, DEVICE, False)
-        for fault in faults:
-            device.behave(FAULTS.add(device.behaviour, fault), 0.0)
         self.now = 1000.0
         self.endpoint = SimulatedComponents([Description(DEVICE, device)], self.now)
         self.device = device
@@ -274,29 +271,7 @@ def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
     assert not information.cap_flags & (Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK)
 
 
-# Faults, and a person
-
-@pytest.mark.parametrize(('fault', 'source', 'degrees'), [
-    ('obeys-others', Address(255, 190), (0.0, -20.0, 30.0)),
-    ('frozen-axis', MANAGER, (0.0, 0.0, 30.0)),
-    ('frozen-axis=yaw', MANAGER, (0.0, -20.0, 0.0)),
-    ('lie', MANAGER, (0.0, 0.0, 0.0))])
-def test_a_fault_changes_what_moves(
-        fault: str, source: Address, degrees: tuple[float, ...]) -> None:
-    bench = Bench(fault)
-    bench.point(0.0, -20.0, 30.0, source=source)
-    assert bench.angles(2.0) == degrees
-
-
-def test_faults_of_the_status() -> None:
-    stale, silent, nameless, jumping = map(Bench, ('stale-flags', 'no-status', 'no-frame',
-                                                   'jumps=30'))
-    stale.point(flags=MountFlags.NEUTRAL | YawFrame.VEHICLE.flag)
-    assert stale.after(0.1).flags == FOLLOW | YawFrame.VEHICLE.flag
-    assert silent.device.message(GimbalDeviceAttitudeStatus.id, silent.now) is None
-    assert nameless.after(0.1).flags == FOLLOW
-    assert [jumping.angles(0.1)[2] for _ in range(11)] == [0.0] * 9 + [30.0, 0.0]
-
+# A person
 
 def test_a_person_turns_it_and_reads_its_state() -> None:
     bench = Bench(announced=False, manager_id=191)

@@ -20,8 +20,8 @@ import math
 from typing import Any
 
 from illuminator_ros.gimbal import messages as gimbal
-from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags, GimbalCommand
-from illuminator_ros.gimbal.simulated_manager import FAULTS, PROFILES, SIMULATED, SimulatedManager
+from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand
+from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED, SimulatedManager
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.messages import (
     Attitude,
@@ -48,18 +48,14 @@ every_profile = pytest.mark.parametrize('profile', PROFILES)
 class Bench:
     """A simulated gimbal with a manager; angles in degrees."""
 
-    def __init__(self, profile: str = 'reference', *faults: str, taken: bool = True,
-                 **settings: object) -> None:
+    def __init__(self, profile: str = 'reference', **settings: object) -> None:
         settings = {'profile': profile, **settings}
         self.address = SIMULATED.address(settings)
         device: SimulatedManager = SIMULATED.make(settings, self.address, False)
-        for fault in faults:
-            device.behave(FAULTS.add(device.behaviour, fault), 0.0)
         self.now = 1000.0
         self.endpoint = SimulatedComponents([Description(self.address, device)], self.now)
         self.device = device
-        if taken:
-            self.take()
+        self.take()
 
     def command(
         self, command: int, *params: float, source: mav.Address = PLAYER, as_int: bool = False,
@@ -159,26 +155,6 @@ def test_px4_releases_the_component_id_of_a_sender_in_another_system() -> None:
         assert bench.control == control
 
 
-@pytest.mark.parametrize(('profile', 'moved', 'result', 'roi'), [
-    ('reference', False, DENIED, DENIED), ('px4', False, DENIED, ACCEPTED),
-    ('ardupilot', True, ACCEPTED, ACCEPTED)])
-def test_a_component_without_control_moves_it_only_where_the_profile_lets_it(
-        profile: str, moved: bool, result: mav.MavResult, roi: mav.MavResult) -> None:
-    bench = Bench(profile)
-    bench.point(0.0, -20.0, 30.0, source=OTHER)
-    assert bench.angles() == ((0.0, -20.0, 30.0) if moved else (0.0, 0.0, 0.0))
-    assert bench.command(PITCHYAW, -10.0, 10.0, NAN, NAN, FOLLOW, source=OTHER) == result
-    assert bench.angles() == ((0.0, -10.0, 10.0) if moved else (0.0, 0.0, 0.0))
-    assert bench.command(ROI, 0, 0, 0, 0, 47.4, 8.55, 488.0, source=OTHER) == roi
-
-
-@every_profile
-def test_while_no_component_has_control_only_ardupilot_obeys(profile: str) -> None:
-    bench = Bench(profile, taken=False)
-    result = bench.command(PITCHYAW, -10.0, 0.0, NAN, NAN, FOLLOW)
-    assert result == (ACCEPTED if profile == 'ardupilot' else DENIED)
-
-
 def test_gm_9_secondary_control_adds_limited_angles() -> None:
     bench = Bench()
     bench.take(PLAYER, OTHER)
@@ -243,25 +219,6 @@ def test_a_locked_yaw_follows_the_attitude_of_the_vehicle(profile: str) -> None:
     assert math.degrees(bench.device.mount.motion.angles[2]) == pytest.approx(10.0)
 
 
-@pytest.mark.parametrize(('profile', 'shown'), [
-    ('reference', FOLLOW | MountFlags.NEUTRAL), ('px4', FOLLOW | MountFlags.NEUTRAL),
-    ('ardupilot', FOLLOW)])
-def test_the_status_shows_the_flags_except_of_ardupilot(profile: str, shown: int) -> None:
-    bench = Bench(profile)
-    bench.point(0.0, -30.0, 0.0, flags=FOLLOW | MountFlags.NEUTRAL)
-    assert bench.message(gimbal.GimbalManagerStatus).flags == shown
-    assert bench.angles() == (0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize(('profile', 'flags'), [
-    ('reference', ErrorFlags.AT_PITCH_LIMIT), ('ardupilot', 0)])
-def test_ardupilot_reports_no_failures(profile: str, flags: int) -> None:
-    bench = Bench(profile)
-    bench.point(0.0, 60.0, 0.0)
-    assert bench.angles() == (0.0, 45.0, 0.0)
-    assert bench.message(GimbalDeviceAttitudeStatus).failure_flags == flags
-
-
 @every_profile
 def test_gm_28_a_message_for_another_device_is_ignored_except_by_px4(profile: str) -> None:
     bench = Bench(profile)
@@ -316,24 +273,7 @@ def test_a_place_that_does_not_exist_is_refused(
     assert Bench().command(ROI, *params, as_int=True, frame=frame) == result
 
 
-# Faults and people
-
-@pytest.mark.parametrize(('fault', 'control', 'pitch'), [
-    ('stale-control', (0, 0, 0, 0), -20.0), ('lie', (0, 0, 0, 0), 0.0),
-    ('refuse', (0, 0, 0, 0), 0.0), ('frozen-axis', (1, 195, 0, 0), 0.0)])
-def test_a_fault_changes_what_is_reported_or_done(
-        fault: str, control: tuple[int, ...], pitch: float) -> None:
-    bench = Bench('reference', fault)
-    bench.point(0.0, -20.0, 0.0)
-    assert bench.control == control
-    assert bench.angles()[1] == pitch
-
-
-def test_a_gimbal_without_status_sends_none() -> None:
-    bench = Bench('reference', 'no-status')
-    assert bench.message(gimbal.GimbalManagerStatus) is None
-    assert bench.message(GimbalDeviceAttitudeStatus) is None
-
+# People
 
 @pytest.mark.parametrize('flags', [NAN, math.inf, 96.0])
 def test_impossible_flags_are_denied(flags: float) -> None:

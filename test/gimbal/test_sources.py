@@ -58,31 +58,6 @@ def asked(rig: Rig, since: float = 0.0) -> set[str]:
             if abs(from_mavlink(one.q, VEHICLE).euler()[2] - yaw) < 0.01}
 
 
-def test_a_setpoint_of_a_lower_source_is_refused_and_not_sent() -> None:
-    rig = shared()
-
-    refusals = [point(rig, source) for source in ('operator', 'autonomy', 'default')]
-    rig.run(1.0)
-
-    assert refusals == ['', 'held by operator', 'held by operator']
-    assert asked(rig) == {'operator'}
-
-
-def test_a_higher_source_takes_the_gimbal_at_once() -> None:
-    rig = shared()
-    point(rig, 'autonomy')
-    rig.run(0.1)
-
-    assert point(rig, 'safety') == ''
-    taken_at = rig.now
-    rig.run(1.0)
-
-    assert asked(rig, taken_at) == {'safety'}
-    assert [one.change for one in rig.all_of(GimbalHeld)] == [
-        HolderChanged(None, 'autonomy', Cause.CLAIM),
-        HolderChanged('autonomy', 'safety', Cause.CLAIM)]
-
-
 # How safety's hold ends.
 ENDS: dict[Cause, Callable[[Rig], object]] = {
     Cause.RELEASE: lambda rig: rig.gimbal.release('safety', rig.now),

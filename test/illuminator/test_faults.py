@@ -101,16 +101,6 @@ def test_the_same_seed_gives_the_same_faults(fault: str) -> None:
     assert run(1) == run(1) != run(2)
 
 
-@pytest.mark.parametrize('name', FAULTS)
-def test_each_fault_changes_the_behaviour_and_is_listed_until_it_is_removed(name: str) -> None:
-    faulty = FAULTS.add(NORMAL, name)
-    assert FAULTS.active(faulty, NORMAL) == [name]
-    (typed,) = FAULTS.as_typed(faulty, NORMAL)
-    assert FAULTS.add(NORMAL, typed) == faulty
-    assert FAULTS.remove(faulty, NORMAL, name) == NORMAL
-    assert sum(line.startswith(f'  {name}') for line in FAULTS.describe().splitlines()) >= 1
-
-
 @pytest.mark.parametrize(('text', 'reason'), [
     ('nope', "no fault 'nope'; there are silence, reboot"), ('', "no fault ''"),
     ('lie=1', 'lie takes no value'), ('drop=2', "'drop=2': 2 is outside 0.001 to 1"),

@@ -67,21 +67,6 @@ def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
         + b'n' * 31 + b'\0')
 
 
-def test_a_heartbeat_of_type_illuminator_is_sent_at_1_hz_from_the_start() -> None:
-    beats = [m for m in LightBench().run(4.5) if isinstance(m, mav.Heartbeat)]
-    assert {(m.type, m.autopilot) for m in beats} == {(mav.MavType.ILLUMINATOR, 8)}
-    assert len(beats) == 5
-
-
-@pytest.mark.parametrize(('microseconds', 'expected'), [
-    (250_000, 8), (2_000_000, 1), (0, 2), (-1, 0), (1, 200)])
-def test_the_interval_of_the_status_can_be_set_within_what_the_light_offers(
-    bench: LightBench, microseconds: float, expected: float,
-) -> None:
-    assert bench.result(SET_INTERVAL, STATUS_ID, microseconds) == ACCEPTED
-    assert len(statuses(bench.run(2.001))) == expected
-
-
 @pytest.mark.parametrize(('target', 'enabled'), [((1, 244), [False, True]), ((0, 0), [True] * 2)])
 def test_lights_on_one_link_obey_only_their_own_commands(
     target: tuple[int, int], enabled: list[bool],

@@ -108,13 +108,6 @@ class Camera:
         return self.device.images[-1]
 
 
-def test_heartbeat_has_the_contents_of_real_cameras_re_7() -> None:
-    camera = Camera()
-    camera.endpoint.poll(START)
-
-    assert camera.sent() == [(Address(255, 100), Heartbeat(0, 1, 2, 3, 4, 3))]
-
-
 def test_camera_has_the_system_id_of_the_host_that_it_heard_last_re_8() -> None:
     camera = Camera()
     camera.tell(heartbeat(18))
@@ -125,27 +118,10 @@ def test_camera_has_the_system_id_of_the_host_that_it_heard_last_re_8() -> None:
     assert camera.endpoint.components[0].address == Address(255, 100)
 
 
-@pytest.mark.parametrize('sequence', [0, 1, 2 ** 32 - 1])
-def test_ping_is_answered_to_its_sender_with_its_sequence_number_re_11(sequence: int) -> None:
-    assert Camera().tell(Ping(5, sequence, 0, 0)) == [
-        (Address(7, 100), Ping(5, sequence, *HOST))]
-
-
 @pytest.mark.parametrize('message', [
     Ping(5, 1, 7, 100), Ping(5, 1, 7, 1), CommandLong(7, 100, 512, 0, 0, 0, 0, 0, 0, 0, 0)])
 def test_answers_and_commands_are_not_answered(message: Message) -> None:
     assert Camera().tell(message) == []
-
-
-@pytest.mark.parametrize(('component', 'system', 'taken'), [
-    (100, 7, 1), (100, 200, 1), (0, 0, 1), (0, 200, 1), (1, 7, 0), (101, 0, 0)])
-def test_target_component_selects_the_camera_and_target_system_is_ignored_re_5(
-        component: int, system: int, taken: int) -> None:
-    camera = Camera()
-    camera.tell(control(1, component, system))
-    camera.tell(MountStatus(system, component, 100, 0, 0))
-    assert len(camera.device.images) == taken
-    assert camera.image().mount_source is (Source.INJECTED if taken else Source.NONE)
 
 
 def test_capture_is_followed_by_camera_status_and_later_by_camera_feedback() -> None:
@@ -174,13 +150,6 @@ def test_img_idx_counts_images_by_mavlink_only() -> None:
     assert [(one.image, one.img_idx, one.trigger, one.shot) for one in camera.device.images] == [
         (1, None, 'interval', 'survey'), (2, None, 'interval', 'survey'),
         (3, 1, 'mavlink', 'survey'), (4, 2, 'mavlink', 'panel')]
-
-
-@pytest.mark.parametrize('shot', [0, 3, 255])
-def test_other_values_of_shot_take_no_image(shot: int) -> None:
-    camera = Camera()
-    assert camera.tell(control(shot)) == []
-    assert not camera.device.images
 
 
 def test_image_has_the_injected_values_and_their_ages() -> None:
@@ -276,39 +245,6 @@ def test_images_at_an_interval_have_its_times_and_what_was_known_then() -> None:
 
     [image] = camera.device.images
     assert (image.time_utc_s, image.position_source) == (OWN_UTC + 1.0, Source.OWN)
-
-
-@pytest.mark.parametrize(('fault', 'ask', 'answers'), [
-    ('other-ping', Ping(0, 1, 0, 0), [(Address(7, 101), Ping(0, 1, *HOST))]),
-    ('ping-sequence', Ping(0, 2 ** 32 - 1, 0, 0), [(Address(7, 100), Ping(0, 0, *HOST))]),
-    ('ping-target', Ping(0, 1, 0, 0), [(Address(7, 100), Ping(0, 1, 0, 0))]),
-    ('fixed-system', Ping(0, 1, 0, 0), [(Address(255, 100), Ping(0, 1, *HOST))]),
-    ('slow', Ping(0, 1, 0, 0), []),
-    ('silence', Ping(0, 1, 0, 0), []),
-    ('no-status', control(1), []),
-    ('fixed-system', control(1), []),
-])
-def test_fault_changes_the_answer(
-        fault: str, ask: Message, answers: list[tuple[Address, Message]]) -> None:
-    assert Camera(fault).tell(ask) == answers
-
-
-@pytest.mark.parametrize(('fault', 'shown'), [
-    ('no-feedback', lambda sent, camera: not sent),
-    ('late', lambda sent, camera: not sent and len(camera.wait(15.0)) == 1),
-    ('same-index', lambda sent, camera: sent[0][1].img_idx == 0),
-    ('extension', lambda sent, camera: sent[0][1].base_size == 47),
-    ('any-shot', lambda sent, camera: camera.tell(control(77))),
-    ('no-panel', lambda sent, camera: not camera.tell(control(2))),
-    ('no-injection', lambda sent, camera: camera.image(FIX).position_source is Source.OWN),
-    ('stale', lambda sent, camera:
-        camera.image(FIX, wait=60.0).position_source is Source.INJECTED),
-])
-def test_fault_shows_after_a_capture(
-        fault: str, shown: Callable[[list[tuple[Address, Any]], Camera], object]) -> None:
-    camera = Camera(fault)
-    camera.tell(control(1))
-    assert shown(camera.wait(1.0), camera)
 
 
 def test_feedback_that_waits_is_bounded() -> None:

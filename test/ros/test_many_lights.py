@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Several lights on one link: a node for each, and none waits for another."""
+"""Several lights on one link: a node for each, none waits for another, and all at once."""
 
 from collections.abc import Iterator
 import contextlib
@@ -20,7 +20,7 @@ import contextlib
 import pytest
 from rclpy.node import NodeNameNonExistentError
 from std_msgs.msg import Bool, Float32
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 from support.light import Address, eventually, MavResult, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
@@ -145,3 +145,44 @@ def test_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
     pass_time_until(lambda: refreshed.answered, step=0.1)
     assert refreshed.result().success
     assert group[0].count('is served by') == served
+
+
+def enable_all(ros: Ros, on: bool = True) -> SetBool.Response:
+    answer: SetBool.Response = ros.call(
+        SetBool, '/illuminator/enable_all', SetBool.Request(data=on))
+    return answer
+
+
+def are_on(lights: Group) -> dict[str, bool]:
+    return {node: bool(light.fake.fields['enable']) for node, light in lights.items()}
+
+
+def test_one_request_switches_all_lights_and_names_each(ros: Ros, lights: Group) -> None:
+    response = enable_all(ros)
+
+    assert (response.success, set(are_on(lights).values())) == (True, {True})
+    summary, *outcomes = response.message.split('; ')
+    assert summary == '3 of 3 on'
+    assert {outcome.partition(': ')[0] for outcome in outcomes} == {
+        f'{node[1:]} ({address})' for node, address in NODES.items()}
+    assert enable_all(ros, on=False).success
+    assert set(are_on(lights).values()) == {False}
+
+
+def test_topic_switches_all_lights_and_a_failure_is_logged(
+    ros: Ros, group: tuple[Program, Group], lights: Group,
+) -> None:
+    lights['/belly'].fake.results[ON_OFF] = MavResult.DENIED
+
+    ros.publish(Bool, '/illuminator/cmd/enable_all', True)
+
+    eventually(lambda: are_on(lights) == {node: node != '/belly' for node in NODES})
+    pass_time_until(lambda: group[0].count('~/cmd/enable_all: 2 of 3 on; '), step=0.1)
+
+
+def test_request_to_all_fails_while_no_light_is_connected(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port):
+        response = enable_all(own_ros)
+
+    assert not response.success
+    assert response.message.startswith('no light connected: ')
