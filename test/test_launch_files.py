@@ -102,6 +102,21 @@ def test_executables_are_installed(launch: ET.Element) -> None:
 
 
 @EVERY
+def test_packages_of_others_are_looked_for_before_anything_is_started(launch: ET.Element) -> None:
+    # Launch ends at a package that is missing, and leaves the programs running before it.
+    found: set[str] = set()
+    started = [*launch.iter('node'), *(
+        node for include in launch.findall('include')
+        for node in FILES[Path(include.attrib['file']).name].iter('node'))]
+    for element in launch:
+        if element.tag in ('node', 'executable', 'include'):
+            break
+        found |= set(re.findall(r'find-pkg-prefix (\w+)', element.attrib.get('value', '')))
+
+    assert {node.attrib['pkg'] for node in started} <= {OURS, *found}
+
+
+@EVERY
 def test_named_file_is_installed(launch: ET.Element) -> None:
     for text in texts(launch):
         text = text.replace(f'$(find-pkg-share {OURS})', str(ROOT))
