@@ -76,7 +76,6 @@ class Delayed(FakeLight):
         super().__init__(stream=0.1)
         self.boot = None
         self._late: list[tuple[float, Any]] = []
-        self._now = 0.0
 
     def status(self, now: float) -> Any:
         self._late.append((now, super().status(now)))
@@ -166,11 +165,6 @@ def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
         LIGHT, CommandAck(ON_OFF, MavResult.DENIED, 0, 0, *BRIDGE), faked.now)
     fake.fields['enable'] = 1
     assert faked.wait_for(answer).success
-
-
-# Off overtakes
-
-# Restarts
 
 
 # Events

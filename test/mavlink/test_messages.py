@@ -18,31 +18,15 @@ from __future__ import annotations
 
 from dataclasses import asdict
 import struct
-from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
 from illuminator_ros.illuminator.messages import STATUS_ID
-from illuminator_ros.mavlink import messages
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.crc_extra import DIALECT
 from pymavlink.dialects.v20 import ardupilotmega, common
 import pytest
 from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
-from support.reference_dialect import fields_of, reference, twin
 
 each_message = pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda one: one.name)
-
-
-@each_message
-def test_definition_is_that_of_the_generator(message: mav.Message) -> None:
-    generated = reference().mavlink_map[message.id]
-
-    assert (message.name, message.crc_extra, message.codec.size) == (
-        generated.msgname, generated.crc_extra, generated.unpacker.size)
-    assert mav.LAYOUTS[message.id] == (generated.crc_extra, generated.unpacker.size)
-    assert mav.encode_payload(message) == twin(message).unpacker.pack(
-        *(fields_of(twin(message))[name] for name in generated.ordered_fieldnames))
 
 
 def test_status_and_information_lie_on_the_wire_as_specified() -> None:
@@ -65,19 +49,6 @@ def test_cut_zeros_and_unknown_extensions_change_no_known_field(message: mav.Mes
     assert not mav.encode_payload(mav.decode_payload(type(message), b'')).strip(b'\0')
 
 
-@given(st.binary(max_size=255), st.sampled_from(EVERY_MESSAGE))
-def test_any_payload_decodes_to_the_fields_that_the_generator_reads(
-        payload: bytes, message: mav.Message) -> None:
-    generated = reference().mavlink_map[message.id]
-    values = generated.unpacker.unpack(
-        payload[:message.codec.size].ljust(message.codec.size, b'\0'))
-
-    read = asdict(mav.decode_payload(type(message), payload))  # type: ignore[call-overload]
-
-    assert repr(read) == repr(dict(zip(
-        generated.fieldnames, (values[i] for i in generated.orders), strict=True)))
-
-
 def test_mavlink_1_acknowledgement_has_neither_progress_nor_target() -> None:
     assert mav.CommandAck.base_size == 3
     assert mav.decode_payload(mav.CommandAck, struct.pack('<HB', 405, 4)) == mav.CommandAck(405, 4)
@@ -93,17 +64,6 @@ def test_frames_of_all_messages_of_pymavlink_can_be_checked() -> None:
     known = ardupilotmega.mavlink_map
     assert {id_: (known[id_].crc_extra, known[id_].unpacker.size) for id_ in DIALECT} == DIALECT
     assert {*common.mavlink_map, STATUS_ID} <= {*mav.LAYOUTS}
-
-
-@pytest.mark.parametrize(('enum', 'prefix'), [
-    (mav.MavCmd, 'MAV_CMD'), (mav.MavResult, 'MAV_RESULT'), (mav.MavType, 'MAV_TYPE')])
-def test_numbers_are_those_of_pymavlink(enum: Any, prefix: str) -> None:
-    missing = {entry.name for entry in enum if not hasattr(common, f'{prefix}_{entry.name}')}
-
-    assert missing <= {'CANCELLED', 'COMMAND_UNSUPPORTED_MAV_FRAME', 'NOT_IN_CONTROL'}
-    for entry in enum:
-        assert getattr(common, f'{prefix}_{entry.name}', entry) == entry
-    assert messages.MAV_COMP_ID_ILLUMINATOR == common.MAV_COMP_ID_ILLUMINATOR
 
 
 def test_every_result_has_a_name_of_its_own() -> None:

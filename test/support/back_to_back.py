@@ -116,7 +116,7 @@ class Pair:
 
     def _take(self, event: AnyLightEvent) -> None:
         if isinstance(event, LightFound):
-            self.recorders[event.address] = Recorder(lambda: self.now)
+            self.recorders[event.address] = Recorder()
             self._on_light(self.controller.lights[event.address])
         else:
             self.recorders[event.address](event)

@@ -74,7 +74,6 @@ class FakeLight(Endpoint):
         self.boot: float | None = 0.0
         self.identity = Identity('maker', 'torch', '1.2', '3', 'T-1')
         self.fields = {**DEFAULT_STATUS, **fields}
-        self.carried_out: list[Any] = []
         self.silent = False
         self._status_due = 0.0
         self._to_apply: list[tuple[float, Any]] = []
@@ -104,7 +103,6 @@ class FakeLight(Endpoint):
         target = source if self.targeted else (0, 0)
         self.send(mav.CommandAck(message.command, result, 0, 0, *target))
         if result == mav.MavResult.ACCEPTED:
-            self.carried_out.append(message)
             self._carry_out(message, now)
 
     def _result(self, command: int) -> int | None:

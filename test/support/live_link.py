@@ -60,7 +60,6 @@ class Talker(Endpoint):
         self.heartbeat = HeartbeatTimer(BRIDGE, 18)
         self.heard: Log[tuple[Address, Any]] = Log()
         self.greetings: Log[float] = Log()
-        self.closings: Log[float] = Log()
         self.turns = 0
 
     def link_opened(self, now: float) -> None:
@@ -69,7 +68,6 @@ class Talker(Endpoint):
 
     def link_closed(self, now: float, reason: str) -> None:
         self.heartbeat.due = math.inf
-        self.closings.append(now)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         self.heard.append((source, message))

@@ -29,8 +29,6 @@ from support.ros import Ros
 from support.slow import CLOCK
 from support.waiting import PATIENCE
 
-# Cursor movements and colours.
-
 
 class Watching:
     """A monitor that looks at the domain of a ROS client, by the slow clock."""

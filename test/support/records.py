@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
 from typing import Any
@@ -29,21 +28,14 @@ from illuminator_ros.payload.request import Result
 
 @dataclass
 class Recorder:
-    """
-    Keeps the events of a light.
+    """Keeps the events of a light."""
 
-    :ivar changed_at: when each of the changes was told, s; ``failed_at`` of the setpoints.
-    """
-
-    clock: Callable[[], float]
     events: list[str] = field(default_factory=list)
     statuses: list[Status] = field(default_factory=list)
     identities: list[Identity] = field(default_factory=list)
     changes: list[tuple[light_events.Cause, dict[str, Any]]] = field(default_factory=list)
     restorations: list[tuple[bool, str]] = field(default_factory=list)
-    changed_at: list[float] = field(default_factory=list)
     failed_setpoints: list[str] = field(default_factory=list)
-    failed_at: list[float] = field(default_factory=list)
     others: list[light_events.AnyLightEvent] = field(default_factory=list)
 
     def __call__(self, event: light_events.AnyLightEvent) -> None:
@@ -59,13 +51,11 @@ class Recorder:
             case light_events.StatusReceived():
                 self.statuses.append(event.status)
             case light_events.ConfigurationChanged():
-                self.changed_at.append(self.clock())
                 self.changes.append((event.cause, {
                     name: getattr(event.configuration, name) for name in event.names}))
             case light_events.ConfigurationRestored():
                 self.restorations.append((event.success, event.message))
             case light_events.SetpointFailed():
-                self.failed_at.append(self.clock())
                 self.failed_setpoints.append(event.message)
             case _:
                 self.others.append(event)

@@ -15,8 +15,8 @@
 """
 pymavlink's generator as an oracle.
 
-It makes a dialect module from the definitions below, which has what pymavlink's wheels lack: a
-parser and an encoder, none of them ours, that know the illuminator's messages.
+It makes classes of the definitions below, which pymavlink's wheels lack, for their own parser and
+encoder.
 """
 
 from __future__ import annotations
@@ -31,20 +31,11 @@ import tempfile
 from typing import Any
 
 from illuminator_ros.mavlink.messages import Address
+from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.generator import mavgen
 
 # Message id, name and fields, in the order of common.xml; a bar before the extension fields.
 DEFINITIONS = {
-    0: ('HEARTBEAT', 'uint8_t type, uint8_t autopilot, uint8_t base_mode, uint32_t custom_mode, '
-        'uint8_t system_status, uint8_t_mavlink_version mavlink_version'),
-    75: ('COMMAND_INT', 'uint8_t target_system, uint8_t target_component, uint8_t frame, '
-         'uint16_t command, uint8_t current, uint8_t autocontinue, float param1, float param2, '
-         'float param3, float param4, int32_t x, int32_t y, float z'),
-    76: ('COMMAND_LONG', 'uint8_t target_system, uint8_t target_component, uint16_t command, '
-         'uint8_t confirmation, float param1, float param2, float param3, float param4, '
-         'float param5, float param6, float param7'),
-    77: ('COMMAND_ACK', 'uint16_t command, uint8_t result, |, uint8_t progress, '
-         'int32_t result_param2, uint8_t target_system, uint8_t target_component'),
     396: ('COMPONENT_INFORMATION_BASIC', 'uint32_t time_boot_ms, uint64_t capabilities, '
           'uint32_t time_manufacture_s, char[32] vendor_name, char[32] model_name, '
           'char[24] software_version, char[24] hardware_version, char[32] serial_number'),
@@ -59,28 +50,32 @@ LIGHT = Address(1, 243)
 
 @cache
 def reference() -> Any:
-    """Return the generated module."""
+    """Return a copy of pymavlink's dialect that has the generated messages, too."""
+    dialect = _load(Path(ardupilotmega.__file__))
     with tempfile.TemporaryDirectory() as directory:
-        definitions, module = Path(directory, 'definitions.xml'), Path(directory, 'reference.py')
+        definitions, module = Path(directory, 'definitions.xml'), Path(directory, 'generated.py')
         definitions.write_text(_xml())
         options = mavgen.Opts(
             str(module), wire_protocol='2.0', language='Python3', validate=False)
         with contextlib.redirect_stdout(io.StringIO()):
             assert mavgen.mavgen(options, [str(definitions)])
-        spec = importlib.util.spec_from_file_location('reference', module)
-        assert spec is not None
-        assert spec.loader is not None
-        loaded = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(loaded)
+        dialect.mavlink_map |= _load(module).mavlink_map
+    return dialect
+
+
+def _load(path: Path) -> Any:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
     return loaded
 
 
 def _xml() -> str:
     def field(definition: str) -> str:
-        if definition == '|':
-            return '<extensions/>'
-        type_, name = definition.split(' ')
-        return f'<field type="{type_}" name="{name}">-</field>'
+        return '<extensions/>' if definition == '|' else (
+            '<field type="{}" name="{}">-</field>'.format(*definition.split()))
 
     messages = ''.join(
         f'<message id="{id_}" name="{name}"><description>-</description>'
