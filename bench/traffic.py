@@ -37,7 +37,7 @@ COMMON = ('ATTITUDE',) * 5 + ('GLOBAL_POSITION_INT',) * 5 + ('VFR_HUD',) * 3 + (
     'LOCAL_POSITION_NED', 'BATTERY_STATUS', 'VIBRATION', 'NAV_CONTROLLER_OUTPUT', 'SYSTEM_TIME')
 # One of them is a heartbeat, which comes once a second.
 HEARTBEAT_EVERY = 512
-# Messages of its own dialect, which other software knows nothing of.
+# Messages of its own dialect, which other software does not have.
 ARDUPILOT = ('AHRS', 'EKF_STATUS_REPORT')
 # Bytes that may wait in a UDP socket while it is kept busy; less than any system grants.
 FULL = 60_000

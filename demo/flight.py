@@ -216,7 +216,7 @@ def fly(flight: Flight, images: Path, directory: Path) -> Comparison:
     try:
         with running(directory / 'node.log', *node):
             if not camera.heard.wait(START_TIMEOUT):
-                raise TimeoutError('the camera does not hear the node rededge')
+                raise TimeoutError('the camera does not receive from the node rededge')
             with running(directory / 'robot.log', *robot) as process:
                 assert process.stdout is not None
                 if not (line := process.stdout.readline()):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An ordinary ROS client: it knows the node's names and standard types, nothing else."""
+"""An ordinary ROS client: it uses the node's names and standard types, nothing else."""
 
 from __future__ import annotations
 

@@ -180,7 +180,7 @@ def _serve(
     if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or _log_directory_refusal():
         return executable.refuse(refusal)
     _limit_memory()
-    # On a terminal rcutils colours its lines; it sees a pipe in its place.
+    # On a terminal rcutils colours its lines; its stderr is a pipe.
     if termination.is_terminal:
         os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
     # rclpy has an exception of its own for each thing that can be wrong with an argument.

@@ -79,10 +79,10 @@ def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n'
     """
     Print texts, so that a reader at the other end of a pipe sees them immediately.
 
-    A reader that closes a pipe wants no more.
+    A pipe that its reader has closed is not an error.
 
     :param complain: takes the reason why they cannot be written, once.
-    :return: whether they were written, or are not wanted.
+    :return: whether they were written, or the reader has closed the pipe.
     """
     try:
         print(*texts, sep='\n', end=end, flush=True)

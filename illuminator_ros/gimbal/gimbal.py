@@ -161,7 +161,7 @@ class _Setpoint:
 
 class Gimbal:
     """
-    One gimbal device, as a component that may control it sees it; for the link's thread.
+    One gimbal device, for a component that may control it; for the link's thread.
 
     Its first manager that is heard is used. Every change needs primary control, as
     GIMBAL_MANAGER_STATUS shows it.

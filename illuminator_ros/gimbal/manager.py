@@ -228,7 +228,7 @@ class GimbalManager(Payload):
     # Snapshots
 
     def status(self, now: float) -> GimbalManagerStatus:
-        """Return the message that tells who is in control."""
+        """Return the message with the players in control."""
         setpoint, device = self._setpoint, self._device_status(now)
         flags = 0 if setpoint is None else setpoint.device_flags
         accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
@@ -376,7 +376,7 @@ class GimbalManager(Payload):
             if change.role is Role.SECONDARY:
                 self._offsets = STILL
             else:
-                # The gimbal stays where it points until the next player says more.
+                # The gimbal stays where it points until the next player sends a setpoint.
                 self._roi = None
                 self._setpoint = self._setpoint and stopped(self._setpoint, now)
                 self._send(now)

@@ -45,7 +45,7 @@ class ManagerWithClient(Payload):
     """
     A manager, and the client that ROS uses.
 
-    :ivar client: knows the gimbal of the manager, and no other.
+    :ivar client: has the gimbal of the manager, and no other.
     """
 
     messages = (*GimbalManager.messages, mav.CommandAck)

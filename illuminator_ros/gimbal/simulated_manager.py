@@ -72,7 +72,7 @@ class ManagerBehaviour(GimbalBehaviour):
 
     :param enforces_roi: whether a region of interest needs control, too.
     :param frozen_control: whether its status shows the control of the start.
-    :param has_secondary: whether it knows secondary control.
+    :param has_secondary: whether it has secondary control.
     :param own_is_manager: whether -2 in CONFIGURE is the manager itself, not the sender.
     :param releases_pairs: whether -3 in CONFIGURE needs system and component id of the sender.
     :param invalid_configure: result of CONFIGURE with values that do not exist.
@@ -83,7 +83,7 @@ class ManagerBehaviour(GimbalBehaviour):
     :param partial_angles: result of PITCHYAW with the angle of one axis, which then changes
         nothing; None where the axes are independent.
     :param angles_with_rates: whether messages may have angles and rates.
-    :param frame_is_lock: whether YAW_LOCK alone tells the frame of a yaw.
+    :param frame_is_lock: whether YAW_LOCK alone selects the frame of a yaw.
     :param shows_flags: whether its status has the flags of the setpoint.
     """
 
@@ -123,7 +123,7 @@ PROFILES = {
     'reference': Profile('follows the protocol, and enforces control'),
     # input_mavlink.cpp and output_rc.cpp of src/modules/gimbal.
     'px4': Profile(
-        'PX4 with a gimbal on its outputs: enforces primary control, knows no secondary control '
+        'PX4 with a gimbal on its outputs: enforces primary control, has no secondary control '
         'and no device ids, -2 is PX4 itself, -3 compares system and component id separately, '
         'PITCHYAW takes rates in rad/s, no SET_PITCHYAW, regions of interest from any component',
         ManagerBehaviour(

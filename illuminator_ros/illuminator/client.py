@@ -47,11 +47,11 @@ class IlluminatorClient(Payload):
     commanded it.
 
     :param commands: the command sender of the component that carries this payload.
-    :param wanted: tells whether a light at an address is of interest; others are ignored.
+    :param wanted: returns whether a light at an address is of interest; others are ignored.
     :param needs_mounts: whether the messages for :attr:`mounts` are received.
     :ivar events: the events of all lights.
     :ivar mounts: the directions of gimbals.
-    :ivar mount_moved: tells the system id of a mount that has sent its attitude.
+    :ivar mount_moved: takes the system id of each mount that sends its attitude.
     """
 
     def __init__(

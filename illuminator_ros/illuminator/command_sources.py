@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The sources of the commands to one light: which of them holds it, and what each wants."""
+"""The sources of the commands to one light: which of them holds it, and what each requests."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One light as the drone sees it."""
+"""One light, as its messages describe it."""
 
 from __future__ import annotations
 

@@ -112,8 +112,8 @@ class Limits:
     """
     The strobe periods that a light reports to be possible, s.
 
-    As sent, so they may be anything: see :attr:`known`. Both 0 means that it does not say: ArduSub
-    sends zeros for what it does not know.
+    As sent, so they may be anything: see :attr:`known`. Both 0 are no information: ArduSub
+    sends zeros for what it does not measure.
     """
 
     min_strobe_period: float = 0.0
@@ -121,7 +121,7 @@ class Limits:
 
     @property
     def known(self) -> bool:
-        """Whether the light says anything of use."""
+        """Whether the light reports them."""
         low, high = self.min_strobe_period, self.max_strobe_period
         return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
 
@@ -294,7 +294,7 @@ class Status:
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.
     :param temperature: degC, as sent: 0 may mean "not measured".
-    :param gimbal_device_id: of the gimbal that it is on, 0 if it tells none.
+    :param gimbal_device_id: of the gimbal that it is on, 0 if it reports none.
     """
 
     uptime_ms: int
@@ -385,7 +385,7 @@ def unexpected_differences(
     :param step: whether the light's own rounding is passed over.
     """
     names = confirmed.differences(reported, step=step)
-    # A light that does not say which mode it is in does not contradict.
+    # A status without a mode does not contradict.
     if reported.mode is Mode.UNKNOWN or step and confirmed.mode is Mode.UNKNOWN:
         names = [name for name in names if name != 'mode']
     if flags & DIMMING_FLAGS and reported.brightness < confirmed.brightness:

@@ -145,7 +145,7 @@ class SendingTimes:
         """
         Return the latest time at which a status that has just come can have been sent, s.
 
-        The second value tells whether the uptimes show that. Where the light has no clock, or
+        The second value is whether the uptimes show that. Where the light has no clock, or
         there is nothing to compare with, the status counts as sent when it came.
         """
         if self._last is not None:

@@ -74,7 +74,7 @@ class ThermalModel:
 
     @property
     def flags(self) -> ErrorFlag:
-        """Return the error flags of its report: without a sensor it knows no heat."""
+        """Return the error flags of its report: without a sensor it reports no heat."""
         return ErrorFlag.THERMISTOR_FAILURE if self.sensor_failed else self._flags
 
     @property

@@ -67,7 +67,7 @@ class Endpoint(ABC):
     @abstractmethod
     def link_opened(self, now: float) -> None:
         """
-        Note that messages can be sent, or that a new peer may hear us.
+        Note that messages can be sent, or that a new peer may receive them.
 
         The link repeats the call while it hears no peer.
         """

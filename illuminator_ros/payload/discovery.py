@@ -42,7 +42,7 @@ FORGET_AFTER = 60.0
 
 
 class Device(Protocol):
-    """A device as the discovery sees it."""
+    """A device, for the discovery."""
 
     @property
     def address(self) -> Address:
@@ -74,7 +74,7 @@ class Discovery(Generic[D]):
     :param commands: ends the commands to a device that is dropped.
     :param found: called when a device is announced.
     :param forgotten: called when an announced device was dropped.
-    :param wanted: tells whether a device at an address is of interest; others are ignored.
+    :param wanted: returns whether a device at an address is of interest; others are ignored.
     :ivar devices: the announced devices, by address, in the order of their announcement.
     :ivar ignored: the first devices that are not wanted, by address.
     :ivar limit_reached: whether more than :data:`MAX_DEVICES` have been heard.

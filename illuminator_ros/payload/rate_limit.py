@@ -22,7 +22,7 @@ class RepeatLimit:
     """
     Limits how often a change by another sender is undone.
 
-    Two programs that both insist would otherwise make a light flash.
+    Two programs that both repeat their command would otherwise make a light flash.
 
     :param times: how often in a row; a row ends after :attr:`row_time` s without a change.
     :param interval: s between two of a row.

@@ -155,7 +155,7 @@ class Bridge:
         self.pool.join(deadline)
         for payload in self._payloads:
             payload.close()
-        # At once, so that other nodes notice the end.
+        # At once, so that other nodes learn of the end.
         for node in self.nodes:
             node.destroy_node()
 

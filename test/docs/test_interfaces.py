@@ -54,7 +54,7 @@ NUMBERS = {'boolean', 'float', 'double', 'uint32'}
 SHOWN = {'brightness', 'temperature', 'connected', 'enabled', 'error_flags'}
 SOURCES = ('safety', 'operator', 'autonomy')
 OF_EVERY_NODE = re.compile('parameter|logger|type_description|rosout|/clock$')
-# What no operator needs, and what an operator has as every node does.
+# Services that an operator does not need, and topics that each node has.
 INTERNAL = {'get_logger_levels', 'set_logger_levels', 'get_type_description'}
 OF_OPERATOR = {'/clock', '/parameter_events', '/rosout'}
 QOS = {'state': (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),

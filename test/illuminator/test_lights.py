@@ -129,7 +129,7 @@ def test_a_light_without_a_clock_may_have_restarted_whichever_message_comes_firs
     (0.0, {}, 22, 27),
     # Each request is tried four times.
     (0.0, {REQUEST: None}, 60, 108),
-], ids=['it streams', 'it does not', 'it knows no requests'])
+], ids=['it streams', 'it does not', 'it has no requests'])
 def test_a_light_that_sends_no_status_is_asked_for_one_at_a_limited_rate(
     stream: float, results: dict[int, Any], least: int, most: int,
 ) -> None:

@@ -269,7 +269,7 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
             node.wait_for('~/fix: latitude of ~/fix: nan deg is outside -90 to 90 deg')
         eventually(lambda: '~/imu: nothing for' in newest())
         camera.answers = False
-        eventually(lambda: 'PINGs without a reply: the camera does not hear us' in newest())
+        eventually(lambda: 'PINGs without a reply: the camera does not receive' in newest())
 
 
 def test_help_names_the_device_and_its_own_defaults() -> None:

@@ -33,7 +33,7 @@ from support.processes import ended, python
 from support.waiting import eventually, PATIENCE
 
 HOST = Address(1, 191)
-# Length of the payload by message id, of which MAVLink 1 knows no other.
+# Length of the payload by message id, of which MAVLink 1 has no other.
 LENGTHS = {0: 9, 4: 14, 179: 29, 180: 45}
 
 

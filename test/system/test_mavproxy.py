@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Through MAVProxy, which knows no illuminators, a light is found, commanded and found again."""
+"""A light is found and commanded through MAVProxy, which has no support for illuminators."""
 
 import importlib.util
 from pathlib import Path

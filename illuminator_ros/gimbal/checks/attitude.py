@@ -190,7 +190,7 @@ async def uptime(tester: GimbalTester) -> None:
 @requirement('failures-at-rest', 'reports no failure before the first command', MESSAGES,
              'GIMBAL_DEVICE_ERROR_FLAGS')
 async def failures_at_rest(tester: GimbalTester) -> None:
-    """Read the flags; a device may say that it has no manager."""
+    """Read the flags; a device may report that it has no manager."""
     seen = {one.failure_flags & ~ErrorFlags.NO_MANAGER
             for _, one in tester.session.idle(AttitudeStatus)}
     if flags := [str(flag.name) for flag in ErrorFlags if any(one & flag for one in seen)]:

@@ -149,7 +149,7 @@ async def north_needs_heading(tester: DeviceTester) -> None:
     unknown = [one for _, one in tester.session.idle(AttitudeStatus)
                if math.isnan(one.delta_yaw)]
     if not unknown:
-        raise Skipped('it knows the heading')
+        raise Skipped('its statuses have the heading')
     if any(one.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME for one in unknown):
         raise Failed('it reports ACCEPTS_YAW_IN_EARTH_FRAME, and delta_yaw is NaN')
 

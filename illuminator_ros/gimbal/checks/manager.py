@@ -541,7 +541,7 @@ async def roi(tester: ManagerTester) -> str:
             GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0, *PLACE,
             as_int=True)
         if not one.accepted and tester.vehicle is None:
-            raise Skipped(f'{one.answer}: it may not know where the vehicle is')
+            raise Skipped(f'{one.answer}: the position of the vehicle may be unknown')
         one.expect(accepted=True)
         if tester.vehicle is not None:
             await tester.reach(NORTH)

@@ -120,7 +120,7 @@ class EventPublisher:
                 log.error(f'{light} is not confirmed to be {_state(on)}, which is repeated: '
                           f'{failure}', 'automatic')
             case events.ChangedByOther(change=new, undone=False):
-                log.error(f'{light}: another sender insists on {new}, which stays from now on: '
+                log.error(f'{light}: another sender keeps sending {new}, which stays from now on: '
                           'only one of the two programs must control the light', 'insists')
             case events.ChangedByOther(change=new, left_out=int(left_out)):
                 log.warning(f'{light} was changed by another sender, which is undone: '

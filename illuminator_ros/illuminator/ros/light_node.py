@@ -256,7 +256,7 @@ class LightNode:
         light = self._light()
         snapshot = light.snapshot(now) if light else None
         if snapshot is not None and snapshot.identity_is_settled:
-            # A light that tells its serial number late keeps the id it had.
+            # A light that sends its serial number late keeps the id it had.
             self._hardware_id = self._hardware_id or hardware_id(snapshot)
         return functools.partial(
             reports, light=snapshot, heard=self._heard(), hardware_id=self._hardware_id,

@@ -240,7 +240,7 @@ SocketName = tuple[str, int] | tuple[str, int, int, int]
 
 def resolve(address: HostPort, kind: socket.SocketKind) -> list[tuple[int, SocketName]]:
     """
-    Return families and socket addresses; IPv4 first, since most MAVLink programs know only that.
+    Return families and socket addresses; IPv4 first, since most MAVLink programs have no other.
 
     :param address: an empty host means all IPv4 interfaces.
     :raises OSError: if the name cannot be resolved.

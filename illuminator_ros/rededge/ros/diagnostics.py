@@ -69,7 +69,7 @@ def camera_findings(camera: CameraSnapshot) -> list[Finding]:
                                 'camera a link of its own'))
     if camera.is_unresponsive:
         findings.append((WARN, f'{camera.unanswered_pings} PINGs without a reply: the camera does '
-                               'not hear us; check the line to it'))
+                               'not receive our messages; check the line to it'))
     return findings
 
 
