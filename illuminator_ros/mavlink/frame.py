@@ -26,6 +26,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import re
+import struct
 from typing import cast
 
 from fastcrc.crc16 import mcrf4xx
@@ -43,6 +44,9 @@ MAX_ID_V1 = 255
 MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
 STARTS = (b'\xfd', b'\xfe')
+# STX, payload length, incompatibility and compatibility flags, sequence number, system id,
+# component id, and message id in two parts.
+_HEADER_V2 = struct.Struct('<BBBBBBBHB').unpack_from
 _START = re.compile(b'[\xfd\xfe]')
 
 
@@ -126,25 +130,26 @@ class Decoder:
     in ``layouts`` cannot be checked and are never returned.
 
     :ivar taken: the bytes taken, which are the position in the stream.
+    :ivar rest: the beginning of a frame whose rest is awaited.
     """
 
     layouts: Mapping[int, Layout] = field(default_factory=lambda: LAYOUTS)
     counters: DecoderCounters = field(default_factory=DecoderCounters)
     taken: int = 0
-    _rest: bytes = b''
+    rest: bytes = b''
     # How much of the rest may be the signature of the frame before.
     _signature_end: int = 0
 
     @property
     def incomplete(self) -> int | None:
         """Where in the stream the frame begins whose rest is awaited, None if there is none."""
-        return self.taken - len(self._rest) if self._rest else None
+        return self.taken - len(self.rest) if self.rest else None
 
     def give_up(self, position: int) -> list[Frame]:
         """Return the good frames behind beginnings before a position whose rest does not come."""
         frames: list[Frame] = []
         while self.incomplete is not None and self.incomplete < position:
-            rest, self._rest = self._rest[1:], b''
+            rest, self.rest = self.rest[1:], b''
             self._signature_end = max(self._signature_end - 1, 0)
             self.taken -= len(rest)
             self.counters.skipped_bytes += 1
@@ -156,24 +161,30 @@ class Decoder:
         return cast('list[Frame]', self.sort(data, {}))
 
     def sort(
-        self, data: bytes, foreign: Mapping[bytes, bytes],
+        self, data: bytes, foreign: Mapping[int, bytes],
     ) -> list[Frame | ForeignFrames]:
         """
         Return the frames that ``data`` completes, in order, and foreign ones as runs.
 
-        :param foreign: the messages that are only counted: CRC_EXTRA by the 3 bytes of the id.
+        :param foreign: the messages that are only counted: CRC_EXTRA, as a byte, by id.
             A frame that is signed, cut in two or of MAVLink 1 is returned all the same.
         """
         self.taken += len(data)
-        data = self._rest + data if self._rest else data
+        data = self.rest + data if self.rest else data
         frames: list[Frame | ForeignFrames] = []
         count = 0
         position = end = 0
         signature_end = self._signature_end
-        while match := _START.search(data, position):
-            start = match.start()
-            if foreign and start >= signature_end:
-                begin, start = start, self._count_foreign(data, start, foreign, frames)
+        while position < len(data):
+            start = position
+            if data[start] != STX_V2:
+                match = _START.search(data, start)
+                if match is None:
+                    position = len(data)
+                    continue
+                start = match.start()
+            if start >= signature_end:
+                begin, start = start, self._take_plain(data, start, foreign, frames)
                 if start > begin:
                     self.counters.skipped_bytes += begin - end
                     position = end = start
@@ -203,34 +214,43 @@ class Decoder:
             start = len(data)
         self.counters.frames += count
         self.counters.skipped_bytes += start - end
-        self._rest = data[start:]
+        self.rest = data[start:]
         self._signature_end = max(signature_end - start, 0)
         return frames
 
-    def _count_foreign(
-        self, data: bytes, start: int, foreign: Mapping[bytes, bytes],
+    def _take_plain(
+        self, data: bytes, start: int, foreign: Mapping[int, bytes],
         frames: list[Frame | ForeignFrames],
     ) -> int:
-        """Append the foreign frames from ``start``; return where something else begins."""
-        size = len(data)
-        source = b''
-        count = 0
-        while (payload := start + HEADER_V2) < size and data[start] == STX_V2:
-            crc_extra = foreign.get(data[start + 7:payload])
-            end = payload + CHECKSUM + data[start + 1]
-            if (crc_extra is None or data[start + 2] or end > size
-                    or mcrf4xx(data[start + 1:end - CHECKSUM] + crc_extra)
-                    != data[end - 2] | data[end - 1] << 8):
+        """Append whole unsigned frames of MAVLink 2; return where something else begins."""
+        last = len(data) - HEADER_V2 - CHECKSUM
+        source: tuple[int, int] | None = None
+        count = foreign_count = 0
+        while start <= last:
+            stx, length, flags, _, sequence, system, component, low, high = _HEADER_V2(data, start)
+            id_ = low | high << 16
+            crc_extra = foreign_extra = foreign.get(id_)
+            if crc_extra is None and (layout := self.layouts.get(id_)):
+                crc_extra = bytes((layout.crc_extra,))
+            end = start + HEADER_V2 + length
+            if (stx != STX_V2 or flags or crc_extra is None or start + length > last
+                    or mcrf4xx(data[start + 1:end] + crc_extra) != data[end] | data[end + 1] << 8):
                 break
-            if data[start + 5:start + 7] != source:
-                source = data[start + 5:start + 7]
-                sequences = bytearray()
-                frames.append(ForeignFrames(Address(*source), sequences))
-            sequences.append(data[start + 4])
+            if foreign_extra is None:
+                frames.append(Frame(2, sequence, Address(system, component), id_,
+                                    data[start + HEADER_V2:end]))
+                source = None
+            else:
+                if source != (system, component):
+                    source = system, component
+                    sequences = bytearray()
+                    frames.append(ForeignFrames(Address(system, component), sequences))
+                sequences.append(sequence)
+                foreign_count += 1
             count += 1
-            start = end
+            start = end + CHECKSUM
         self.counters.frames += count
-        self.counters.foreign += count
+        self.counters.foreign += foreign_count
         return start
 
     def _is_frame(self, data: bytes, start: int) -> bool:

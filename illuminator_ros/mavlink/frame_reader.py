@@ -63,7 +63,7 @@ class FrameReader:
         self._signing = signing
         # Making a Frame of each foreign frame takes twice the time on a busy link.
         self._foreign = {} if signing.mode is not SigningMode.OFF else {
-            id_.to_bytes(3, 'little'): bytes((layout.crc_extra,))
+            id_: bytes((layout.crc_extra,))
             for id_, layout in LAYOUTS.items() if id_ not in handled}
         self._streams: dict[Peer, _Stream] = {}
         self._waits: dict[Peer, _Wait] = {}
@@ -80,7 +80,7 @@ class FrameReader:
             stream = self._new_stream(peer)
         decoder = stream.decoder
         frames = decoder.sort(data, self._foreign)
-        if decoder.incomplete is not None or self._waits:
+        if decoder.rest or self._waits:
             self._watch(peer, decoder, now)
         if frames:
             frames = [one for one in frames if isinstance(one, ForeignFrames)
