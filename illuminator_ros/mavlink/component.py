@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Protocol
 
@@ -54,12 +54,14 @@ class Endpoint(ABC):
     :ivar streams: groups of classes of messages that newer ones replace, the most urgent first. A
         group is sent as one when the line has room, and dropped where it has none for
         :data:`~.conflating_queue.MAX_AGE`; all other messages are sent at once.
+    :ivar inspect: looks at the frame of a message, of this class, before that is received.
     :ivar outgoing: messages to send, each with the address that sends it.
     """
 
     messages: Sequence[type[Message]]
     sends: Sequence[type[Message]] = ()
     streams: Sequence[StreamGroup] = ()
+    inspect: Callable[[Frame, type[Message]], None] | None = None
 
     def __init__(self) -> None:
         self.outgoing: deque[tuple[Address, Message]] = deque()
@@ -74,9 +76,6 @@ class Endpoint(ABC):
 
     def link_closed(self, now: float, reason: str) -> None:  # noqa: B027 - optional
         """Note that nothing can be sent any more, and why."""
-
-    def inspect(self, frame: Frame, cls: type[Message]) -> None:  # noqa: B027 - optional
-        """Look at the frame of a message, of this class, before it is received."""
 
     @abstractmethod
     def receive(self, source: Address, message: Message, now: float) -> None:

@@ -20,7 +20,7 @@ from collections import deque
 import random
 
 from .frame import encode_frame, Frame
-from .messages import Address, encode_payload, Message
+from .messages import Address, Message
 from .signing import Signing, stamp_of
 
 # s for which an unsigned frame may return. Each second that is remembered is one more sequence
@@ -77,6 +77,7 @@ class FrameWriter:
                              'or use MAVLink 2')
         self.sequences: dict[Address, int] = {}
         self._signing = signing
+        self._signs = signing.signs
         self._version = version
         self._loopback = LoopbackFilter()
 
@@ -87,20 +88,19 @@ class FrameWriter:
         :raises ValueError: if MAVLink 1 cannot carry the message.
         :raises struct.error: if a value does not fit into its field.
         """
-        payload = encode_payload(message)
+        payload = message.codec.encode(message)
         if self._version == 1:
             payload = payload[:message.base_size]
         sequence = self.sequences.get(source, -1)
         if sequence < 0:
             # Two programs that were started together with one address can then be distinguished.
             sequence = random.randrange(256)
-        signs = self._signing.signs
         frame = encode_frame(
             message.id, payload, sequence=sequence, source=source, crc_extra=message.crc_extra,
-            signed=signs, version=self._version)
+            signed=self._signs, version=self._version)
         self.sequences[source] = (sequence + 1) & 0xFF
         self._loopback.sent(source, sequence, message.id, payload, now)
-        if signs:
+        if self._signs:
             frame = self._signing.sign(frame, unix_time)
             self._loopback.signed(self._signing.timestamp)
         return frame

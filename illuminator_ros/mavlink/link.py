@@ -352,9 +352,7 @@ class Link:
             self._lost(error)
 
     def _take(self, channel: Channel, peer: Peer, data: bytes) -> None:
-        self._traffic.bytes_received += len(data)
         now = self.clock()
-        self._traffic_seen(now)
         frames = self._receiver.take(peer, data, now, self._wall_clock())
         if frames:
             for frame in frames:
@@ -364,6 +362,8 @@ class Link:
                     # Those from our own address are our own, returned, or an address conflict.
                     self._heard(channel, peer, frame.source, frame.sequences, now)
             self._flush()
+        self._traffic.bytes_received += len(data)
+        self._traffic_seen(now)
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
@@ -373,7 +373,8 @@ class Link:
         cls = self._classes.get(frame.message_id)
         if cls is not None:
             self._work_pending = True
-            self._safe_call(self.endpoint.inspect, frame, cls)
+            if self.endpoint.inspect is not None:
+                self._safe_call(self.endpoint.inspect, frame, cls)
             message = decode_payload(cls, frame.payload, sender)
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('received from %s: %s', frame.source, message,
@@ -417,7 +418,8 @@ class Link:
         dropped = streams.dropped
         if outgoing:
             now = self.clock()
-            urgent = [one for one in outgoing if not streams.hold(*one, now)]
+            urgent = ([one for one in outgoing if not streams.hold(*one, now)]
+                      if self.endpoint.streams else list(outgoing))
             outgoing.clear()
             self._send_messages(urgent, now)
         while streams and self._stream_due() <= (now := self.clock()):

@@ -26,7 +26,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from itertools import islice
 from operator import attrgetter, itemgetter
 import struct
 from typing import Annotated, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
@@ -72,10 +71,8 @@ class Layout(NamedTuple):
 
 
 class _Codec(NamedTuple):
-    pack: Callable[..., bytes]
+    encode: Callable[[Message], bytes]
     unpack: Callable[[bytes], tuple[object, ...]]
-    # Returns the values of a message in wire order.
-    values: Callable[[Message], tuple[object, ...]]
     # Returns values in wire order in the order of the fields.
     arguments: Callable[[tuple[object, ...]], tuple[object, ...]]
     size: int
@@ -137,34 +134,42 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
         crc = mcrf4xx(seed)
         cls.id, cls.name, cls.crc_extra = id_, name, crc & 0xFF ^ crc >> 8
         cls.base_size = struct.calcsize('<' + ''.join(codes[one] for one in base))
-        pack: Callable[..., bytes] = layout.pack
-        unpack: Callable[[bytes], tuple[object, ...]] = layout.unpack
-        if any(codes[one][:-1] and codes[one][-1] != 's' for one in order):
-            pack, unpack = _with_arrays(layout, [codes[one] for one in order])
+        arrays = [(index, int(code[:-1])) for index, code in enumerate(codes[one] for one in order)
+                  if code[:-1] and code[-1] != 's']
+        encode, unpack = _with_arrays(layout, attrgetter(*order), arrays)
         cls.codec = _Codec(
-            pack, unpack, attrgetter(*order), itemgetter(*map(order.index, names)), layout.size)
+            encode, unpack if arrays else layout.unpack,
+            itemgetter(*map(order.index, names)), layout.size)
         LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
         return cls
     return complete
 
 
 def _with_arrays(
-    layout: struct.Struct, codes: Sequence[str],
-) -> tuple[Callable[..., bytes], Callable[[bytes], tuple[object, ...]]]:
-    """Return pack and unpack of a layout in which arrays of numbers are tuples."""
-    counts = [0 if code[-1] == 's' else int(code[:-1] or 0) for code in codes]
+    layout: struct.Struct, read: Callable[[Message], tuple[object, ...]],
+    arrays: Sequence[tuple[int, int]],
+) -> tuple[Callable[[Message], bytes], Callable[[bytes], tuple[object, ...]]]:
+    """
+    Return functions that encode and unpack a message in which arrays of numbers are tuples.
 
-    def pack(*values: object) -> bytes:
-        flat: list[object] = []
-        for value in values:
-            flat += value if isinstance(value, tuple) else (value,)
-        return layout.pack(*flat)
+    :param read: returns the values of a message in wire order.
+    :param arrays: position and size of each.
+    """
+    def encode(message: Message) -> bytes:
+        values = [*read(message)]
+        for index, _ in reversed(arrays):
+            array = values[index]
+            assert isinstance(array, tuple)
+            values[index:index + 1] = array
+        return layout.pack(*values)
 
     def unpack(payload: bytes) -> tuple[object, ...]:
-        flat = iter(layout.unpack(payload))
-        return tuple(tuple(islice(flat, count)) if count else next(flat) for count in counts)
+        values: list[object] = [*layout.unpack(payload)]
+        for index, size in arrays:
+            values[index:index + size] = [tuple(values[index:index + size])]
+        return tuple(values)
 
-    return pack, unpack
+    return encode, unpack
 
 
 def encode_payload(message: Message) -> bytes:
@@ -173,8 +178,7 @@ def encode_payload(message: Message) -> bytes:
 
     :raises struct.error: if a value does not fit into its field.
     """
-    codec = message.codec
-    return codec.pack(*codec.values(message))
+    return message.codec.encode(message)
 
 
 def decode_payload(cls: type[M], payload: bytes, sender: int = 0) -> M:

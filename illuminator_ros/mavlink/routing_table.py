@@ -40,9 +40,9 @@ class RoutingTable:
     """
 
     def __init__(self) -> None:
-        self._routes: dict[Address, dict[Peer, float]] = {}
+        self._routes: dict[tuple[int, int], dict[Peer, float]] = {}
         # When a component was last heard over more peers than a route has.
-        self._overflowed: dict[Address, float] = {}
+        self._overflowed: dict[tuple[int, int], float] = {}
         self._expiry_due = -math.inf
 
     def __len__(self) -> int:
@@ -77,7 +77,7 @@ class RoutingTable:
         system = getattr(message, 'target_system', 0)
         if not system or len(peers) < 2:
             return peers
-        target = Address(system, getattr(message, 'target_component', 0))
+        target = system, getattr(message, 'target_component', 0)
         if now - self._overflowed.get(target, -math.inf) <= EXPIRY:
             return peers
         route = self._routes.get(target, {})

@@ -83,6 +83,7 @@ class VirtualLink:
             for frame in decoder.feed(self._codec.frame(source, message)):
                 for cls in receiver.messages:
                     if frame.message_id == cls.id:
-                        receiver.inspect(frame, cls)
+                        if receiver.inspect is not None:
+                            receiver.inspect(frame, cls)
                         receiver.receive(
                             frame.source, decode_payload(cls, frame.payload), self.now)

@@ -22,9 +22,8 @@ import errno
 import ipaddress
 import selectors
 import socket
-from typing import cast
 
-from .base import Channel, ChannelLost, Peer, resolve, SocketName
+from .base import Channel, ChannelLost, Peer, resolve
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
@@ -63,6 +62,7 @@ class UdpChannel(Channel):
             raise OSError(f'{url.bind} and {url.remote} are of different IP versions')
         self._remote = remote[1] if remote else None
         self._broadcast = url.broadcast
+        self._hears_all = remote is None or bool(url.broadcast)
         self._peers: dict[Peer, float] = {}
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
@@ -82,16 +82,13 @@ class UdpChannel(Channel):
         """See :meth:`Channel.register`."""
         selector.register(self._socket, selectors.EVENT_READ)
 
-    @property
-    def _hears_all(self) -> bool:
-        return self._remote is None or bool(self._broadcast)
-
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         receive = self._socket.recvfrom
         # Datagrams of one peer are decoded together, at a third of the cost. The first is decoded
         # alone: it is mostly the only one, and an answer may wait for it.
         sender: object = None
+        is_heard = False
         datagrams: list[bytes] = []
         lost = None
         self.more = True
@@ -111,18 +108,18 @@ class UdpChannel(Channel):
                 break
             size += len(datagram)
             if peer != sender:
-                yield from self._heard_of(sender, datagrams)
-                yield from self._heard_of(peer, [datagram])
-                sender, datagrams = peer, []
-            else:
+                if datagrams:
+                    yield sender, b''.join(datagrams)
+                    datagrams = []
+                sender, is_heard = peer, self._hears_all or self._is_of_remote(peer[0])
+                if is_heard:
+                    yield peer, datagram
+            elif is_heard:
                 datagrams.append(datagram)
-        yield from self._heard_of(sender, datagrams)
+        if datagrams:
+            yield sender, b''.join(datagrams)
         if lost:
             raise lost
-
-    def _heard_of(self, peer: object, datagrams: list[bytes]) -> Iterator[tuple[Peer, bytes]]:
-        if datagrams and (self._hears_all or self._is_of_remote(cast(SocketName, peer)[0])):
-            yield peer, b''.join(datagrams)
 
     def _is_of_remote(self, host: str) -> bool:
         assert self._remote is not None
@@ -135,8 +132,9 @@ class UdpChannel(Channel):
         """See :meth:`Channel.peers`."""
         if not self._hears_all or self._broadcast == 'always':
             return (self._remote,)
-        for peer in [p for p, heard in self._peers.items() if now - heard > PEER_EXPIRY]:
-            del self._peers[peer]
+        if now - min(self._peers.values(), default=now) > PEER_EXPIRY:
+            self._peers = {peer: heard for peer, heard in self._peers.items()
+                           if now - heard <= PEER_EXPIRY}
         if self._broadcast and not self._peers:
             return (self._remote,)
         return tuple(self._peers)
@@ -153,41 +151,34 @@ class UdpChannel(Channel):
 
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
-        begin = 0
-        for end in _ends(frames):
-            datagram = b''.join(frames[begin:end])
-            for peer in peers:
-                if not self._sent(datagram, peer):
-                    self.dropped += end - begin
-            begin = end
+        datagram, count = b'', 0
+        for frame in frames:
+            if datagram and len(datagram) + len(frame) > MAX_DATAGRAM:
+                self.dropped += count * self._failures(datagram, peers)
+                datagram, count = b'', 0
+            datagram += frame
+            count += 1
+        self.dropped += count * self._failures(datagram, peers)
 
-    def _sent(self, datagram: bytes, peer: Peer) -> bool:
-        """Send to one peer; return False if the datagram was dropped."""
-        try:
-            self._socket.sendto(datagram, cast(SocketName, peer))
-        except (BlockingIOError, ConnectionError):
-            return False
-        except OSError as error:
-            if error.errno in NO_ROOM:
-                return False
-            if peer == self._remote:
-                raise ChannelLost(error.errno, error.strerror) from None
-            # The link survives the loss of a learnt peer.
-            self._peers.pop(peer, None)
-            return False
-        return True
+    def _failures(self, datagram: bytes, peers: Sequence[Peer]) -> int:
+        """Send to each peer; return how often the datagram was dropped."""
+        failures = 0
+        for peer in peers:
+            assert isinstance(peer, tuple)
+            try:
+                self._socket.sendto(datagram, peer)
+            except (BlockingIOError, ConnectionError):
+                failures += 1
+            except OSError as error:
+                failures += 1
+                if error.errno in NO_ROOM:
+                    continue
+                if peer == self._remote:
+                    raise ChannelLost(error.errno, error.strerror) from None
+                # The link survives the loss of a learnt peer.
+                self._peers.pop(peer, None)
+        return failures
 
     def close(self) -> None:
         """See :meth:`Channel.close`."""
         self._socket.close()
-
-
-def _ends(frames: Sequence[bytes]) -> Iterator[int]:
-    """Return the index after the last frame of each datagram."""
-    size = 0
-    for index, frame in enumerate(frames):
-        if size and size + len(frame) > MAX_DATAGRAM:
-            yield index
-            size = 0
-        size += len(frame)
-    yield len(frames)
