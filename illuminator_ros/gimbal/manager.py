@@ -103,7 +103,6 @@ IDENTITY_TIME = 3.0
 # s between two reports of one kind, and kinds that have a limit of their own.
 REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
-_AHEAD = Quaternion()
 _ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
@@ -251,7 +250,7 @@ class GimbalManager(Payload):
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, AnySetpoint):
-            self._take_setpoint(source, message, now)
+            self.take_setpoint(source, message, now)
         elif isinstance(message, mav.Heartbeat):
             self.control.heard(source, now)
             self._compare_identity(source, message, now)
@@ -388,10 +387,12 @@ class GimbalManager(Payload):
 
     # Setpoints
 
-    def _take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
+    def take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
+        """Take a setpoint of a player."""
         if (message.target_system not in (0, self.address.system)
                 or message.target_component not in (0, self.address.component)
-                or message.gimbal_device_id not in (0, self.tracker.device_id)):
+                or message.gimbal_device_id
+                and message.gimbal_device_id != self.tracker.device_id):
             return
         try:
             demand = read_demand(message, self.model.ranges)
@@ -439,8 +440,11 @@ class GimbalManager(Payload):
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
             return f'the gimbal does not have {lacking.name}'
-        current = _AHEAD if demand.is_complete else self._pointing(demand.frame, now)
-        if current is None or self._converts(demand.frame, now) and self._heading(now) is None:
+        current = demand.attitude or (
+            Quaternion() if demand.is_pose else self._pointing(demand.frame, now))
+        if current is None or (
+                demand.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
+                and self._heading(now) is None):
             return 'the heading of the vehicle is unknown'
         self._roi = None
         self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
@@ -463,12 +467,9 @@ class GimbalManager(Payload):
             return Quaternion()
         return None if heading is None else turned_by(Quaternion(), heading)
 
-    def _converts(self, frame: YawFrame, now: float) -> bool:
-        """Return whether the device needs the other yaw frame."""
-        if frame is YawFrame.VEHICLE:
-            return False
+    def _accepts_earth_frame(self, now: float) -> bool:
         status = self._device_status(now)
-        return not self.model.accepts_earth_frame(status.flags if status else None)
+        return self.model.accepts_earth_frame(status.flags if status else None)
 
     def _device_status(self, now: float) -> GimbalDeviceAttitudeStatus | None:
         return self._status if now < self._status_at + ATTITUDE_AGE else None
@@ -486,15 +487,19 @@ class GimbalManager(Payload):
         if setpoint is None or self.tracker.state is not ManagerState.ACTIVE:
             self._send_due = math.inf
             return
-        converts = self._converts(setpoint.frame, now)
         # The direction from which the range of the yaw counts.
-        ahead = 0.0 if setpoint.frame is YawFrame.VEHICLE else self._heading(now)
-        attitude = setpoint.at(now)
-        follows = setpoint.turning != STILL or self._roi is not None or converts
-        self._send_due = now + (FOLLOW_INTERVAL if follows else HOLD_INTERVAL)
+        ahead: float | None = 0.0
+        converts = False
+        if setpoint.frame is YawFrame.EARTH:
+            ahead, converts = self._heading(now), not self._accepts_earth_frame(now)
+        turns = setpoint.turning != STILL
+        attitude = setpoint.at(now) if turns else setpoint.attitude
+        self._send_due = now + (
+            FOLLOW_INTERVAL if turns or converts or self._roi is not None else HOLD_INTERVAL)
         if attitude is not None:
-            attitude, clipped = clip(
-                mix(attitude, self._offsets), self.model.ranges, ahead)
+            if self._offsets != STILL:
+                attitude = mix(attitude, self._offsets)
+            attitude, clipped = clip(attitude, self.model.ranges, ahead)
             self._limits_reached = 0
             if clipped:
                 self._report_clipped(clipped, now)
@@ -510,7 +515,9 @@ class GimbalManager(Payload):
         if self.tracker.device is None:
             self.events.emit(SetpointSent(sent))
         else:
-            self._commands.send(_device_message(self.tracker.device, sent))
+            self._commands.send(GimbalDeviceSetAttitude(
+                *self.tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
+                *sent.rates))
 
     def _report_clipped(self, clipped: list[Clipped], now: float) -> None:
         self._limits_reached = sum(AT_LIMIT[AXES.index(one.axis)] for one in clipped)
@@ -533,7 +540,7 @@ class GimbalManager(Payload):
         above = self.vehicle.home_altitude if is_relative else 0.0
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
-                and self._converts(YawFrame.EARTH, now)):
+                and not self._accepts_earth_frame(now)):
             self._report_refusal(
                 source, 'the position or the heading of the vehicle is unknown', now)
             return MavResult.TEMPORARILY_REJECTED
@@ -649,11 +656,6 @@ class GimbalManager(Payload):
         if kind not in self._limits and len(self._limits) >= MAX_REPORTS:
             del self._limits[next(iter(self._limits))]
         return self._limits.setdefault(kind, RateLimit(REPORT_INTERVAL))
-
-
-def _device_message(device: Address, setpoint: Setpoint) -> GimbalDeviceSetAttitude:
-    return GimbalDeviceSetAttitude(
-        *device, setpoint.device_flags, setpoint.attitude or UNSET_QUATERNION, *setpoint.rates)
 
 
 def _ignore(result: CommandResult, now: float) -> None:

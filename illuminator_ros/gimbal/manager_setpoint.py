@@ -158,9 +158,9 @@ class Demand(NamedTuple):
     attitude: Quaternion | None = None
 
     @property
-    def is_complete(self) -> bool:
-        """Whether the attitude that follows depends on nothing else."""
-        return self.attitude is not None or bool(self.flags & _POSE_BITS)
+    def is_pose(self) -> bool:
+        """Whether a flag alone sets the attitude."""
+        return bool(self.flags & _POSE_BITS)
 
     @property
     def target(self) -> Vector:
@@ -300,7 +300,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     Return the setpoint that a demand makes.
 
     :param current: the attitude in the frame of the demand, from which axes without an angle
-        begin.
+        begin, and which a demand with attitude or pose does not need.
     :param turns: whether the manager must turn the gimbal where only rates are given.
     """
     flags, frame = demand.flags, demand.frame

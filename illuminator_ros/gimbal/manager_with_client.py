@@ -30,6 +30,7 @@ from typing import Any, TypeVar
 from .client import GimbalClient
 from .gimbal import GimbalSettings
 from .manager import GimbalManager, ManagerSettings
+from .manager_setpoint import AnySetpoint
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand, CommandReceiver
 from ..mavlink.command_sender import CommandSender, CommandStatus
@@ -75,6 +76,10 @@ class ManagerWithClient(Payload):
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
+        if isinstance(message, AnySetpoint):
+            # It makes none of the messages that the client receives.
+            self.manager.take_setpoint(source, message, now)
+            return
         if isinstance(message, mav.CommandAck):
             self._own.acknowledge(source, message, now)
         else:
