@@ -52,7 +52,6 @@ EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
 ROS_ANGLES = (0.0, math.radians(45), math.radians(30))
 TURNED = Quaternion.from_euler(*ROS_ANGLES)
 LOST = 'control of gimbal 1/154 lost: 1/195 has taken primary control'
-TRIGGERS = ('take_control', 'release_control', 'neutral', 'retract', 'clear_roi')
 
 
 def start_gimbal(ros: Ros, port: int, **parameters: Any) -> Program:
@@ -213,16 +212,6 @@ def test_gm_3_yaw_lock_is_set_by_a_service_unless_the_gimbal_lacks_it(
         lock.wait_value(on)
 
 
-def test_gm_14_services_without_control_say_who_has_it(
-        ros: Ros, gimbal: FakeManager) -> None:
-    gimbal.primary = OTHER
-    ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
-    for name in ('neutral', 'retract', 'clear_roi'):
-        answer = trigger(ros, name)
-        assert (answer.success, answer.message) == (
-            False, 'no control of gimbal 1/154: primary 1/195, secondary none')
-
-
 # Setpoints
 
 @pytest.mark.parametrize(('header', 'frame'), [
@@ -276,16 +265,6 @@ def test_wrong_setpoint_is_refused_with_the_reason(
     publish(ros, topic, message)
 
     program.wait_for(f'~/{topic}: ignored: {text}')
-    assert gimbal.received == []
-
-
-def test_gm_14_setpoint_without_control_is_not_sent_and_the_log_names_the_controller(
-        ros: Ros, gimbal: FakeManager, program: Program) -> None:
-    gimbal.primary = OTHER
-    ros.subscribe(String, '/gimbal/controller').wait_value('primary 1/195, secondary none')
-    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=0.1)))
-
-    program.wait_for('~/cmd/rate: ignored: no control of gimbal 1/154: primary 1/195')
     assert gimbal.received == []
 
 
@@ -421,13 +400,3 @@ def test_lost_gimbal_is_reported(own_ros: Ros) -> None:
         controller.wait_value('primary 1/195, secondary none')
         # The same components are in control as before.
         assert program.count('control of gimbal 1/154: ') == 1
-
-
-def test_services_without_a_gimbal_give_the_reason(own_ros: Ros) -> None:
-    with ended(start_gimbal(own_ros, free_port())) as program:
-        program.wait_for('link open')
-        for name in TRIGGERS:
-            answer = trigger(own_ros, name)
-            assert not answer.success
-            assert answer.message.startswith(
-                'no gimbal connected: no component announces a gimbal: nothing is received')

@@ -171,16 +171,6 @@ def test_gm_18_the_manager_stays_until_it_is_silent() -> None:
     assert bench.angles(1.0) == (0.0, 0.0, 0.0)
 
 
-def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() -> None:
-    bench = Bench(announced=False, manager_id=7)
-    bench.announce()
-    bench.now += 2 * MANAGER_TIMEOUT
-    bench.point(0.0, -10.0, 0.0)
-    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
-    bench.point(0.0, -10.0, 0.0, source=Address(1, 7))
-    assert bench.angles(1.0) == (0.0, -10.0, 0.0)
-
-
 def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
     bench = Bench()
     down = Quaternion.from_euler(0.0, -0.5, 0.0)

@@ -24,7 +24,6 @@ from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand
 from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED, SimulatedManager
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.messages import (
-    Attitude,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
@@ -84,16 +83,6 @@ class Bench:
         self.endpoint.receive(source, gimbal.GimbalManagerSetAttitude(
             *self.address, flags, device_id, q, *rates), self.now)
 
-    def pitchyaw(
-        self, *values: float, kind: Any = gimbal.GimbalManagerSetPitchyaw,
-        source: mav.Address = PLAYER,
-    ) -> None:
-        self.endpoint.receive(source, kind(*self.address, FOLLOW, 1, *values), self.now)
-
-    def vehicle(self, heading: float) -> None:
-        self.endpoint.receive(mav.Address(1, 1), Attitude(
-            0, 0.0, 0.0, math.radians(heading), 0.0, 0.0, 0.0), self.now)
-
     def message(self, cls: Any) -> Any:
         return self.device.message(cls.id, self.now)
 
@@ -147,14 +136,6 @@ def test_configure_gives_control_as_the_status_shows(
     assert bench.control == control
 
 
-def test_px4_releases_the_component_id_of_a_sender_in_another_system() -> None:
-    for profile, control in (('px4', (1, 0, 0, 0)), ('reference', (1, 195, 0, 0)),
-                             ('ardupilot', (1, 195, 0, 0))):
-        bench = Bench(profile)
-        bench.command(CONFIGURE, -3, -3, -3, -3, source=mav.Address(9, 195))
-        assert bench.control == control
-
-
 def test_gm_9_secondary_control_adds_limited_angles() -> None:
     bench = Bench()
     bench.take(PLAYER, OTHER)
@@ -166,33 +147,6 @@ def test_gm_9_secondary_control_adds_limited_angles() -> None:
 
 
 # Setpoints
-
-@pytest.mark.parametrize(('profile', 'kind', 'values', 'degrees'), [
-    *((profile, PITCHYAW, (-20.0, 30.0, NAN, NAN), (0.0, -20.0, 30.0)) for profile in PROFILES),
-    ('reference', PITCHYAW, (NAN, NAN, -2.0, 1.0), (0.0, -10.0, 5.0)),
-    ('ardupilot', PITCHYAW, (NAN, NAN, -2.0, 1.0), (0.0, -10.0, 5.0)),
-    # PX4 reads 0.1 deg/s as 0.1 rad/s.
-    ('px4', PITCHYAW, (NAN, NAN, -0.1, NAN), (0.0, -28.648, 0.0)),
-    ('reference', PITCHYAW, (NAN, 30.0, NAN, NAN), (0.0, 0.0, 30.0)),
-    ('px4', PITCHYAW, (NAN, 30.0, NAN, NAN), (0.0, 0.0, 0.0)),
-    ('ardupilot', PITCHYAW, (NAN, 30.0, NAN, NAN), (0.0, 0.0, 0.0)),
-    ('reference', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, NAN, NAN), (0.0, -11.459, 5.73)),
-    ('px4', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, NAN, NAN), (0.0, 0.0, 0.0)),
-    ('reference', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, 0.01, 0.01), (0.0, -2.865, 2.865)),
-    ('ardupilot', gimbal.GimbalManagerSetPitchyaw, (-0.2, 0.1, 0.01, 0.01), (0.0, 0.0, 0.0)),
-    ('ardupilot', gimbal.GimbalManagerSetPitchyaw, (NAN, NAN, -0.02, 0.01), (0.0, -5.73, 2.865)),
-    ('reference', gimbal.GimbalManagerSetManualControl, (-0.5, 0.1, NAN, NAN), (0, -60.0, 17.0)),
-    ('reference', gimbal.GimbalManagerSetManualControl, (NAN, NAN, -0.1, 0.0), (0, -14.324, 0.0)),
-    ('ardupilot', gimbal.GimbalManagerSetManualControl, (NAN, NAN, -0.1, 0.0), (0, 0.0, 0.0))])
-def test_a_setpoint_moves_it_as_the_profile_reads_it(
-        profile: str, kind: Any, values: tuple[float, ...], degrees: tuple[float, ...]) -> None:
-    bench = Bench(profile)
-    if kind is PITCHYAW:
-        bench.command(PITCHYAW, *values, float(FOLLOW))
-    else:
-        bench.pitchyaw(*values, kind=kind)
-    assert bench.angles() == degrees
-
 
 @pytest.mark.parametrize(('profile', 'flags', 'yaw'), [
     ('reference', FOLLOW | YawFrame.EARTH.flag, 30.0), ('reference', LOCK, 30.0),
@@ -207,16 +161,6 @@ def test_gm_2_the_flags_tell_the_frame_of_a_yaw(profile: str, flags: int, yaw: f
     frame = bench.message(GimbalDeviceAttitudeStatus).flags & 96
     earth = profile == 'reference' and flags != FOLLOW or profile == 'px4' and flags == LOCK
     assert frame == (YawFrame.EARTH if earth else YawFrame.VEHICLE).flag
-
-
-@every_profile
-def test_a_locked_yaw_follows_the_attitude_of_the_vehicle(profile: str) -> None:
-    bench = Bench(profile)
-    bench.point(0.0, 0.0, 30.0, flags=LOCK)
-    bench.angles()
-    bench.vehicle(20.0)
-    assert bench.angles() == (0.0, 0.0, 10.0 if profile == 'ardupilot' else 30.0)
-    assert math.degrees(bench.device.mount.motion.angles[2]) == pytest.approx(10.0)
 
 
 @every_profile

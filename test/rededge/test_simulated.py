@@ -170,27 +170,6 @@ def test_image_has_the_injected_values_and_their_ages() -> None:
         'camera_yaw_deg': row['camera_yaw_deg']}
 
 
-@pytest.mark.parametrize(('vehicle', 'camera', 'earth'), [
-    ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
-    ((0, 0, 270), (0, 0, 0), (0, 0, 270)),
-    # Panning a camera that looks down is its roll, and turns the top of the image.
-    ((0, 0, 40), (30, 0, 0), (0, 0, 70)),
-    # A stabilised gimbal below a vehicle that pitches and rolls.
-    ((10, -15, 40), (0, 15, 10), (0, 0, 40)),
-    ((0, 0, 0), (0, 45, 0), (0, 45, 0)),
-])
-def test_camera_attitude_is_composed_of_those_of_vehicle_and_mount(
-    vehicle: tuple[float, float, float], camera: tuple[float, float, float],
-    earth: tuple[float, float, float],
-) -> None:
-    image = Camera().image(attitude(*vehicle), mount(*camera))
-
-    roll, pitch, yaw = earth
-    assert image.camera_roll_deg == pytest.approx(roll, abs=1e-6)
-    assert image.camera_pitch_deg == pytest.approx(pitch, abs=1e-6)
-    assert image.camera_yaw_deg == pytest.approx(yaw, abs=1e-6)
-
-
 @pytest.mark.parametrize('message', [
     FIX, SystemTime(int(HOST_UTC * 1e6), 0), attitude(1, 2, 3), mount(1, 2, 3),
     GlobalPositionInt(0, 481234567, 0, 0, 0, 0, 100, 0, 0)])

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.light import CONFIGURE, ON_OFF, params, ServedLight
+from support.light import CONFIGURE, params, ServedLight
 from support.ports import free_port
 from support.processes import ended, python
 from support.ros import Parameters, Ros, running_bridge
@@ -83,22 +83,3 @@ def test_last_section_of_a_file_wins_and_the_file_of_a_launch_argument_over_any(
         with ended(python('illuminator_ros.bridge', '--ros-args', *arguments,
                           env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as bridge:
             bridge.wait_for(f'link open: udp 127.0.0.1:{port}')
-
-
-def test_restarted_light_gets_overrides_and_later_changes_and_is_never_switched_on(
-    own_ros: Ros, port: int, light: ServedLight,
-) -> None:
-    light.fake.fields['enable'] = 1
-    with running_bridge(own_ros.domain, port, brightness=60) as bridge, light:
-        bridge.wait_for('light 1/243 configured: ')
-        assert Parameters(own_ros).set(strobe_period=4.0)[0].successful
-        light.forget()
-
-        light.restart()
-
-        bridge.wait_for('light 1/243 has restarted')
-        bridge.wait_for('light 1/243 configured: ', count=2)
-        assert [params(c) for c in light.commands(CONFIGURE)] == [(2.0, 60.0, 4.0, 10.0)]
-        assert Parameters(own_ros).get('brightness', 'strobe_period') == [60.0, 4.0]
-        assert light.commands(ON_OFF) == []
-        assert light.fake.fields['enable'] == 0
