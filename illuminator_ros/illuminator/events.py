@@ -102,14 +102,23 @@ class StatusReceived:
 
     :param received_at: s on the link's clock.
     :param temperature: degC; None where the light does not measure it, or its sensor fails.
-    :param shared_address: whether several lights send from this address.
     """
 
     address: Address
     status: Status
     received_at: float
     temperature: float | None = None
-    shared_address: bool = False
+
+
+@dataclass(frozen=True)
+class AddressShared(LightEvent):
+    """
+    Statuses have begun, or ceased, to show that several lights send from an address.
+
+    :param shared: whether several lights send.
+    """
+
+    shared: bool
 
 
 @dataclass(frozen=True)
@@ -266,8 +275,9 @@ class LightSnapshot:
             events.append(LightIdentified(self.address, self.identity))
         if self.status:
             events.append(StatusReceived(
-                self.address, self.status, self.status_at, self.temperature,
-                self.shared_address))
+                self.address, self.status, self.status_at, self.temperature))
+        if self.shared_address:
+            events.append(AddressShared(self.address, True))
         if self.configuration:
             events.append(ConfigurationChanged(
                 self.address, self.configuration, list(FIELDS), Cause.FIRST_STATUS))

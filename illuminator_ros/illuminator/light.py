@@ -26,7 +26,7 @@ from .commands import Switch
 from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
 from .model import Changes, DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
-from .status_tracker import RESTART_PROOF_TIME, StatusTracker
+from .status_tracker import RESTART_PROOF_TIME, StatusTracker, Uptime
 from ..mavlink.command_sender import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
@@ -127,6 +127,7 @@ class Light:
             restore=settings.restore_configuration, reassert=settings.reassert)
         self._switching: RequestQueue[Status] = RequestQueue(self._target)
         self._tracker = StatusTracker()
+        self._is_shared = False
         self._measures_temperature = False
         self._link_failure = ''
         self._status_due = math.inf
@@ -170,31 +171,43 @@ class Light:
         """
         self.heard(now)
         was_lost, self._was_lost = self._was_lost, False
+        uptime = self._tracker.take_uptime(status, now)
+        # A request that waits for the status is answered before the status is published. Otherwise
+        # it is published first: the comparison with earlier ones would delay it by a quarter.
+        is_awaited = (self._switching.is_confirming or self._configuration.is_confirming
+                      or bool(self._refreshes))
+        is_first = uptime is Uptime.RUNNING and not is_awaited
+        if is_first:
+            self._note(status, now)
+            self._publish(status, now)
         report, restarted = self._tracker.take(
-            status, now, sender=sender, was_lost=was_lost,
+            status, uptime, now, sender=sender, was_lost=was_lost,
             commanded=bool(self._switching.current or self._configuration.is_changing))
         if report is None:
             self._was_lost = was_lost
             if self._tracker.is_suspecting:
                 self._status_due = min(self._status_due, now + RESTART_PROOF_TIME)
             return
-        self.status = status
-        self.status_at = now
+        self._note(status, now)
         self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
-        # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
-        self._measures_temperature |= bool(status.temperature)
         if restarted:
             self._restarted(now)
-        event = events.StatusReceived(
-            self.address, status, now, self.temperature, report.shared_address)
-        # A request that waits for the status is answered before the status is published.
-        is_awaited = (self._switching.is_confirming or self._configuration.is_confirming
-                      or bool(self._refreshes))
-        if not is_awaited:
-            self._emit(event)
+        if not is_first and not is_awaited:
+            self._publish(status, now)
+        if self._is_shared is not report.shared_address:
+            self._is_shared = report.shared_address
+            self._emit(events.AddressShared(self.address, self._is_shared))
         self._take_report(report, now, restarted=restarted)
         if is_awaited:
-            self._emit(event)
+            self._publish(status, now)
+
+    def _note(self, status: Status, now: float) -> None:
+        self.status, self.status_at = status, now
+        # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
+        self._measures_temperature |= bool(status.temperature)
+
+    def _publish(self, status: Status, now: float) -> None:
+        self._emit(events.StatusReceived(self.address, status, now, self.temperature))
 
     def _take_report(self, report: Report[Status], now: float, *, restarted: bool) -> None:
         before, self._enabled = self._enabled, report.status.enabled

@@ -365,8 +365,13 @@ class StatusTracker:
         """Whether another status is needed soon to tell whether the light has restarted."""
         return self._clock.is_suspecting
 
+    def take_uptime(self, status: Status, now: float) -> Uptime:
+        """Return the meaning of the uptime of a status, which must be passed to :meth:`take`."""
+        return self._clock.take(status.uptime_ms, now)
+
     def take(
-        self, status: Status, now: float, *, was_lost: bool, commanded: bool, sender: int = 0,
+        self, status: Status, uptime: Uptime, now: float, *, was_lost: bool, commanded: bool,
+        sender: int = 0,
     ) -> tuple[Report[Status] | None, bool]:
         """
         Return the report of a status, None if it is late, and whether the light has restarted.
@@ -382,10 +387,9 @@ class StatusTracker:
             self._clock = UptimeClock()
             return Report(status, now, False, True, conflict.sender(now), conflict.senders(now),
                           conflict.span(now)), False
-        meaning = self._clock.take(status.uptime_ms, now)
-        if meaning is Uptime.LATE:
+        if uptime is Uptime.LATE:
             return None, False
-        restarted = meaning is Uptime.RESTARTED or meaning is Uptime.NO_CLOCK and was_lost
+        restarted = uptime is Uptime.RESTARTED or uptime is Uptime.NO_CLOCK and was_lost
         if restarted:
             self._sending_times = SendingTimes()
         sent_by, has_clock = self._sending_times.take(status, now)

@@ -117,7 +117,11 @@ class Discovery(Generic[D]):
             Otherwise it may replace a candidate only after :data:`CANDIDATE_TIME`.
         :return: None if the device is not wanted, or if there are too many.
         """
-        device = self.get(address) or self._candidate(address, now, proved=proved)
+        device = self.devices.get(address)
+        if device is not None:
+            self.changed(address)
+            return device
+        device = self._candidates.get(address) or self._candidate(address, now, proved=proved)
         if device is not None:
             self.changed(address)
             if proved:

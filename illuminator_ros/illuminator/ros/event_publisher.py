@@ -49,7 +49,8 @@ PUBLICATIONS = (
 )
 # Events that may change a level.
 _DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
-              events.ConfigurationChanged, events.ConfigurationRestored, events.LimitExceeded)
+              events.AddressShared, events.ConfigurationChanged, events.ConfigurationRestored,
+              events.LimitExceeded)
 _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 
@@ -77,22 +78,25 @@ class EventPublisher:
         self._source = ''
         self._limits = model.Limits()
         self._condition: tuple[object, ...] = ()
-        self._shared = False
         self._flags = FlagLog()
         interface.publish('connected', False)
 
     def take(self, event: events.AnyLightEvent) -> None:
         """Publish an event."""
+        if isinstance(event, events.StatusReceived):
+            self._status_received(event)
+            return
         log, light = self._log, f'light {event.address}'
         match event:
-            case events.StatusReceived():
-                self._status_received(event)
             case events.LightConnected():
                 log.info(f'{light} connected', 'connection')
                 self._interface.publish('connected', True)
             case events.LightLost(reason=reason):
                 log.warning(f'{light} lost: {reason}', 'connection')
                 self._interface.publish('connected', False)
+            case events.AddressShared(shared=True):
+                log.warning(f'several lights answer as {event.address}: parameters stay as '
+                            'they are', 'shared')
             case events.LightRestarted(was_on=was_on, is_on=is_on):
                 log.info(f'{light} has restarted', 'restart')
                 if was_on and is_on is False:
@@ -154,16 +158,12 @@ class EventPublisher:
         if event.temperature is not None:
             publish('temperature', temperature(
                 event.temperature, self._clock.now().nanoseconds, self._frame_id))
-        condition = (status.error_flags, status.invalid, event.shared_address, status.limits)
+        condition = (status.error_flags, status.invalid, status.limits)
         if condition != self._condition:
             self._condition = condition
             self._condition_changed(event)
 
     def _condition_changed(self, event: events.StatusReceived) -> None:
-        if event.shared_address and not self._shared:
-            self._log.warning(f'several lights answer as {event.address}: parameters stay as '
-                              'they are', 'shared')
-        self._shared = event.shared_address
         if event.status.limits != self._limits:
             self._limits = event.status.limits
             self._fit(0.0)
