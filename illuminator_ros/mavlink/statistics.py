@@ -28,6 +28,8 @@ MAX_SOURCES = 256
 # are two frames: the number has 8 bits.
 WINDOW = 64
 _ALL_SEEN = (1 << WINDOW) - 1
+# Consecutive numbers, more than a read brings.
+_CONSECUTIVE = bytes(range(256)) * 8
 # A sender is distinguished from another one with its address if its numbers continue within this
 # many frames, by at most this many.
 INTERLEAVED = 32
@@ -123,6 +125,17 @@ class SequenceCounter:
             self._next = (self._newest + 1) & 0xFF
         if content is not None:
             self._contents[sequence] = content, self.received
+
+    def add_run(self, sequences: bytes | bytearray) -> None:
+        """Take the numbers of frames, in order; consecutive ones, which most are, in one step."""
+        count, first = len(sequences), self._next
+        if sequences == _CONSECUTIVE[first:first + count]:
+            self.received += count
+            self._newest, self._next = sequences[-1], (sequences[-1] + 1) & 0xFF
+            self._seen = ((self._seen + 1 << count) - 1) & _ALL_SEEN
+        else:
+            for sequence in sequences:
+                self.add(sequence)
 
     def _add_irregular(self, sequence: int, content: int | None) -> None:
         if self._newest < 0:
@@ -247,6 +260,7 @@ class Traffic:
         """
         Count frames with the right checksum by their sequence numbers.
 
+        :param sequences: at least one.
         :param content: a hash of the only frame, None where it is not known.
         :return: the sender of the last one, see :class:`SequenceCounter`.
         """
@@ -256,8 +270,10 @@ class Traffic:
                 self._frames_of_others += len(sequences)
                 return 0
             counter = self.sources[source] = SequenceCounter()
-        for sequence in sequences:
-            counter.add(sequence, content)
+        if content is None:
+            counter.add_run(sequences)
+        else:
+            counter.add(sequences[0], content)
         return counter.sender
 
     def restart(self) -> None:

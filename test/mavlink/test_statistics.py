@@ -114,6 +114,19 @@ def recent_loss(counter: statistics.SequenceCounter, now: float) -> float:
     return counter.recent_loss
 
 
+@given(runs=st.lists(st.tuples(
+    st.sampled_from((0, 0, 1, -3, 100)), st.integers(1, 300)), max_size=6))
+def test_runs_of_numbers_count_as_the_same_numbers_one_by_one(
+        runs: list[tuple[int, int]]) -> None:
+    counter, sequences, expected = statistics.SequenceCounter(), bytearray(), 250
+    for gap, count in runs:
+        first, expected = expected + gap, expected + gap + count
+        run = bytes(number & 0xFF for number in range(first, expected))
+        counter.add_run(run)
+        sequences += run
+    assert counter == after(sequences)
+
+
 @pytest.mark.parametrize(('before', 'sequences', 'loss'), [
     ([], [], 0.0), ([], range(0, 80, 2), 100 * 39 / 79),
     # Duplicates hide no loss, and a late frame of before makes none negative.
