@@ -19,9 +19,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import contextlib
 import errno
+import fcntl
+import os
 import socket
 import struct
 import termios
+import tty
 from typing import Any
 
 from hypothesis import given
@@ -146,6 +149,19 @@ def test_read_that_fills_the_buffer_says_that_there_may_be_more(
     stream.write(b'123456')
     for piece, more in ((b'1234', True), (b'56', False)):
         assert (stream.ours.receive_bytes(len(piece)), stream.ours.channel.more) == (piece, more)
+
+
+def test_read_of_a_full_terminal_says_that_there_may_be_more() -> None:
+    far, near = os.openpty()
+    tty.setraw(near)
+    os.write(far, bytes(2 * base.READ_SIZE))
+    eventually(lambda: struct.unpack(
+        'i', fcntl.ioctl(near, termios.FIONREAD, bytes(4))) >= (base.READ_SIZE,), within=5.0)
+    stream = base.Stream(near)
+    stream.receive()
+    assert stream.more
+    os.close(far)
+    os.close(near)
 
 
 def test_line_without_reader_gets_whole_frames_and_the_newest(stream: Stream) -> None:

@@ -34,8 +34,9 @@ Peer = Hashable
 # Bytes that wait for a slow line. Whole frames beyond that are dropped, the oldest first: a
 # command that has waited longer than its time-out has been sent again.
 MAX_QUEUED = 16 * 1024
-# Bytes read from a stream before other work gets its turn.
-READ_SIZE = 16 * 1024
+# Bytes read from a stream before other work gets its turn. As many as a terminal of Linux holds: a
+# full one stops a fast sender, such as a USB device, and must be read again at once.
+READ_SIZE = 4095
 
 
 class ChannelLost(OSError):
