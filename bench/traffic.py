@@ -39,8 +39,10 @@ COMMON = ('ATTITUDE',) * 5 + ('GLOBAL_POSITION_INT',) * 5 + ('VFR_HUD',) * 3 + (
 HEARTBEAT_EVERY = 512
 # Messages of its own dialect, which other software does not have.
 ARDUPILOT = ('AHRS', 'EKF_STATUS_REPORT')
-# Bytes that may wait in a UDP socket while it is kept busy; less than any system grants.
-FULL = 60_000
+# Bytes that wait in a UDP socket while it is kept busy: 768 for a small datagram, as the kernel
+# counts. More than the 128 datagrams that the bridge lets collect, which would otherwise be slowed
+# down, and less than the 208 KiB that any system grants.
+FULL = 150_000
 CHUNK = 32
 
 
