@@ -144,12 +144,14 @@ class EarlierCommand(NamedTuple):
     :param result: its MAV_RESULT, None if there was no answer.
     :param ended_at: s, on the clock of the calls.
     :param tries: how often it was sent.
+    :param elapsed: s, from the first sending; 0 where that is no measure of a round trip.
     """
 
     command: Command
     result: int | None
     ended_at: float
     tries: int = 1
+    elapsed: float = 0.0
 
 
 class CommandResult(NamedTuple):
@@ -226,8 +228,8 @@ class RttEstimator:
 
     def __init__(self) -> None:
         self._ambiguous_until = -math.inf
-        self._unambiguous: deque[float] = deque(maxlen=8)
-        self._samples: deque[float] = deque()
+        # Each with whether it is unambiguous.
+        self._samples: deque[tuple[float, bool]] = deque()
         self._sorted: list[float] = []
 
     def __len__(self) -> int:
@@ -235,12 +237,10 @@ class RttEstimator:
 
     def add(self, seconds: float, now: float) -> None:
         """Add a sample, s."""
-        if now >= self._ambiguous_until:
-            self._unambiguous.append(seconds)
-        self._samples.append(seconds)
+        self._samples.append((seconds, now >= self._ambiguous_until))
         bisect.insort(self._sorted, seconds)
         if len(self._samples) > MAX_SAMPLES:
-            del self._sorted[bisect.bisect_left(self._sorted, self._samples.popleft())]
+            del self._sorted[bisect.bisect_left(self._sorted, self._samples.popleft()[0])]
 
     def expect_ambiguous(self, now: float) -> None:
         """Note that acknowledgements may belong to an earlier try or be copies from now on."""
@@ -256,14 +256,15 @@ class RttEstimator:
         """
         Return a time after a command within which no answer to it can come, s.
 
-        :return: a quartile of unambiguous samples, or the median of all if there are none; 0 while
-            acknowledgements are not ambiguous.
+        Where the line stays ambiguous, its last unambiguous samples may be those of another delay.
+
+        :return: a quartile of the last eight unambiguous ones of the samples, or the median of all
+            if there are none; 0 while acknowledgements are not ambiguous.
         """
         if now >= self._ambiguous_until:
             return 0.0
-        if not self._unambiguous:
-            return self.quantile(0.5) or 0.0
-        return sorted(self._unambiguous)[len(self._unambiguous) // 4]
+        unambiguous = sorted([seconds for seconds, known in self._samples if known][-8:])
+        return unambiguous[len(unambiguous) // 4] if unambiguous else self.quantile(0.5) or 0.0
 
     def timeout(self, longest: float) -> float:
         """
@@ -455,11 +456,25 @@ class CommandSender:
             self.counters.unexpected_acks += 1
             if source in self._round_trips:
                 self._estimator(source).expect_ambiguous(now)
+                self._measure_resent(source, ack.command, now)
             return
         # A command in progress is not rejected: the rejection belongs to a command beside it.
         request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
         if request is not None:
             self._answered(request, ack, now)
+
+    def _measure_resent(self, source: Address, command: int, now: float) -> None:
+        """
+        Take the round trip of a command whose every try seems to be acknowledged.
+
+        Otherwise each command would be sent twice for ever where a line has become slower than the
+        wait for one try, since those that are sent again are no measure.
+        """
+        for key, earlier in self._earlier.items():
+            if key[:2] == (source, command) and earlier.elapsed:
+                self._earlier[key] = earlier._replace(elapsed=0.0)
+                self._estimator(source).add(earlier.elapsed, now)
+                return
 
     def _answered(self, request: _Request, ack: messages.CommandAck, now: float) -> None:
         if request.tries == 1 and request.result is None:
@@ -574,7 +589,8 @@ class CommandSender:
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
             del self._earlier[oldest.command.key]
         self._earlier[command.key] = EarlierCommand(
-            command, request.result if answered else None, now, request.tries)
+            command, request.result if answered else None, now, request.tries,
+            result.elapsed if answered and request.tries > 1 and not request.rejected else 0.0)
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering[command.target] = None

@@ -27,6 +27,7 @@ from illuminator_ros.illuminator.events import (
     Origin,
     StatusReceived,
 )
+from illuminator_ros.mavlink.command_sender import MAX_SAMPLES
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -150,6 +151,34 @@ def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeL
     fake.send(acknowledgement)
     fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
     pair.run(0.1)
+    assert not pair.enable(True).success
+
+
+@pytest.mark.parametrize(('before', 'latency'), [(None, 0.2), (0.01, 0.2), (0.24, 0.05)])
+def test_a_line_that_stays_ambiguous_confirms_changes_and_nothing_else(
+    fake: FakeLight, before: float | None, latency: float,
+) -> None:
+    # Acknowledgements that no command waits for come for ever. Before, there were none, and the
+    # line had another latency.
+    pair = Pair(fake, there=Faults(latency=before or latency)).settle()
+    fake.stream = 0.0
+    if before:
+        for on in (True, False) * 4:
+            assert pair.enable(on).success
+            pair.run(6.0)
+    pair.near.wire.faults = pair.far.wire.faults = Faults(latency=latency)
+    for on in (True, False) * MAX_SAMPLES:
+        fake.send(CommandAck(1, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+        pair.run(0.1)
+        begun = pair.now
+        assert pair.enable(on).success
+        taken = pair.now - begun
+    assert taken < 4 * latency + 0.1
+
+    fake.applies = False
+    fake.send(CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+    fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
+    pair.run(latency / 2)
     assert not pair.enable(True).success
 
 
