@@ -68,8 +68,7 @@ class VehicleState:
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         """Take a message of the autopilot, unless its values are not finite, or no position."""
         if isinstance(message, Attitude):
-            if not all(map(math.isfinite, (
-                    message.roll, message.pitch, message.yaw, message.yawspeed))):
+            if not (message.is_finite and math.isfinite(message.yawspeed)):
                 return
             self._attitude.set(Quaternion.from_euler(
                 message.roll, message.pitch, message.yaw), now, link=True)

@@ -47,7 +47,8 @@ class MountOrientations:
                 except ValueError:
                     self._mounts[key] = None, now
                 return True
-        elif (isinstance(message, Attitude) and source.component == MAV_COMP_ID_AUTOPILOT1
+        elif (isinstance(message, Attitude) and message.is_finite
+                and source.component == MAV_COMP_ID_AUTOPILOT1
                 and (source.system in self._vehicles or len(self._vehicles) < MAX_MOUNTS)):
             self._vehicles[source.system] = message, now
         return False

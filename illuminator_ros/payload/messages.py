@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 from ..mavlink import messages as mav
 
@@ -41,6 +42,11 @@ class Attitude(mav.Message):
     rollspeed: mav.Float
     pitchspeed: mav.Float
     yawspeed: mav.Float
+
+    @property
+    def is_finite(self) -> bool:
+        """Return whether it is a rotation."""
+        return all(map(math.isfinite, (self.roll, self.pitch, self.yaw)))
 
 
 @mav.define(33, 'GLOBAL_POSITION_INT')

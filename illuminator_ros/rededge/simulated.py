@@ -376,7 +376,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             self._time = Injected(message.time_usec / 1e6, now)
         elif isinstance(message, SystemTime):
             self._time = Injected(message.time_unix_usec / 1e6, now)
-        elif isinstance(message, Attitude):
+        elif isinstance(message, Attitude) and message.is_finite:
             self._attitude = Injected(message, now)
         elif isinstance(message, rededge.MountStatus):
             self._mount = Injected(message, now)

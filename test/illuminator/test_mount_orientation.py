@@ -93,6 +93,15 @@ def test_vehicle_without_attitude_counts_as_level_and_its_heading_must_be_known(
     assert pointed(mounts) == (None if direction is None else approx(direction, abs=1e-9))
 
 
+@pytest.mark.parametrize('value', [NAN, math.inf, -math.inf])
+def test_attitude_of_the_vehicle_that_is_not_a_rotation_is_ignored(value: float) -> None:
+    mounts = MountOrientations()
+    mounts.take(GIMBAL, status((0.0, 0.0, 0.5)), 0.0)
+    for body in ((value, 0.0, 0.0), (0.0, value, 0.0), (0.0, 0.0, value)):
+        mounts.take(AUTOPILOT, vehicle(*body), 0.0)
+        assert pointed(mounts) == approx((math.cos(0.5), -math.sin(0.5), 0.0))
+
+
 def test_direction_ends_with_the_attitude_and_belongs_to_one_gimbal() -> None:
     mounts = MountOrientations()
     mounts.take(GIMBAL, status((0.0, 0.0, 0.0)), 0.0)

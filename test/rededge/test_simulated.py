@@ -226,6 +226,14 @@ def test_images_at_an_interval_have_its_times_and_what_was_known_then() -> None:
     assert (image.time_utc_s, image.position_source) == (OWN_UTC + 1.0, Source.OWN)
 
 
+@pytest.mark.parametrize('value', [math.nan, math.inf])
+def test_attitude_that_is_not_a_rotation_is_ignored(value: float) -> None:
+    camera = Camera(interval=1.0)
+    camera.tell(Attitude(0, value, 0.0, 0.0, 0.0, 0.0, 0.0))
+    camera.wait(3.0)
+    assert [image.attitude_source for image in camera.device.images] == [Source.NONE] * 3
+
+
 def test_feedback_that_waits_is_bounded() -> None:
     camera = Camera('late')
     for _ in range(MAX_IMAGES + 2):
