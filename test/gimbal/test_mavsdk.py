@@ -225,7 +225,7 @@ def test_gm_4_mavsdk_reads_the_angles_that_we_read_in_both_frames(
         target = Quaternion.from_euler(*angles)
 
         assert ours.call(lambda gimbal, now, target=target, frame=frame:  # type: ignore[misc]
-                        gimbal.set_attitude(target, frame, now)) == ''
+                         gimbal.set_attitude(target, frame, now)) == ''
         eventually(lambda target=target, frame=frame:  # type: ignore[misc]
                    ours.rotation(frame).angle_to(target) < math.radians(0.02))
         # MAVSDK computes the other frame from the ATTITUDE of the autopilot, we from delta_yaw.
