@@ -58,6 +58,8 @@ class Rig:
         self.clock, self.steady, self.jumps = Clock(), 50.0, 0
         monkeypatch.setattr('illuminator_ros.rededge.ros.inputs.time.monotonic',
                             lambda: self.steady)
+        monkeypatch.setattr('illuminator_ros.rededge.ros.inputs.time.time_ns',
+                            lambda: round(self.clock.seconds * 1e9))
         # Any: a clock in place of a node.
         node: Any = self.clock
         self.reader = StampReader(node, self.jumped)

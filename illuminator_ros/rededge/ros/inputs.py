@@ -65,8 +65,9 @@ class StampReader:
 
     def read(self, header: Header) -> Stamp:
         """Return the stamp of a message that was received just now."""
-        now = self._clock.now().nanoseconds
         simulated = self._clock.ros_time_is_active
+        # ROS time is the system's otherwise; rclpy takes 50 times as long to read it.
+        now = self._clock.now().nanoseconds if simulated else time.time_ns()
         if not simulated:
             offset = now / 1e9 - time.monotonic()
             if self._offset is not None and abs(offset - self._offset) > JUMP:
@@ -93,7 +94,7 @@ def orientation_and_rates(message: Imu) -> tuple[Quaternion | None, Vector]:
 
 
 def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand]:
-    """Return the subscribed topics, which the feeder takes in the link's thread."""
+    """Return the subscribed topics, which the feeder takes in turns of the link."""
     reader = StampReader(node, lambda: link.call(lambda now: feeder.clock_jumped()))
 
     def topic(
