@@ -161,7 +161,7 @@ class _Setpoint:
 
 class Gimbal:
     """
-    One gimbal device, for a component that may control it; for the link's thread.
+    One gimbal device, for a component that may control it; in turns of the link.
 
     Its first manager that is heard is used. Every change needs primary control, as
     GIMBAL_MANAGER_STATUS shows it.

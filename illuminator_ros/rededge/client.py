@@ -83,7 +83,7 @@ class RedEdgeClient(Payload):
             settings.feeder, send, lambda: self.camera.target, self.events.emit)
 
     def snapshot(self, now: float) -> ClientSnapshot:
-        """Return camera and inputs at this moment; call it in the link's thread."""
+        """Return camera and inputs at this moment; call it in a turn of the link."""
         return ClientSnapshot(self.camera.snapshot(now), self.feeder.snapshot(now))
 
     def link_opened(self, now: float) -> None:

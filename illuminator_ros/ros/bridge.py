@@ -213,7 +213,7 @@ class Bridge:
         while not self._ended.is_set():
             try:
                 more = self.pool.work()
-                self.link.call(self._poll)
+                self.link.run_turn(self._poll)
                 self._diagnostics.poll(self._tick / 2)
                 self.log.flush()
                 if self.link.clock() >= names_due:

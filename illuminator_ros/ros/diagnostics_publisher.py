@@ -29,10 +29,10 @@ from .node import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 
-# Longest wait for the link's thread, s.
+# Longest wait for a turn of the link, s.
 SNAPSHOT_TIMEOUT = 1.0
 
-# Makes reports of a snapshot that was taken in the link's thread; a pure function.
+# Makes reports of a snapshot that was taken in a turn of the link; a pure function.
 MakeReports = Callable[[LinkSnapshot], Sequence[Report]]
 
 
@@ -41,7 +41,7 @@ class DiagnosticsSource:
     """
     The reports of one node.
 
-    :param look: takes a snapshot, in the link's thread, given the time (s).
+    :param look: takes a snapshot, in a turn of the link, given the time (s).
     """
 
     node_name: str
@@ -81,7 +81,7 @@ class DiagnosticsPublisher:
             self._sources.pop(source, None)
 
     def look(self, now: float) -> LinkSnapshot:
-        """Return a snapshot of the link; call it in the link's thread."""
+        """Return a snapshot of the link; call it in a turn of the link."""
         return link_snapshot(self._link, self._component, self._url, now)
 
     def poll(self, tolerance: float) -> None:
@@ -94,7 +94,7 @@ class DiagnosticsPublisher:
             sources = list(self._sources)
         taken: queue.SimpleQueue[tuple[float, LinkSnapshot, list[MakeReports]]] = (
             queue.SimpleQueue())
-        self._link.call(lambda now: taken.put((
+        self._link.run_turn(lambda now: taken.put((
             now, self.look(now), [source.look(now) for source in sources])))
         try:
             now, link, looks = taken.get(timeout=SNAPSHOT_TIMEOUT)

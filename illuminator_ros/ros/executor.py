@@ -191,7 +191,7 @@ class NodeExecutor(SingleThreadedExecutor):
         self, service: Service, header: _rclpy.rmw_service_info_t, response: object,
     ) -> None:
         # The middleware waits up to 0.1 s for a client that it does not know yet. Only here: it
-        # must not hold up the link's thread.
+        # must not hold up the link.
         send = functools.partial(_send, service, header, response)
         with self._counting:
             spaced = self._open[id(service)] > MAX_UNSPACED
@@ -255,7 +255,6 @@ class _Entities:
             *((wait_set.add_service, service.handle) for service in services),
             *((wait_set.add_subscription, one.handle) for one in subscriptions),
             *((wait_set.add_guard_condition, guard.handle) for guard in guards)]
-        self._prepare()
 
     @classmethod
     def of(
@@ -269,21 +268,15 @@ class _Entities:
                    [one for node in nodes for one in node.subscriptions],
                    [wakeup, *(one for node in nodes for one in node.guards)], context)
 
-    def _prepare(self) -> None:
-        self._wait_set.clear_entities()
-        for add, handle in self._added:
-            add(handle)
-
     def wait(self, timeout: float | None) -> tuple[list[Service], list[Subscription]]:
         """Wait, and return the services and subscriptions that are ready."""
         wait_set = self._wait_set
+        wait_set.clear_entities()
+        for add, handle in self._added:
+            add(handle)
         wait_set.wait(-1 if timeout is None else int(timeout * 1e9))
-        ready = ([self._services[one] for one in wait_set.get_ready_entities('service')],
-                 [self._subscriptions[one]
-                  for one in wait_set.get_ready_entities('subscription')])
-        # Before the callbacks: the link's thread, which they wake, then gets the interpreter.
-        self._prepare()
-        return ready
+        return ([self._services[one] for one in wait_set.get_ready_entities('service')],
+                [self._subscriptions[one] for one in wait_set.get_ready_entities('subscription')])
 
     def close(self) -> None:
         """Let the entities go."""

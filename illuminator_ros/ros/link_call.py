@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bringing requests from ROS callbacks to the link's thread."""
+"""Bringing requests from ROS callbacks into turns of the link."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ T = TypeVar('T')
 # Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
 
-# A request: called in the link's thread with the time, s, and with the function that it must
+# A request: called in a turn of the link with the time, s, and with the function that it must
 # call once with its answer, then or later.
 Request = Callable[[float, Callable[[T], None]], None]
 
 
 class LinkCalls:
     """
-    Requests of one kind to the link's thread.
+    Requests of one kind, for turns of the link.
 
     :param limit: how many may wait for their answers; one more is refused at once.
     """
@@ -81,14 +81,14 @@ class LinkCalls:
                 self._log.error(reason, 'request')
                 end(lambda: refuse(reason))
 
-        self._link.call(run)
+        self._link.run_turn(run)
 
 
 class LatestOnly(Generic[T]):
     """
     Carries out one request after the other; of those that come meanwhile only the newest.
 
-    For the link's thread.
+    For turns of the link.
 
     :param start: starts a request, given its value, the time (s), and the function to call with
         the time when it has ended.

@@ -101,7 +101,7 @@ class RequestService(Generic[Q, A]):
     A service ``~/name``.
 
     :param type: the service's class; its response has ``success`` and ``message``.
-    :param start: called in the link's thread with the request, the time (s), and the function
+    :param start: called in a turn of the link with the request, the time (s), and the function
         that it must call once with success and message, then or later.
     :param limit: requests that may wait for their answers; one more is answered at once.
     """
@@ -130,7 +130,7 @@ class CommandTopic(Generic[T]):
     A topic ``~/name`` that the node subscribes to.
 
     :param type: the message's class, without sequences.
-    :param take: called in the link's thread with a value and the time (s); of values that come
+    :param take: called in a turn of the link with a value and the time (s); of values that come
         faster than the link takes them only the newest.
     :param read: returns the value of a message, in any thread; a ValueError is logged. The message
         has the fields of ``type`` only, and tuples for arrays.
@@ -195,7 +195,7 @@ def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:
 
 
 class _Newest(Generic[T]):
-    """Hands the newest value of a topic to the link's thread."""
+    """Hands the newest value of a topic to a turn of the link."""
 
     def __init__(self, link: Link, log: NodeLog, command: CommandTopic[T]) -> None:
         self._link = link
@@ -215,7 +215,7 @@ class _Newest(Generic[T]):
             called = bool(self._waiting)
             self._waiting[:] = [value]
         if not called:
-            self._link.call(self._deliver)
+            self._link.run_turn(self._deliver)
 
     def _deliver(self, now: float) -> None:
         with self._lock:

@@ -51,7 +51,7 @@ MAX_NAMES = 1000
 # Requests that wait in the middleware, each of the size of a few parameters.
 QUEUE_DEPTH = 100
 
-# Sets values in the device, in the link's thread, given the time (s); calls its last argument
+# Sets values in the device, in a turn of the link, given the time (s); calls its last argument
 # once with '' or why the values were not set.
 Configure = Callable[[Values, float, Callable[[str], None]], None]
 # Raises ValueError where the device cannot take a value of a parameter, given its name.
@@ -155,7 +155,7 @@ class ParameterServices:
         self._calls.ask(
             lambda now, done: self._set_all(messages, now, done), answer, answer)
 
-    # In the link's thread
+    # In turns of the link
 
     def _set_each(
         self, messages: Messages, now: float, answer: Callable[[list[str]], None],

@@ -359,7 +359,7 @@ def _sections(content: object) -> Iterator[tuple[tuple[str, ...], Set[str]]]:
 
 class DeviceParameters:
     """
-    Parameters of a node that show a device; for the link's thread.
+    Parameters of a node that show a device; for turns of the link.
 
     They have no value until the device reports one, and only :meth:`show` sets them.
 

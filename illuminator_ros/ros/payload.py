@@ -58,7 +58,7 @@ class Host:
 
 
 class ServedPayload:
-    """A payload that is served. All but :meth:`close` runs in the link's thread."""
+    """A payload that is served. All but :meth:`close` runs in turns of the link."""
 
     def poll(self, now: float) -> None:
         """Do what is due; called a few times a second."""

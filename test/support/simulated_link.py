@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+import contextlib
 import selectors
 from typing import Any
 
@@ -73,8 +74,12 @@ class _Selector(selectors.BaseSelector):
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         link = self._link
-        if link.socket.inbox:
-            return [(self._keys[link.socket], selectors.EVENT_READ)]
+        key = self._keys.get(link.socket)
+        ready = [(key, selectors.EVENT_READ)] if key and link.socket.inbox else []
+        while link.meanwhile:
+            link.meanwhile.popleft()()
+        if ready:
+            return ready
         assert timeout is not None
         link.now = min(link.now + timeout, link.until)
         return []
@@ -93,6 +98,7 @@ class SimulatedLink(Link):
 
     :param take: called with what it sends, and to whom.
     :ivar now: s.
+    :ivar meanwhile: called once each when the link waits, as other threads would.
     """
 
     def __init__(
@@ -101,6 +107,7 @@ class SimulatedLink(Link):
         mavlink_version: int = 2,
     ) -> None:
         self.now = self.until = now
+        self.meanwhile: deque[Callable[[], object]] = deque()
         super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing,
                          mavlink_version=mavlink_version, selector=_Selector(self))
@@ -137,6 +144,12 @@ class SimulatedLink(Link):
             self._run_once()
             idle = idle + 1 if self.now == before and not self.socket.inbox else 0
             assert idle < MAX_IDLE_TURNS, f'the thread would spin at {self.now}'
+
+    def is_woken(self) -> bool:
+        """Return whether the thread was woken since this was asked last."""
+        with contextlib.suppress(BlockingIOError):
+            return bool(self._wake_out.recv(4096))
+        return False
 
     def state(self) -> LinkSnapshot:
         """Return the link at this moment."""

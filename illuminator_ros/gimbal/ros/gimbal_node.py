@@ -69,7 +69,7 @@ REQUESTS: dict[str, Callable[[Gimbal, float, request.Done], None]] = {
 
 class GimbalNode:
     """
-    Serves one gimbal with a node; all methods are for the link's thread.
+    Serves one gimbal with a node; all methods are for turns of the link.
 
     :ivar key: of the gimbal, None while there is none.
     """

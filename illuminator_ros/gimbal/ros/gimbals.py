@@ -66,7 +66,7 @@ def settings(values: Values) -> GimbalSettings:
 
 class Gimbals(ServedPayload):
     """
-    Gives each gimbal on the link a node; for the link's thread.
+    Gives each gimbal on the link a node; for turns of the link.
 
     :param why_none: returns why there is no gimbal, as far as this process knows; '' if not.
     :raises ParameterError: if a parameter is wrong.

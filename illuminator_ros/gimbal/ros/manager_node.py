@@ -111,7 +111,7 @@ def manager_settings(values: Values, ros: Address) -> gimbal_manager.ManagerSett
 
 class ManagerNode(ServedPayload):
     """
-    Serves a manager with one node, for the link's thread.
+    Serves a manager with one node, in turns of the link.
 
     :raises ParameterError: if a parameter is wrong.
     """

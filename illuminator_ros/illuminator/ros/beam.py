@@ -107,7 +107,7 @@ class Beam:
 
 class BeamPublisher:
     """
-    Publishes the beam of one light; for the link's thread.
+    Publishes the beam of one light, in turns of the link.
 
     :param direction: returns the rotation of a gimbal, given its gimbal device id, relative to
         the vehicle; None if it is not known.

@@ -55,7 +55,7 @@ class LightNode:
     """
     Serves one light with a node: topics, services, parameters, diagnostics.
 
-    All methods but :meth:`close` are for the link's thread.
+    All methods but :meth:`close` are for turns of the link.
 
     :param services: ``commands``, of the node beside those of its light.
     :ivar address: of the light, None while there is none.

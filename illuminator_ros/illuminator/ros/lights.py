@@ -47,7 +47,7 @@ NAMES_DELAY = 10.0
 
 class Lights(ServedPayload):
     """
-    Gives each light on the link a node. In the link's thread, except :meth:`close`.
+    Gives each light on the link a node. In turns of the link, except :meth:`close`.
 
     :raises ParameterError: if a parameter is wrong.
     """

@@ -78,7 +78,7 @@ MOUNT_PARAMETERS = tuple(
 
 class CameraNode(ServedPayload):
     """
-    Serves the camera of a link. In the link's thread, except the making.
+    Serves the camera of a link. In turns of the link, except the making.
 
     :raises ParameterError: if a parameter is wrong.
     """

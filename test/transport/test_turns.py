@@ -1,0 +1,169 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Turns of a link: one after the other, in its thread or in that of a caller."""
+
+from __future__ import annotations
+
+import selectors
+import threading
+from typing import Any
+
+from illuminator_ros.mavlink.messages import heartbeat
+import pytest
+from support.frames import heartbeat_frame
+from support.live_link import BRIDGE, LiveLink, Run, Talker
+from support.open_channel import Open
+from support.simulated_link import SimulatedLink
+from support.waiting import Log, PATIENCE
+
+URL = 'memory://link'
+PEER = ('127.0.0.1', 14550)
+
+
+class Waiting(selectors.DefaultSelector):
+    """
+    Waits, and tells so.
+
+    :ivar begins: set when it begins to wait.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begins = threading.Event()
+
+    def select(self, timeout: float | None = None) -> Any:
+        self.begins.set()
+        return super().select(timeout)
+
+
+@pytest.fixture
+def talker() -> Talker:
+    """Return the endpoint of the link."""
+    return Talker()
+
+
+@pytest.fixture
+def link(talker: Talker) -> SimulatedLink:
+    """Return a link that has heard a peer."""
+    link = SimulatedLink(talker, lambda data, peer: None)
+    link.receive((heartbeat_frame(), PEER))
+    link.run(0.01)
+    link.is_woken()
+    return link
+
+
+def test_caller_takes_the_turn_and_sends_while_the_thread_waits(run: Run, channel: Open) -> None:
+    other, selector = channel(URL), Waiting()
+    link = run(LiveLink(URL, selector=selector))
+    link.wait_open()
+    takers: Log[threading.Thread] = Log()
+
+    def take(now: float) -> None:
+        message = heartbeat(18)
+        message.custom_mode = 0x12345678
+        link.endpoint.outgoing.append((BRIDGE, message))
+        takers.append(threading.current_thread())
+
+    while threading.current_thread() not in takers:
+        selector.begins.clear()
+        # The thread goes round each 0.25 s, since no peer answers.
+        assert selector.begins.wait(PATIENCE)
+        link.link.run_turn(take)
+        takers.wait_for(lambda taker: True)
+    data = b''
+    while b'\x78\x56\x34\x12' not in data:
+        data += b''.join(piece for _, piece in other.receive())
+
+
+def test_turn_within_a_turn_is_left_to_the_thread(link: SimulatedLink) -> None:
+    done: list[str] = []
+
+    def outer(now: float) -> None:
+        link.run_turn(lambda now: done.append('inner'))
+        done.append('outer')
+
+    link.meanwhile.extend((lambda: link.run_turn(outer), lambda: done.append('thread waits')))
+    link.run(0.01)
+    assert done == ['outer', 'thread waits', 'inner']
+
+
+def test_turn_of_a_caller_does_not_overtake_a_call(link: SimulatedLink) -> None:
+    done: list[str] = []
+    link.meanwhile.extend((lambda: link.call(lambda now: done.append('call')),
+                           lambda: link.run_turn(lambda now: done.append('turn'))))
+    link.run(0.01)
+    assert done == ['call', 'turn']
+
+
+@pytest.mark.parametrize(('ahead', 'wakes'), [(0.001, True), (1000.0, False)])
+def test_turn_of_a_caller_wakes_the_thread_for_an_earlier_deadline_only(
+        link: SimulatedLink, talker: Talker, ahead: float, wakes: bool) -> None:
+    found: list[bool] = []
+
+    def plan(now: float) -> None:
+        talker.heartbeat.due = now + ahead
+
+    link.meanwhile.extend((lambda: link.run_turn(plan), lambda: found.append(link.is_woken())))
+    link.run(0.01)
+    assert found == [wakes]
+
+
+def test_frames_of_a_channel_that_a_caller_has_lost_are_not_read(
+        link: SimulatedLink, talker: Talker, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: Any) -> None:
+        raise OSError('no such device')
+
+    def send(now: float) -> None:
+        talker.heartbeat.send(now, talker.outgoing)
+
+    monkeypatch.setattr(link.udp, 'send', fail)
+    link.meanwhile.append(lambda: link.run_turn(send))
+    heard = len(talker.heard)
+    link.socket.inbox.append((heartbeat_frame(sequence=1), PEER))
+    link.run(0.001)
+    assert (link.state().is_open, len(talker.heard)) == (False, heard)
+
+
+def test_fault_in_the_turn_of_a_caller_is_logged_and_ends_neither_caller_nor_link(
+        run: Run, channel: Open, caplog: pytest.LogCaptureFixture) -> None:
+    channel(URL)
+    selector = Waiting()
+    link = run(LiveLink(URL, selector=selector))
+    link.wait_open()
+    deadlines: Log[threading.Thread] = Log()
+    genuine = link.endpoint.next_deadline
+
+    def next_deadline() -> float:
+        deadlines.append(threading.current_thread())
+        if threading.current_thread() is threading.main_thread():
+            raise ValueError('a fault of a payload')
+        return genuine()
+
+    link.endpoint.next_deadline = next_deadline  # type: ignore[method-assign]
+    while threading.main_thread() not in deadlines:
+        selector.begins.clear()
+        assert selector.begins.wait(PATIENCE)
+        link.link.run_turn(lambda now: None)
+    assert link.ask(lambda now: 'goes on') == 'goes on'
+    assert 'internal error in the link' in caplog.text
+
+
+def test_caller_takes_no_turn_of_a_link_that_has_ended(run: Run) -> None:
+    link = run(LiveLink(URL))
+    link.wait_open()
+    link.stop()
+    taken: list[float] = []
+    link.link.run_turn(taken.append)
+    assert not taken
