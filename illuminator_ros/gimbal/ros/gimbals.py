@@ -19,9 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 import functools
 import logging
-import math
-
-from rclpy.node import Node
 
 from .conversions import FRAME_PARAMETERS
 from .gimbal_node import GimbalNode
@@ -31,12 +28,9 @@ from ..gimbal import GimbalSettings
 from ...payload.request import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
-from ...ros.parameters import ignored_parameters, ParameterSpec, Values
+from ...ros.device_nodes import DeviceNodes
+from ...ros.parameters import ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
-from ...ros.throttled_log import NodeLog
-
-# s without a gimbal until the log gives the reason, once.
-NO_GIMBAL_DELAY = 5.0
 
 GIMBAL_PARAMETERS = (
     ParameterSpec('gimbal_device_id', 0, 'gimbal device id of the gimbal to serve; 0 = the first',
@@ -77,21 +71,16 @@ class Gimbals(ServedPayload):
     ) -> None:
         self._client = client
         self._host = host
-        self._settings = settings(host.values)
-        self._name = host.node.get_name()
-        self._why_none = why_none
-        self._first = GimbalNode(
-            host.node, host, host.log, client, self._settings, why_none)
-        self._nodes: dict[GimbalKey, GimbalNode] = {}
-        # The names of the nodes of further gimbals.
-        self._names: dict[GimbalKey, str] = {}
-        self._no_gimbal_due = host.link.clock() + NO_GIMBAL_DELAY
-        host.diagnostics.add(self._first.source)
+        gimbals = settings(host.values)
+        self._nodes = DeviceNodes[GimbalKey, GimbalNode](
+            host, 'gimbal', GimbalNode(host.node, host, host.log, client, gimbals, why_none),
+            lambda node, log: GimbalNode(node, host, log, client, gimbals, why_none),
+            GimbalNode.bind, lambda: client.gimbals)
         client.events.subscribe(self._take)
 
     def _take(self, event: GimbalEvent) -> None:
         if isinstance(event, GimbalForgotten):
-            self._forget(event.key)
+            self._nodes.forget(event.key)
         elif node := self._nodes.get(event.key):
             node.take(event)
         elif isinstance(event, GimbalConnected):
@@ -99,53 +88,20 @@ class Gimbals(ServedPayload):
 
     def _serve(self, event: GimbalConnected) -> None:
         """Give a gimbal a node: the first one, or one of its own."""
-        key = event.key
-        if self._first.key is None and (
-                self._host.values['gimbal_device_id'] in (0, key.device_id)):
-            self._bind(self._first, key, self._host.link.clock())
-            self._first.take(event)
-        elif key not in self._names:
-            name = f'{self._name}_{key.address.system}_{key.device_id}'
-            if name in self._names.values():
+        key, nodes = event.key, self._nodes
+        if nodes.first_is_free and self._host.values['gimbal_device_id'] in (0, key.device_id):
+            nodes.bind(nodes.first, key, self._host.link.clock())
+            nodes.first.take(event)
+        else:
+            name = f'{self._host.node.get_name()}_{key.address.system}_{key.device_id}'
+            if nodes.has_name(name):
                 # The same number behind another manager.
                 name += f'_{key.address.component}'
-            self._names[key] = name
-            self._host.nodes.make(key, f'gimbal {key}', name,
-                                  functools.partial(self._serve_further, key))
-
-    def _serve_further(self, key: GimbalKey, node: Node) -> None:
-        """Give the node of a further gimbal its interface; in the thread that makes nodes."""
-        log = NodeLog(node.get_logger())
-        gimbal_node = GimbalNode(node, self._host, log, self._client, self._settings,
-                                 self._why_none)
-        for warning in ignored_parameters(node, self._host.node):
-            log.warning(warning)
-        self._host.log.info(f'gimbal {key} is served by {gimbal_node.full_name}', 'served')
-        self._host.link.call(lambda now: self._bind(gimbal_node, key, now))
-
-    def _bind(self, node: GimbalNode, key: GimbalKey, now: float) -> None:
-        if key in self._client.gimbals:
-            self._nodes[key] = node
-            node.bind(key, now)
-            self._host.diagnostics.add(node.source)
-
-    def _forget(self, key: GimbalKey) -> None:
-        self._names.pop(key, None)
-        node = self._nodes.pop(key, None)
-        if node is not None:
-            node.release()
-        if node is not None and node is not self._first:
-            self._host.diagnostics.remove(node.source)
-            self._host.log.info(
-                f'gimbal {key} was silent for long: {node.full_name} is removed', 'forgotten')
-        self._host.nodes.remove(key)
+            nodes.serve(key, name)
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""
-        if now >= self._no_gimbal_due:
-            self._no_gimbal_due = math.inf
-            if self._first.key is None:
-                self._host.log.warning(self._first.absence(now))
+        self._nodes.poll(now)
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """See :meth:`ServedPayload.shut_down`: release the gimbals that we control."""

@@ -21,7 +21,6 @@ import functools
 import logging
 import math
 
-from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
@@ -33,14 +32,12 @@ from ..light import Light
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.request import Result
+from ...ros.device_nodes import DeviceNodes
 from ...ros.link_call import LatestOnly
 from ...ros.node import Answer, CommandTopic, RequestService
-from ...ros.parameters import ignored_parameters, Values
+from ...ros.parameters import Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
-from ...ros.throttled_log import NodeLog
 
-# s without a light until the log gives the reason, once.
-NO_LIGHT_DELAY = 5.0
 # s after the first light in which lights that start together are heard.
 NAMES_DELAY = 10.0
 
@@ -56,31 +53,29 @@ class Lights(ServedPayload):
         self._client = client
         self._host = host
         self._selection = parameters.Selection(host.values, host.node.get_name())
-        self._geometry = parameters.BeamGeometry.of(host.values)
+        geometry = parameters.BeamGeometry.of(host.values)
         self._switching = LatestOnly(self._switch_all)
-        self._first = LightNode(
-            host.node, host, host.log, client, self._geometry,
-            services=(RequestService('enable_all', SetBool, self._enable_all),),
-            commands=(CommandTopic('cmd/enable_all', Bool, self._switching.offer),))
-        # By the addresses of their lights.
-        self._nodes: dict[Address, LightNode] = {}
-        self._wanted: set[Address] = set()
+        self._nodes = DeviceNodes[Address, LightNode](
+            host, 'light', LightNode(
+                host.node, host, host.log, client, geometry,
+                services=(RequestService('enable_all', SetBool, self._enable_all),),
+                commands=(CommandTopic('cmd/enable_all', Bool, self._switching.offer),)),
+            lambda node, log: LightNode(node, host, log, client, geometry.declare(node)),
+            LightNode.bind, lambda: client.lights)
         self._second_reported = False
-        self._no_light_due = host.link.clock() + NO_LIGHT_DELAY
         self._names_due = math.inf
-        host.diagnostics.add(self._first.source)
         client.events.subscribe(self._take)
         client.mount_moved.subscribe(self._turn)
 
     def _turn(self, system: int) -> None:
-        for address, node in self._nodes.items():
-            if address.system == system:
+        for node in self._nodes:
+            if node.address and node.address.system == system:
                 node.turn()
 
     def _take(self, event: events.AnyLightEvent) -> None:
         node = self._nodes.get(event.address)
         if isinstance(event, events.LightForgotten):
-            self._forget(event.address)
+            self._nodes.forget(event.address)
         elif node is not None:
             if isinstance(event, events.LightRestarted):
                 # Its sequence numbers have restarted, which is not a loss.
@@ -92,50 +87,18 @@ class Lights(ServedPayload):
     def _serve(self, address: Address) -> None:
         """Give a light a node: the first one, or one of its own."""
         now = self._host.link.clock()
-        selected = self._selection.is_target(address)
-        if selected and self._first.address is None:
+        nodes, selected = self._nodes, self._selection.is_target(address)
+        if selected and nodes.first_is_free:
             if warning := self._selection.unused_name(address):
                 self._host.log.warning(warning)
             self._names_due = now + NAMES_DELAY
-            self._bind(self._first, address, now)
-        elif address not in self._wanted:
-            self._wanted.add(address)
-            if selected and not self._second_reported:
-                self._second_reported = True
-                self._host.log.info(
-                    f'a second light, {address}, was found; {self._first.full_name} serves '
-                    f'{self._first.address}. Set target_system and target_component to choose')
-            self._host.nodes.make(
-                address, f'light {address}', self._selection.node_name(address),
-                functools.partial(self._serve_further, address))
-
-    def _serve_further(self, address: Address, node: Node) -> None:
-        """Give the node of a further light its interface; in the thread that makes nodes."""
-        log = NodeLog(node.get_logger())
-        geometry = self._geometry.declare(node)
-        light_node = LightNode(node, self._host, log, self._client, geometry)
-        for warning in ignored_parameters(node, self._host.node):
-            log.warning(warning)
-        self._host.log.info(f'light {address} is served by {light_node.full_name}', 'served')
-        self._host.link.call(lambda now: self._bind(light_node, address, now))
-
-    def _bind(self, node: LightNode, address: Address, now: float) -> None:
-        if address in self._client.lights:
-            self._nodes[address] = node
-            node.bind(address, now)
-            self._host.diagnostics.add(node.source)
-
-    def _forget(self, address: Address) -> None:
-        self._wanted.discard(address)
-        node = self._nodes.pop(address, None)
-        if node is not None:
-            node.release()
-        if node is not self._first:
-            if node is not None:
-                self._host.diagnostics.remove(node.source)
-                self._host.log.info(f'light {address} was silent for long: {node.full_name} '
-                                    'is removed', 'forgotten')
-            self._host.nodes.remove(address)
+            nodes.bind(nodes.first, address, now)
+        elif (nodes.serve(address, self._selection.node_name(address)) and selected
+                and not self._second_reported):
+            self._second_reported = True
+            self._host.log.info(
+                f'a second light, {address}, was found; {nodes.first.full_name} serves '
+                f'{nodes.first.address}. Set target_system and target_component to choose')
 
     # Requests to all lights
 
@@ -146,7 +109,7 @@ class Lights(ServedPayload):
                        lambda result, now: answer(result.success, result.message),
                        name=self._name_of, detail='enable_all')
         else:
-            answer(False, self._first.absence(now))
+            answer(False, self._nodes.first.absence(now))
 
     def _switch_all(self, on: bool, now: float, ended: Callable[[float], None]) -> None:
         def answer(success: bool, message: str) -> None:
@@ -164,15 +127,12 @@ class Lights(ServedPayload):
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""
-        if now >= self._no_light_due:
-            self._no_light_due = math.inf
-            if self._first.address is None:
-                self._host.log.warning(self._first.absence(now))
+        self._nodes.poll(now)
         if now >= self._names_due:
             self._names_due = math.inf
             for warning in self._selection.unused_names(self._client.lights):
                 self._host.log.warning(warning)
-        for node in self._nodes.values():
+        for node in self._nodes:
             node.poll()
 
     def may_name(self, name: str) -> bool:
@@ -202,10 +162,8 @@ class Lights(ServedPayload):
 
     def close(self) -> None:
         """See :meth:`ServedPayload.close`."""
-        self._first.close()
-        for node in self._nodes.values():
-            if node is not self._first:
-                node.close()
+        for node in {self._nodes.first, *self._nodes}:
+            node.close()
 
 
 def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:

@@ -1,0 +1,141 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The nodes of the devices of one kind: the payload's own, and one for each further device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Hashable, Iterator
+import functools
+import math
+from typing import Generic, Protocol, TypeVar
+
+from rclpy.node import Node
+
+from .diagnostics_publisher import DiagnosticsSource
+from .parameters import ignored_parameters
+from .payload import Host
+from .throttled_log import NodeLog
+
+# s without a device until the log gives the reason, once.
+ABSENCE_DELAY = 5.0
+
+
+class DeviceNode(Protocol):
+    """
+    The node of a device, while there is one.
+
+    :ivar full_name: with its namespace.
+    """
+
+    full_name: str
+    source: DiagnosticsSource
+
+    def release(self) -> None:
+        """Serve no device: it was forgotten."""
+
+    def absence(self, now: float) -> str:
+        """Return why there is no device, for people."""
+
+
+K = TypeVar('K', bound=Hashable)
+N = TypeVar('N', bound=DeviceNode)
+
+
+class DeviceNodes(Generic[K, N]):
+    """
+    Gives devices their nodes; for the link's thread.
+
+    :param kind: a noun for a device, such as ``light``.
+    :param first: the payload's own node.
+    :param make: gives the node of a further device its interface; in the thread that makes nodes.
+    :param bind: has a node serve a device from then on, given its key and the time (s).
+    :param devices: returns the devices that are there, by key.
+    :ivar first: see above.
+    """
+
+    def __init__(
+        self, host: Host, kind: str, first: N, make: Callable[[Node, NodeLog], N],
+        bind: Callable[[N, K, float], None], devices: Callable[[], Container[K]],
+    ) -> None:
+        self.first = first
+        self._host = host
+        self._kind = kind
+        self._make = make
+        self._bind_node = bind
+        self._devices = devices
+        self._nodes: dict[K, N] = {}
+        # The names of the nodes of further devices, also before they are made.
+        self._names: dict[K, str] = {}
+        self._absence_due = host.link.clock() + ABSENCE_DELAY
+        host.diagnostics.add(first.source)
+
+    def __iter__(self) -> Iterator[N]:
+        return iter(self._nodes.values())
+
+    def get(self, key: K) -> N | None:
+        """Return the node that serves a device."""
+        return self._nodes.get(key)
+
+    def has_name(self, name: str) -> bool:
+        """Return whether the node of a further device has a name, without namespace."""
+        return name in self._names.values()
+
+    @property
+    def first_is_free(self) -> bool:
+        """Return whether the payload's own node serves no device."""
+        return self.first not in self._nodes.values()
+
+    def serve(self, key: K, name: str) -> bool:
+        """Give a further device a node of its own; return False if that was done before."""
+        if key in self._names:
+            return False
+        self._names[key] = name
+        self._host.nodes.make(
+            key, f'{self._kind} {key}', name, functools.partial(self._serve, key))
+        return True
+
+    def _serve(self, key: K, node: Node) -> None:
+        log = NodeLog(node.get_logger())
+        served = self._make(node, log)
+        for warning in ignored_parameters(node, self._host.node):
+            log.warning(warning)
+        self._host.log.info(f'{self._kind} {key} is served by {served.full_name}', 'served')
+        self._host.link.call(lambda now: self.bind(served, key, now))
+
+    def bind(self, node: N, key: K, now: float) -> None:
+        """Have a node serve a device from now on, if that is there."""
+        if key in self._devices():
+            self._nodes[key] = node
+            self._bind_node(node, key, now)
+            self._host.diagnostics.add(node.source)
+
+    def forget(self, key: K) -> None:
+        """Remove the node of a device that was forgotten; the payload's own one stays."""
+        self._names.pop(key, None)
+        node = self._nodes.pop(key, None)
+        if node is not None:
+            node.release()
+            if node is not self.first:
+                self._host.diagnostics.remove(node.source)
+                self._host.log.info(f'{self._kind} {key} was silent for long: {node.full_name} is '
+                                    'removed', 'forgotten')
+        self._host.nodes.remove(key)
+
+    def poll(self, now: float) -> None:
+        """Log once why there is no device."""
+        if now >= self._absence_due:
+            self._absence_due = math.inf
+            if self.first_is_free:
+                self._host.log.warning(self.first.absence(now))
