@@ -105,12 +105,14 @@ class MinimalLight:
         command = int(values[7])
         if command in self.silent:
             self.asked.set()
-        elif command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+            return
+        if command == mav.MavCmd.ILLUMINATOR_ON_OFF:
             self._on = int(values[0])
-            self._send(mav.CommandAck(command, mav.MavResult.ACCEPTED))
-            self.status()
-        else:
+        elif (command, values[0]) != (mav.MavCmd.REQUEST_MESSAGE, IlluminatorStatus.id):
             self._send(mav.CommandAck(command, mav.MavResult.UNSUPPORTED))
+            return
+        self._send(mav.CommandAck(command, mav.MavResult.ACCEPTED))
+        self.status()
 
     def _send(self, message: mav.Message) -> None:
         self._sequence = (self._sequence + 1) & 0xFF
