@@ -19,15 +19,14 @@ import json
 from pathlib import Path
 import re
 import signal
-import subprocess
 import sys
 from xml.etree import ElementTree
 
 import pytest
 from support.ports import free_port
-from support.processes import environment, Program, ROOT, run
+from support.processes import Program, run
 from support.terminals import Terminal
-from support.waiting import eventually, PATIENCE
+from support.waiting import eventually
 
 Start = Callable[..., Program]
 
@@ -71,13 +70,6 @@ def simulate(start: Start, url: str) -> Start:
         program.wait_for('link open')
         return program
     return one
-
-
-def shell(command: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        f'{sys.executable} -m {CONFORMANCE} {command}', shell=True, cwd=ROOT,
-        env=environment({'PYTHONUNBUFFERED': ''}), text=True, capture_output=True,
-        timeout=PATIENCE)
 
 
 def test_a_run_ends_with_its_verdict_and_its_reports_agree(
@@ -168,9 +160,9 @@ def test_a_closed_terminal_leaves_the_light_as_it_was(url: str, simulate: Start)
         eventually(lambda: 'off    100 %  no strobe' in simulator.lines[-1], 'not restored')
 
 
-@pytest.mark.parametrize('arguments', ['--list', '--help', 'udpin://{url} --wait 0.1'])
+@pytest.mark.parametrize('arguments', ['--list', 'udpin://{url} --wait 0.1'])
 def test_a_full_disk_is_reported_in_one_line_with_status_1(url: str, arguments: str) -> None:
-    ended = shell(f'{arguments.format(url=url)} > /dev/full')
+    ended = run(CONFORMANCE, *arguments.format(url=url).split(), redirection='> /dev/full')
 
     assert ended.stderr == 'conformance: standard output: No space left on device\n'
     assert ended.returncode == 1
@@ -179,7 +171,8 @@ def test_a_full_disk_is_reported_in_one_line_with_status_1(url: str, arguments: 
 @pytest.mark.parametrize('redirection', ['<&- >&-', '2>&-'])
 def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirection: str) -> None:
     simulate()
-    ended = shell(f'udpout://{url} --only strobe --only address {redirection}')
+    ended = run(CONFORMANCE, f'udpout://{url}', '--only', 'strobe', '--only', 'address',
+                redirection=redirection)
 
     assert ended.returncode == 0
     assert 'Traceback' not in ended.stderr

@@ -20,9 +20,9 @@ import sys
 
 import pytest
 from support.ports import free_port
-from support.processes import environment, python, ROOT
+from support.processes import environment, python, ROOT, run
 from support.terminals import Terminal
-from support.waiting import eventually, PATIENCE
+from support.waiting import eventually
 
 
 @pytest.fixture
@@ -41,10 +41,8 @@ def test_a_simulator_on_a_terminal_takes_commands_and_draws_with_escapes(url: st
 
 
 def test_a_simulator_on_a_pipe_takes_commands_and_prints_plain_text(url: str) -> None:
-    ended = subprocess.run(
-        [sys.executable, '-m', 'illuminator_ros.simulator', url], cwd=ROOT, env=environment(),
-        input='on\nbrightness 40\nfault nope\nstatus\nquit\n', text=True, capture_output=True,
-        timeout=PATIENCE)
+    ended = run('illuminator_ros.simulator', url,
+                typed='on\nbrightness 40\nfault nope\nstatus\nquit\n')
 
     assert ended.returncode == 0
     assert "no fault 'nope'" in ended.stdout

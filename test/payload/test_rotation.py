@@ -58,17 +58,6 @@ def test_composition_inverse_and_vectors_are_those_of_scipy(
         (oracle(one).inv() * oracle(other)).magnitude(), abs=1e-6)
 
 
-@given(angles, angles, angles)
-def test_euler_angles_are_intrinsic_zyx(roll: float, pitch: float, yaw: float) -> None:
-    assert distance(Quaternion.from_euler(roll, pitch, yaw),
-                    Rotation.from_euler('ZYX', [yaw, pitch, roll])) < 1e-6
-
-
-@given(quaternions)
-def test_euler_angles_recompose_the_rotation_at_the_singular_pitch_too(q: Quaternion) -> None:
-    assert q.angle_to(Quaternion.from_euler(*q.euler())) < math.radians(0.001)
-
-
 @given(quaternions, vectors)
 def test_frames_of_ros_and_mavlink_are_converted_there_and_back(
         q: Quaternion, vector: Vector) -> None:
@@ -77,13 +66,6 @@ def test_frames_of_ros_and_mavlink_are_converted_there_and_back(
     assert distance(flip(q), FLU_TO_FRD * oracle(q) * FLU_TO_FRD.inv()) < 1e-6
     assert enu_ned(vector) == pytest.approx(ENU_TO_NED.apply(vector), abs=1e-9)
     assert flu_frd(vector) == pytest.approx(FLU_TO_FRD.apply(vector), abs=1e-9)
-
-
-@pytest.mark.parametrize('yaw_ros, yaw_mavlink', [(0, 90), (90, 0), (180, -90), (-90, 180)])
-def test_yaw_is_counted_from_east_in_ros_and_from_north_in_mavlink(
-        yaw_ros: float, yaw_mavlink: float) -> None:
-    _, _, yaw = ned_frd(Quaternion.from_euler(0, 0, math.radians(yaw_ros))).euler()
-    assert math.cos(yaw - math.radians(yaw_mavlink)) == pytest.approx(1)
 
 
 @pytest.mark.parametrize('q', [

@@ -16,7 +16,6 @@
 
 import contextlib
 from contextlib import AbstractContextManager
-import os
 import sys
 
 import pytest
@@ -25,7 +24,7 @@ pytest.importorskip('rclpy')
 
 from std_msgs.msg import Bool, Float32  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import ended, Program, ROOT  # noqa: E402
+from support.processes import ended, Program  # noqa: E402
 from support.ros import own_domain, Ros  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
@@ -42,10 +41,8 @@ def program(
     name: str, *arguments: str, domain: int, options: str = '',
 ) -> AbstractContextManager[Program]:
     code = PROGRAM.format(name=name, options=options)
-    return ended(Program(sys.executable, '-c', code, *arguments, env={
-        'PYTHONPATH': os.pathsep.join(
-            filter(None, (str(ROOT), str(ROOT / 'test'), os.environ.get('PYTHONPATH')))),
-        'ROS_DOMAIN_ID': str(domain)}))
+    return ended(Program(
+        sys.executable, '-c', code, *arguments, env={'ROS_DOMAIN_ID': str(domain)}))
 
 
 def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:

@@ -29,7 +29,7 @@ ENABLE, BRIGHTNESS = '/illuminator/cmd/enable', '/illuminator/cmd/brightness'
 def test_newest_enable_message_wins_while_the_light_is_being_switched(
     ros: Ros, light: ServedLight, parameters: Parameters,
 ) -> None:
-    light.fake.delays[ON_OFF] = math.inf
+    light.fake.held[ON_OFF] = []
     ros.publish(Bool, ENABLE, *[True] * 50, False)
     light.wait_for(ON_OFF)
     # The node has taken what came before it answers.

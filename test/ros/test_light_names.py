@@ -95,7 +95,7 @@ def test_only_target_leaves_other_lights_alone_and_unused_names_are_logged(
 
     assert light_of(own_ros, '/illuminator', lights) == FIRST
     eventually(lambda: nodes(own_ros) == {'/illuminator', '/stern'})
-    assert lights[0].fake.received == []
+    assert list(lights[0].fake.received) == []
     assert not bridge.count('names: ')
     CLOCK.forward(NAME_GRACE)
     bridge.wait_for('names: 1/250=mast is not used yet')

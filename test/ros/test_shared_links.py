@@ -18,11 +18,11 @@ from collections.abc import Callable, Iterator
 import contextlib
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from illuminator_ros.mavlink.url import parse_url
 import pytest
 from std_msgs.msg import Bool
 from support.fake_light import FakeLight
 from support.light import Address
+from support.live_link import EndpointLink
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
@@ -78,12 +78,9 @@ def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
         FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=100.0),
         FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, enable=1,
                   brightness=40.0))
-    with running_bridge(domain, port) as bridge:
-        link = SlowLink(parse_url(url), lights, label=url)
-        link.start()
+    with running_bridge(domain, port) as bridge, EndpointLink(url, lights, kind=SlowLink):
         bridge.wait_for('several lights answer as 1/1: parameters stay as they are')
         yield bridge, lights
-        link.stop()
 
 
 def test_two_lights_at_one_address_are_a_warning_and_a_set_reaches_both(

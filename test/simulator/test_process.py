@@ -34,18 +34,15 @@ def assert_served(*command: str, stdout: int | None, stderr: int | None) -> None
     """Assert that a simulator obeys a bridge, and ends on SIGTERM without delay."""
     port = free_port()
     # By the clock of the machine, which may stand still for longer than a confirmation takes.
-    bridge = Bridge(f'udpin:127.0.0.1:{port}')
-    process = subprocess.Popen(
-        [*command, f'udpout://127.0.0.1:{port}'], env=environment(), cwd=ROOT, stdout=stdout,
-        stderr=stderr, stdin=subprocess.DEVNULL, preexec_fn=prepare_child)
-    try:
-        eventually(lambda: bridge.enable(True).success)
-        process.terminate()
-        assert process.wait(PATIENCE) == 0
-    finally:
-        bridge.stop()
-        process.kill()
-        process.wait()
+    with Bridge(f'udpin:127.0.0.1:{port}') as bridge, subprocess.Popen(
+            [*command, f'udpout://127.0.0.1:{port}'], env=environment(), cwd=ROOT, stdout=stdout,
+            stderr=stderr, stdin=subprocess.DEVNULL, preexec_fn=prepare_child) as process:
+        try:
+            eventually(lambda: bridge.enable(True).success)
+            process.terminate()
+            assert process.wait(PATIENCE) == 0
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize(('stream', 'make'), [
@@ -80,12 +77,9 @@ def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped() -> None:
 
 def test_the_first_message_of_a_peer_is_one_line() -> None:
     port = free_port()
-    with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')) as program:
-        bridge = Bridge(f'udpin:127.0.0.1:{port}')
-        try:
-            for on in (True, False):
-                eventually(lambda on=on: bridge.enable(on).success)  # type: ignore[misc]
-            program.wait_for(f'peer {Address(1, 194)}: first message')
-        finally:
-            bridge.stop()
+    with (ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')) as program,
+          Bridge(f'udpin:127.0.0.1:{port}') as bridge):
+        for on in (True, False):
+            eventually(lambda on=on: bridge.enable(on).success)  # type: ignore[misc]
+        program.wait_for(f'peer {Address(1, 194)}: first message')
     assert program.count('first message') == 1

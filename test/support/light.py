@@ -17,11 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
-import queue
-import threading
-from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.mavlink.link import Link
@@ -33,71 +29,47 @@ from illuminator_ros.mavlink.messages import (
     MavCmd,
     MavResult,
 )
-from illuminator_ros.mavlink.url import parse_url
 from support.fake_light import FakeLight
+from support.live_link import EndpointLink
 from support.ports import free_port
 from support.slow import CLOCK, SlowLink, SPEED
-from support.waiting import eventually, PATIENCE
+from support.waiting import eventually, Log
 
 LIGHT = Address(1, 243)
 # s of the slow clock between statuses: ten in a real second.
 STREAM = 0.1 * SPEED
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+T = TypeVar('T')
 
 
 class _Recorder(FakeLight):
     """
     A fake light that keeps what it got, and can answer late.
 
-    :ivar delays: s from each command to its being taken, by MAV_CMD; infinity is until released.
-    :ivar steps: what it rounds brightness to, 0 for nothing.
+    :ivar held: commands that are not taken until they are released, by MAV_CMD.
     :ivar heard_from: the addresses that commands have come from.
-    :ivar most_at_once: how many commands, resends not counted, it ever had to take at a time.
     """
 
     def __init__(self, source: Address, **how: Any) -> None:
         super().__init__(source, **how)
         self.pushes = True
-        self.received: list[Any] = []
-        self.changed = threading.Condition()
-        self.delays: dict[int, float] = {}
-        self.steps = 0.0
+        self.received: Log[Any] = Log()
+        self.held: dict[int, list[tuple[Address, Any]]] = {}
         self.heard_from: set[Address] = set()
-        self.most_at_once = 0
-        self._late: list[tuple[float, Address, Any]] = []
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         if not isinstance(message, CommandLong | CommandInt):
             return
-        with self.changed:
-            self.received.append(message)
-            self.heard_from.add(source)
-            self.changed.notify_all()
-        if delay := self.delays.get(message.command, 0.0):
-            self._late.append((now + delay, source, message))
-            first_tries = [late for _, _, late in self._late if not late.confirmation]
-            self.most_at_once = max(self.most_at_once, len(first_tries))
+        self.heard_from.add(source)
+        self.received.append(message)
+        if message.command in self.held:
+            self.held[message.command].append((source, message))
         else:
             super().receive(source, message, now)
 
-    def status(self, now: float) -> Any:
-        if self.steps:
-            self.fields['brightness'] = (
-                round(self.fields['brightness'] / self.steps) * self.steps)
-        return super().status(now)
-
-    def hurry(self, command: int, now: float) -> None:
-        self._late = [(now if late.command == command else due, source, late)
-                      for due, source, late in self._late]
-
-    def poll(self, now: float) -> None:
-        while self._late and self._late[0][0] <= now:
-            _, source, message = self._late.pop(0)
+    def release(self, command: int, now: float) -> None:
+        for source, message in self.held.pop(command):
             super().receive(source, message, now)
-        super().poll(now)
-
-    def next_deadline(self) -> float:
-        return min(self._late[0][0] if self._late else math.inf, super().next_deadline())
 
 
 class ServedLight:
@@ -114,24 +86,20 @@ class ServedLight:
         self.port = port
         self._kind = link
         self.fake = _Recorder(source, **{'stream': STREAM, **how})
-        self._link: Link | None = None
+        self._link: EndpointLink[_Recorder] | None = None
 
     def __enter__(self) -> ServedLight:
         self.serve()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.vanish()
 
     def serve(self) -> None:
         """Come within hearing."""
         if self._link is None:
-            url = f'udpout://127.0.0.1:{self.port}'
-            self._link = self._kind(parse_url(url), self.fake, label=url)
-            self._link.start()
+            self._link = EndpointLink(
+                f'udpout://127.0.0.1:{self.port}', self.fake, kind=self._kind)
 
     def vanish(self) -> None:
         """Go, as a light whose cable is pulled."""
@@ -142,7 +110,7 @@ class ServedLight:
     def behave(self) -> None:
         """Do from now on what a good light does."""
         self.fake.results.clear()
-        self.fake.delays.clear()
+        self.fake.held.clear()
         self.fake.applies = True
         self.fake.apply_after = 0.0
         self.fake.silent = False
@@ -150,12 +118,10 @@ class ServedLight:
         self.fake.answers.add(STATUS_ID)
         self.fake.stream = STREAM
 
-    def do(self, action: Callable[[float], Any]) -> Any:
+    def do(self, action: Callable[[float], T]) -> T:
         """Have ``action(now)`` called in the light's thread and return what it returns."""
         assert self._link is not None
-        answer: queue.Queue[Any] = queue.Queue()
-        self._link.call(lambda now: answer.put(action(now)))
-        return answer.get(timeout=PATIENCE)
+        return self._link.ask(action)
 
     def report(self, **fields: Any) -> float:
         """
@@ -169,11 +135,7 @@ class ServedLight:
             return self.fake.uptime_ms(now) / 1000
 
         CLOCK.forward(0.002)
-        return float(self.do(act))
-
-    def restart(self, **fields: Any) -> None:
-        """Restart with the default settings, or others."""
-        self.do(lambda now: self.fake.restart(now, **fields))
+        return self.do(act)
 
     def send(self, message: Any, source: Address | None = None) -> None:
         """Send any message, optionally from another address."""
@@ -186,11 +148,8 @@ class ServedLight:
         self.send(CommandAck(command, result, progress, 0, 0, 0), source)
 
     def release(self, command: int) -> None:
-        """Take now what ``delays`` has held back, and hold back no more."""
-        def act(now: float) -> None:
-            self.fake.delays.pop(command, None)
-            self.fake.hurry(command, now)
-        self.do(act)
+        """Take now what ``fake.held`` has, and hold back no more."""
+        self.do(lambda now: self.fake.release(command, now))
 
     def forget(self) -> None:
         """Forget the commands received so far."""
@@ -200,12 +159,9 @@ class ServedLight:
         """Return those of the received commands that are of one kind."""
         return [message for message in list(self.fake.received) if message.command == command]
 
-    def wait_for(self, command: int, count: int = 1, timeout: float = PATIENCE) -> list[Any]:
+    def wait_for(self, command: int, count: int = 1) -> list[Any]:
         """Wait until a command has come ``count`` times, and return its receptions."""
-        with self.fake.changed:
-            assert self.fake.changed.wait_for(
-                lambda: len(self.commands(command)) >= count, timeout), (
-                f'{MavCmd(command).name} came {len(self.commands(command))} times, not {count}')
+        self.fake.received.wait_for(lambda message: message.command == command, count=count)
         return self.commands(command)
 
 

@@ -173,13 +173,19 @@ def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = No
 
 
 def run(
-    module: str, *arguments: str, env: Mapping[str, str] | None = None,
+    module: str, *arguments: str, env: Mapping[str, str] | None = None, typed: str = '',
+    redirection: str = '',
 ) -> subprocess.CompletedProcess[str]:
-    """Run a module of ours to its end; return its exit status and output."""
+    """
+    Run a module of ours to its end; return its exit status and output.
+
+    :param typed: what it reads from standard input.
+    :param redirection: of a shell, such as ``> /dev/full``.
+    """
     return subprocess.run(
-        [sys.executable, '-m', module, *arguments], env=environment(env), cwd=ROOT, text=True,
-        stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE,
-        preexec_fn=prepare_child)
+        ['sh', '-c', f'exec "$@" {redirection}', 'sh', sys.executable, '-m', module, *arguments],
+        env=environment(env), cwd=ROOT, text=True, input=typed, capture_output=True,
+        timeout=PATIENCE, preexec_fn=prepare_child)
 
 
 @contextlib.contextmanager

@@ -16,16 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-import contextlib
 import os
 from pathlib import Path
 import select
-import threading
 
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
-from support.frames import Codec
-from support.simulated_lights import simulated_lights
 from support.waiting import PATIENCE
 
 
@@ -73,39 +67,3 @@ class PtyDevice:
             return os.read(self._far, 65536)
         except (BlockingIOError, OSError):
             return b''
-
-    def connect_light(self, clock: Callable[[], float]) -> Callable[[], None]:
-        """Let a simulated light use the far end; return a function that stops it."""
-        stopping, stop = os.pipe()
-        thread = threading.Thread(target=_run_light, args=(self._far, stopping, clock))
-        thread.start()
-
-        def end() -> None:
-            os.close(stop)
-            thread.join(PATIENCE)
-            os.close(stopping)
-
-        return end
-
-
-def _run_light(line: int, stopping: int, clock: Callable[[], float]) -> None:
-    endpoint, codec = simulated_lights([IlluminatorProperties()], clock()), Codec()
-    while True:
-        now = clock()
-        endpoint.poll(now)
-        while endpoint.outgoing:
-            with contextlib.suppress(OSError):
-                os.write(line, codec.frame(*endpoint.outgoing.popleft()))
-        wait = max(endpoint.next_deadline() - now, 0.0)
-        ready, _, _ = select.select([line, stopping], [], [], wait)
-        if stopping in ready:
-            return
-        if line in ready:
-            try:
-                data = os.read(line, 4096)
-            except OSError:
-                # No program has the device open; a closed pseudo-terminal is always readable.
-                select.select([stopping], [], [], 0.01)
-                continue
-            for source, message in codec.messages(data):
-                endpoint.receive(source, message, clock())

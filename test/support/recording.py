@@ -20,46 +20,29 @@ from collections.abc import Callable
 import threading
 from typing import Any
 
-from support.waiting import PATIENCE
+from support.waiting import Log, PATIENCE
 
 
-class Recorder:
+class Recorder(Log[Any]):
     """Keeps the messages of a topic, and waits for them."""
 
-    def __init__(self) -> None:
-        self.messages: list[Any] = []
-        self._grown = threading.Condition()
-
-    def take(self, message: Any) -> None:
-        """Keep a message."""
-        with self._grown:
-            self.messages.append(message)
-            self._grown.notify_all()
+    @property
+    def messages(self) -> list[Any]:
+        """Return all messages."""
+        return list(self)
 
     @property
     def values(self) -> list[Any]:
         """Return the ``data`` of all messages."""
-        return [message.data for message in self.messages]
+        return [message.data for message in self]
 
-    def clear(self) -> None:
-        """Forget the messages so far."""
-        with self._grown:
-            self.messages.clear()
-
-    def wait(self, wanted: Callable[[Any], Any] = lambda message: True, timeout: float = PATIENCE,
-             count: int = 1) -> Any:
+    def wait(self, wanted: Callable[[Any], Any] = lambda message: True, count: int = 1) -> Any:
         """Wait until ``count`` messages are as wanted, and return the last of them."""
-        def found() -> list[Any]:
-            return [message for message in self.messages if wanted(message)]
+        return self.wait_for(wanted, count=count)
 
-        with self._grown:
-            assert self._grown.wait_for(lambda: len(found()) >= count, timeout), (
-                f'no such message among {self.messages[-3:]}')
-            return found()[count - 1]
-
-    def wait_value(self, value: Any, timeout: float = PATIENCE) -> None:
+    def wait_value(self, value: Any) -> None:
         """Wait until a message has this ``data``."""
-        self.wait(lambda message: message.data == value, timeout)
+        self.wait(lambda message: message.data == value)
 
 
 class Call:

@@ -68,7 +68,7 @@ class Ros(SpunNode):
     def subscribe(self, type_: Any, topic: str, qos: QoSProfile = STATE) -> Recorder:
         """Record a topic: every message from now on, or from the last value on."""
         recorder = Recorder()
-        self.node.create_subscription(type_, topic, recorder.take, qos)
+        self.node.create_subscription(type_, topic, recorder.append, qos)
         self.find_publisher(topic)
         if qos.durability is DurabilityPolicy.VOLATILE:
             for node in eventually(lambda: self._publishing_nodes(topic)):
@@ -195,7 +195,7 @@ class Parameters:
 
         def take(event: ParameterEvent) -> None:
             if event.node == self._node:
-                recorder.take(event)
+                recorder.append(event)
 
         self._ros.node.create_subscription(ParameterEvent, '/parameter_events', take, STREAM)
         self._ros.meet(self._node)

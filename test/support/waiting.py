@@ -40,6 +40,11 @@ class Log(Generic[T]):
             self._entries.append(entry)
             self._changed.notify_all()
 
+    def clear(self) -> None:
+        """Forget all entries."""
+        with self._changed:
+            self._entries.clear()
+
     def __iter__(self) -> Iterator[T]:
         with self._changed:
             return iter(list(self._entries))

@@ -18,7 +18,6 @@ from pathlib import Path
 import re
 import shlex
 import subprocess
-import sys
 
 from illuminator_ros import __version__
 from illuminator_ros.cli.simulator.options import parser
@@ -26,7 +25,7 @@ from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from support.ports import free_port
-from support.processes import ended, environment, python, ROOT, run
+from support.processes import ended, python, ROOT, run
 
 PROGRAMS = ('bridge', 'simulator', 'monitor')
 ROS_REMEDY = 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"'
@@ -165,10 +164,8 @@ def test_missing_package_is_one_line_with_its_remedy_and_status_1(
 def test_help_that_cannot_be_written_is_one_line_with_status_1(
     program: str, option: str, unbuffered: str,
 ) -> None:
-    outcome = subprocess.run(
-        f'exec {sys.executable} -m illuminator_ros.{program} {option} > /dev/full', shell=True,
-        text=True, timeout=30, env=environment({'PYTHONUNBUFFERED': unbuffered}),
-        stderr=subprocess.PIPE, cwd=ROOT)
+    outcome = run(f'illuminator_ros.{program}', option, redirection='> /dev/full',
+                  env={'PYTHONUNBUFFERED': unbuffered})
 
     assert (outcome.returncode, outcome.stderr) == (
         1, f'{program}: standard output: No space left on device\n')
@@ -177,9 +174,7 @@ def test_help_that_cannot_be_written_is_one_line_with_status_1(
 @pytest.mark.parametrize('option', ['--hel', '--versio', '--payl=rededge'])
 @pytest.mark.parametrize('program', ['bridge', 'simulator', 'conformance', 'monitor'])
 def test_an_abbreviated_option_is_refused_with_status_2(program: str, option: str) -> None:
-    outcome = subprocess.run(
-        [sys.executable, '-m', f'illuminator_ros.{program}', option], text=True, timeout=30,
-        env=environment({}), stdin=subprocess.DEVNULL, capture_output=True, cwd=ROOT)
+    outcome = run(f'illuminator_ros.{program}', option)
 
     assert (outcome.returncode, outcome.stdout) == (2, '')
     assert option in outcome.stderr
@@ -194,6 +189,5 @@ def run_without(
 ) -> subprocess.CompletedProcess[str]:
     """Run a program on a machine that lacks a package."""
     (directory / 'sitecustomize.py').write_text(f'import sys\nsys.modules[{package!r}] = None\n')
-    return subprocess.run(
-        [sys.executable, '-m', f'illuminator_ros.{name}', *arguments], text=True, timeout=30,
-        env=environment({'PYTHONPATH': f'{directory}:{ROOT}'}), capture_output=True)
+    return run(f'illuminator_ros.{name}', *arguments,
+               env={'PYTHONPATH': f'{directory}:{ROOT}'})

@@ -17,13 +17,11 @@
 import os
 import re
 import signal
-import subprocess
-import sys
 from typing import Any
 
 import pytest
 from support.light import eventually, free_port, ServedLight
-from support.processes import environment, ROOT, run
+from support.processes import run
 from support.ros import Ros, running_bridge
 from support.slow import CLOCK
 from support.terminals import Terminal
@@ -123,11 +121,8 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
           ServedLight(port, brightness=30.0)):
         bridge.wait_for('connected')
         outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
-        with open('/dev/full', 'w') as full:
-            failed = subprocess.run(
-                [sys.executable, '-m', MONITOR, '--once', '--wait', '20'], cwd=ROOT, text=True,
-                env=environment(domain(own_ros)), stdout=full, stderr=subprocess.PIPE,
-                timeout=60)
+        failed = run(MONITOR, '--once', '--wait', '20', env=domain(own_ros),
+                     redirection='> /dev/full')
 
     heading, row = outcome.stdout.splitlines()
     assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
@@ -140,9 +135,7 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
 @pytest.mark.parametrize(('redirection', 'error'), [
     ('', 'monitor: no lights found\n'), ('>&-', 'monitor: standard output is closed\n')])
 def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error: str) -> None:
-    outcome = subprocess.run(
-        ['sh', '-c', f'exec "$@" {redirection}', 'sh', sys.executable, '-m', MONITOR, '--once',
-         '--wait', '0.1'], cwd=ROOT, env=environment(domain(own_ros)), text=True,
-        capture_output=True, timeout=60)
+    outcome = run(MONITOR, '--once', '--wait', '0.1', env=domain(own_ros),
+                  redirection=redirection)
 
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (1, '', error)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+from pathlib import Path
 import socket
 
 from illuminator_ros.illuminator.light import Settings
@@ -32,7 +33,6 @@ from support import live_link
 from support.frames import heartbeat_frame
 from support.open_channel import bound_socket, listening_socket
 from support.ports import free_port
-from support.ptys import PtyDevice
 from support.waiting import eventually, Log, PATIENCE
 
 CYCLES = 200
@@ -239,61 +239,29 @@ def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: live_link.R
 SILENCE = 30.0
 
 
-class _Lights:
-    """A light over TCP, or over UDP from another port each time."""
-
-    def __init__(self, url: str, lights_url: str, clock: live_link.Jump) -> None:
-        self.url = url
-        self._lights_url, self._clock = lights_url, clock
-        self._lights: live_link.Lights | None = None
-
-    def come(self) -> None:
-        self._lights = live_link.Lights(self._lights_url, clock=self._clock)
-        self._lights.wait_open()
-
-    def go(self) -> None:
-        if self._lights:
-            self._lights.stop()
+# Our side and that of a light: over UDP it has another port each time, and a pseudo-terminal is
+# another device.
+URLS = {'tcp': ('tcp://127.0.0.1:{port}', 'tcpin://127.0.0.1:{port}'),
+        'udp': ('udpin://127.0.0.1:{port}', 'udpout://127.0.0.1:{port}'),
+        'serial': ('serial://{path}:57600', 'pty://{path}')}
 
 
-class _SerialLight:
-
-    def __init__(self, device: PtyDevice, clock: live_link.Jump) -> None:
-        self._device, self._clock = device, clock
-        device.pull_out()
-        self.url = f'serial://{device.path}:57600'
-        self._stop: Callable[[], None] = lambda: None
-
-    def come(self) -> None:
-        self._device.plug_in()
-        self._stop = self._device.connect_light(self._clock)
-
-    def go(self) -> None:
-        self._stop()
-        self._stop = lambda: None
-        self._device.pull_out()
-
-
-@pytest.mark.parametrize('kind', ['tcp', 'udp', 'serial'])
+@pytest.mark.parametrize('kind', URLS)
 def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_each(
-        request_: pytest.FixtureRequest, run: live_link.Run, monkeypatch: pytest.MonkeyPatch,
-        kind: str) -> None:
+        run: live_link.Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str) -> None:
+    if kind == 'serial':
+        pytest.importorskip('serial', reason='pyserial is not installed')
     # No change fails because the machine stood still behind its acknowledgement.
     monkeypatch.setattr(request, 'CONFIRMATION_TIMEOUT', PATIENCE)
     monkeypatch.setattr(component, 'HEARTBEAT_INTERVAL', 0.05)
     clock, port = live_link.Jump(), free_port(socket.SOCK_STREAM)
-    other: _SerialLight | _Lights
-    if kind == 'serial':
-        other = _SerialLight(request_.getfixturevalue('device'), clock)
-    else:
-        ours, theirs = {'tcp': ('tcp', 'tcpin'), 'udp': ('udpin', 'udpout')}[kind]
-        other = _Lights(f'{ours}://127.0.0.1:{port}', f'{theirs}://127.0.0.1:{port}', clock)
-    bridge = run(live_link.Bridge(other.url, Settings(heartbeat_timeout=SILENCE), clock=clock))
+    ours, theirs = (url.format(port=port, path=tmp_path / 'ttyLIGHT') for url in URLS[kind])
+
+    bridge = run(live_link.Bridge(ours, Settings(heartbeat_timeout=SILENCE), clock=clock))
     for count in (1, 2, 3):
-        other.come()
-        light = bridge.wait_connected(count)
-        assert bridge.enable(True, light).success
-        other.go()
+        with live_link.Lights(theirs, clock=clock):
+            light = bridge.wait_connected(count)
+            assert bridge.enable(True, light).success
         # Messages sent before are taken first; on UDP only silence shows the loss.
         bridge.ask(lambda now: None)
         clock.ahead += SILENCE
@@ -301,9 +269,5 @@ def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_
         bridge.lights.wait_for(lambda entry: entry[0] == 'lost', count=count)
         refused = bridge.enable(True, light)
         assert (refused.success, 'is lost' in refused.message) == (False, True)
+
     assert [what for what, _ in bridge.lights] == ['connected', 'lost'] * 3
-
-
-@pytest.fixture(name='request_')
-def _request(request: pytest.FixtureRequest) -> pytest.FixtureRequest:
-    return request
