@@ -171,9 +171,7 @@ def _serve(
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    from ..ros.bridge import Bridge
-    from ..ros.node import MAX_NODE_NAME, PayloadNode
-    from ..ros.parameters import ParameterError
+    from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
 
     # From here on the ROS graph has to be left in order, so a signal only has effect later.
     termination.calls(lambda: None)
@@ -188,19 +186,22 @@ def _serve(
     try:
         rclpy.init(
             args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = PayloadNode(executable.load().node_name)
+        node = PayloadNode(executable.payload)
+        # Other participants discover the node while all this is imported.
+        from ..ros.bridge import Bridge
+        executable.load()
         # Such as two topics with one name.
         failed = 'cannot create the node'
         bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
-    except ParameterError as error:
-        return executable.refuse(f'parameter {error}')
     except Exception as error:
+        from ..ros.parameters import ParameterError
+        if isinstance(error, ParameterError):
+            return executable.refuse(f'parameter {error}')
         # For a lack of descriptors or threads the middleware has none.
         if isinstance(error, OSError) or type(error) is RuntimeError:
             failed = 'cannot start'
         return executable.refuse(f'{failed}: {error}')
     # Existing objects stay: a collector that visits them would only delay answers.
-    gc.collect()
     gc.freeze()
     termination.calls(bridge.end)
     bridge.run()

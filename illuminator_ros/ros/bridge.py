@@ -30,7 +30,6 @@ from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
 from .logger_services import LoggerServices
-from .node import PayloadNode
 from .node_manager import NodeManager
 from .parameters import (
     declare_link_parameters,
@@ -43,6 +42,7 @@ from .parameters import (
     unknown_parameters,
 )
 from .payload import Host, RosPayload, ServedPayload
+from .payload_node import PayloadNode
 from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.component import Component

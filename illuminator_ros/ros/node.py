@@ -22,7 +22,6 @@ import math
 import threading
 from typing import Any, Generic, TYPE_CHECKING, TypeVar
 
-from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -48,37 +47,6 @@ STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Requests that the middleware queues while others are taken, so that each gets an answer.
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-
-
-# Characters of a node's full name: services below it, with the prefixes and suffixes of the
-# middleware, may have 247.
-MAX_NODE_NAME = 247 - len('rq/_255_255/set_parameters_atomicallyRequest')
-
-
-class PayloadNode(Node):
-    """
-    A node without rclpy's parameter services and QoS events.
-
-    An executor would wait for an event of each publisher and subscription, which also take memory.
-
-    :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
-    """
-
-    # Untyped: rclpy's own signatures are long, and differ between its versions.
-    def __init__(self, name: str, **options: Any) -> None:
-        super().__init__(name, start_parameter_services=False, **options)
-
-    def create_publisher(self, *arguments: Any, **options: Any) -> Any:
-        """See :meth:`Node.create_publisher`."""
-        options.setdefault(
-            'event_callbacks', PublisherEventCallbacks(use_default_callbacks=False))
-        return super().create_publisher(*arguments, **options)
-
-    def create_subscription(self, *arguments: Any, **options: Any) -> Any:
-        """See :meth:`Node.create_subscription`."""
-        options.setdefault(
-            'event_callbacks', SubscriptionEventCallbacks(use_default_callbacks=False))
-        return super().create_subscription(*arguments, **options)
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from .executor import NodeExecutor
-from .node import PayloadNode
 from .parameters import ParameterError
+from .payload_node import PayloadNode
 from .throttled_log import NodeLog
 
 # Threads for all nodes except the first. Each further node on a thread costs 5 us a callback.

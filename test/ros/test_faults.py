@@ -22,8 +22,8 @@ from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.ros.event_publisher import EventPublisher
 from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsPublisher
-from illuminator_ros.ros.node import PayloadNode
 from illuminator_ros.ros.parameter_services import ParameterServices
+from illuminator_ros.ros.payload_node import PayloadNode
 import pytest
 from rcl_interfaces.srv import ListParameters
 from rclpy.parameter import Parameter

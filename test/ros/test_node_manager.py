@@ -16,8 +16,8 @@
 
 from collections.abc import Iterator
 
-from illuminator_ros.ros.node import PayloadNode
 from illuminator_ros.ros.node_manager import NodeManager
+from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
 from rclpy.node import Node

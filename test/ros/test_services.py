@@ -20,7 +20,8 @@ import threading
 
 from illuminator_ros.ros import executor as executor_module
 from illuminator_ros.ros.executor import DeferredService, NodeExecutor, Respond
-from illuminator_ros.ros.node import PayloadNode, SERVICE_QOS
+from illuminator_ros.ros.node import SERVICE_QOS
+from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
 from rclpy.qos import QoSProfile

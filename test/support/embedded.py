@@ -25,8 +25,8 @@ from unittest import mock
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.ros import bridge as bridge_module
 from illuminator_ros.ros.bridge import Bridge
-from illuminator_ros.ros.node import PayloadNode
 from illuminator_ros.ros.parameters import ParameterError
+from illuminator_ros.ros.payload_node import PayloadNode
 import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter

@@ -1,0 +1,52 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node of a payload, which is made before all else is imported."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+
+# Characters of a node's full name: services below it, with the prefixes and suffixes of the
+# middleware, may have 247.
+MAX_NODE_NAME = 247 - len('rq/_255_255/set_parameters_atomicallyRequest')
+
+
+class PayloadNode(Node):
+    """
+    A node without rclpy's parameter services and QoS events.
+
+    An executor would wait for an event of each publisher and subscription, which also take memory.
+
+    :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
+    """
+
+    # Untyped: rclpy's own signatures are long, and differ between its versions.
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, start_parameter_services=False, **options)
+
+    def create_publisher(self, *arguments: Any, **options: Any) -> Any:
+        """See :meth:`Node.create_publisher`."""
+        options.setdefault(
+            'event_callbacks', PublisherEventCallbacks(use_default_callbacks=False))
+        return super().create_publisher(*arguments, **options)
+
+    def create_subscription(self, *arguments: Any, **options: Any) -> Any:
+        """See :meth:`Node.create_subscription`."""
+        options.setdefault(
+            'event_callbacks', SubscriptionEventCallbacks(use_default_callbacks=False))
+        return super().create_subscription(*arguments, **options)
