@@ -169,6 +169,8 @@ class Link:
         self._turn = threading.Lock()
         self._turn.acquire()
         self._waits_until = -math.inf
+        # The caller that has taken the turn.
+        self._taker: threading.Thread | None = None
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
@@ -198,7 +200,9 @@ class Link:
             if self._thread.ident is None:
                 self._release()
         self._wake()
-        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+        # The thread of this turn cannot wait for the end of the turn.
+        if (self._thread.is_alive()
+                and threading.current_thread() not in (self._thread, self._taker)):
             self._thread.join(timeout)
 
     def is_running(self) -> bool:
@@ -219,7 +223,7 @@ class Link:
         if self._calls or not self._turn.acquire(blocking=False):
             self.call(function)
             return
-        wakes = True
+        wakes, self._taker = True, threading.current_thread()
         try:
             self._safe_call(function, self.clock())
             self._flush()
@@ -230,6 +234,7 @@ class Link:
         finally:
             if wakes:
                 self._waits_until = -math.inf
+            self._taker = None
             self._turn.release()
         if wakes:
             self._wake()

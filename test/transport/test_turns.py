@@ -26,7 +26,7 @@ from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Run, Talker
 from support.open_channel import Open
 from support.simulated_link import SimulatedLink
-from support.waiting import Log, PATIENCE
+from support.waiting import eventually, Log, PATIENCE
 
 URL = 'memory://link'
 PEER = ('127.0.0.1', 14550)
@@ -158,6 +158,22 @@ def test_fault_in_the_turn_of_a_caller_is_logged_and_ends_neither_caller_nor_lin
         link.link.run_turn(lambda now: None)
     assert link.ask(lambda now: 'goes on') == 'goes on'
     assert 'internal error in the link' in caplog.text
+
+
+def test_link_ends_in_the_turn_of_a_caller_which_does_not_wait_for_the_thread(run: Run) -> None:
+    selector = Waiting()
+    link = run(LiveLink(URL, selector=selector))
+    link.wait_open()
+    waited: Log[float] = Log()
+
+    def stop(now: float) -> None:
+        link.link.stop(PATIENCE)
+        waited.append(link.link.clock() - now)
+
+    assert selector.begins.wait(PATIENCE)
+    link.link.run_turn(stop)
+    assert waited.wait_for(lambda seconds: True) < PATIENCE
+    eventually(lambda: not link.link.is_running())
 
 
 def test_caller_takes_no_turn_of_a_link_that_has_ended(run: Run) -> None:
