@@ -196,8 +196,10 @@ class FaultTable(dict[str, Fault]):
 
     def active(self, behaviour: B, normal: B) -> list[str]:
         """Return the names of the faults of a behaviour."""
+        # Two faults without values may set one field.
         return [name for name, fault in self.items()
-                if getattr(behaviour, fault.field) != getattr(normal, fault.field)]
+                if (value := getattr(behaviour, fault.field)) != getattr(normal, fault.field)
+                and (fault.read or value == fault.default)]
 
     def as_typed(self, behaviour: B, normal: B) -> list[str]:
         """Return the faults of a behaviour as :meth:`add` takes them, with values."""

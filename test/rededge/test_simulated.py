@@ -234,6 +234,12 @@ def test_attitude_that_is_not_a_rotation_is_ignored(value: float) -> None:
     assert [image.attitude_source for image in camera.device.images] == [Source.NONE] * 3
 
 
+@pytest.mark.parametrize('fault', FAULTS)
+def test_no_other_fault_is_shown_than_the_one_that_was_added(fault: str) -> None:
+    device = Camera(fault).device
+    assert FAULTS.active(device.behaviour, device.normal) == [fault]
+
+
 def test_feedback_that_waits_is_bounded() -> None:
     camera = Camera('late')
     for _ in range(MAX_IMAGES + 2):
