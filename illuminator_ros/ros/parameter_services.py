@@ -63,17 +63,19 @@ class ParameterServices:
     The six parameter services of a node made with ``start_parameter_services=False``.
 
     :param device: the parameters that the device accepts or refuses, None if it has none.
+    :param check: by default as the specification of each parameter.
     """
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, device: DeviceParameters | None = None,
-        check: Check = lambda name, value: None,
+        check: Check | None = None,
         configure: Configure = lambda changes, now, answer: answer(''),
     ) -> None:
         self._node = node
         self._log = log
         self._device = device or DeviceParameters(node, ())
-        self._check_value = check
+        specs = self._device.specs
+        self._check_value = check or (lambda name, value: specs[name].check(value))
         self._configure = configure
         self._calls = LinkCalls(link, log)
         qos = QoSProfile(depth=QUEUE_DEPTH,

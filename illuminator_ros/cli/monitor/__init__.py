@@ -16,8 +16,8 @@
 The executable ``monitor``: the lights in a ROS graph, as ``top`` shows processes.
 
 ``model`` holds the lights, ``key_bindings`` the meaning of keys, ``view`` the screen: without ROS
-and without a clock. ``graph`` fills the model from the ROS graph and calls services, ``terminal``
-is the terminal, ``run`` the command line.
+and without a clock. ``ros_graph`` fills the model from the ROS graph and calls services,
+``terminal`` is the terminal, ``run`` the command line.
 """
 
 from __future__ import annotations

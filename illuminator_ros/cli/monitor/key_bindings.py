@@ -182,6 +182,14 @@ class KeyBindings:
         self.quit = False
         self.stop = False
 
+    def end(self) -> None:
+        """End the monitor; callable from any thread."""
+        self.quit = True
+
+    def resume(self) -> None:
+        """Note that the shell has continued the job."""
+        self.stop = False
+
     def update(self, lights: Sequence[Light]) -> None:
         """Keep the selection while its light is there, else select the light before it."""
         names = [light.name for light in lights]
@@ -194,7 +202,7 @@ class KeyBindings:
         self.update(lights)
         meaning = _MEANINGS.get(key)
         if meaning is Command.QUIT:
-            self.quit = True
+            self.end()
         elif meaning is Command.STOP:
             self.stop = True
         elif self.show_help or meaning is Command.HELP:

@@ -151,7 +151,7 @@ def _watch(
         keyboard.wake()
 
     def end() -> None:
-        bindings.quit = True
+        bindings.end()
         keyboard.wake()
 
     while not bindings.quit:
@@ -171,7 +171,7 @@ def _watch(
                     bindings.press(key, lights, monitor.clock())
         if not bindings.quit:
             terminal.suspend(job=bindings.stop)
-            bindings.stop = False
+            bindings.resume()
     keyboard.close()
 
 

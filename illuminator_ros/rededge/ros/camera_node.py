@@ -111,7 +111,7 @@ class CameraNode(ServedPayload):
         self._parameters.show(angles)
         client.feeder.set_fixed_mount(_angles(angles), host.link.clock())
         ParameterServices(
-            host.node, host.link, host.log, self._parameters, self._check, self._set_mount)
+            host.node, host.link, host.log, self._parameters, configure=self._set_mount)
         host.diagnostics.add(DiagnosticsSource(
             host.node.get_name(), host.node.get_fully_qualified_name(), self._look))
         client.events.subscribe(self._take)
@@ -132,9 +132,6 @@ class CameraNode(ServedPayload):
             self._client.camera.capture(shot, now, done)
 
         return capture
-
-    def _check(self, name: str, value: object) -> None:
-        self._parameters.specs[name].check(value)
 
     def _set_mount(
         self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],

@@ -126,7 +126,7 @@ def _values(client: ClientSnapshot, now: float) -> dict[str, Value]:
         'attitudes_sent': feeder.attitudes,
     }
     for name, one in feeder.inputs.items():
-        values |= {f'{name.value}': one.state.value, f'{name.value}_s_ago': one.age}
+        values |= {name.value: one.state.value, f'{name.value}_s_ago': one.age}
         if one.refused:
             values |= {f'{name.value}_refused': one.refused,
                        f'{name.value}_refused_s_ago': one.refused_age,
