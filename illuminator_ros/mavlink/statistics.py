@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from array import array
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -34,6 +35,9 @@ _CONSECUTIVE = bytes(range(256)) * 8
 # many frames, by at most this many.
 INTERLEAVED = 32
 CONTINUED = 4
+# Of the hash of a frame that is kept.
+_HASH_BITS = 24
+_HASH_MASK = (1 << _HASH_BITS) - 1
 # s
 RECENT = 10.0
 
@@ -74,7 +78,7 @@ class _Place(NamedTuple):
     sender: int
     newest: int
     seen: int
-    contents: dict[int, tuple[int, int]]
+    contents: array[int] | None
     left_at: int
 
 
@@ -100,8 +104,9 @@ class SequenceCounter:
     sender: int = 0
     _senders: int = 1
     _left: _Place | None = None
-    # By sequence number: a hash, and how many frames had been received by then.
-    _contents: dict[int, tuple[int, int]] = field(default_factory=dict)
+    # By sequence number: how many frames had been received by then, and below it the hash; None
+    # while no hash is known. A dict takes 45 KB.
+    _contents: array[int] | None = None
     _newest: int = -1
     # The number that follows, -1 while that is not known.
     _next: int = -1
@@ -124,7 +129,9 @@ class SequenceCounter:
             self._add_irregular(sequence, content)
             self._next = (self._newest + 1) & 0xFF
         if content is not None:
-            self._contents[sequence] = content, self.received
+            if self._contents is None:
+                self._contents = array('Q', bytes(256 * 8))
+            self._contents[sequence] = self.received << _HASH_BITS | content & _HASH_MASK
 
     def add_run(self, sequences: bytes | bytearray) -> None:
         """Take the numbers of frames, in order; consecutive ones, which most are, in one step."""
@@ -155,7 +162,7 @@ class SequenceCounter:
             self.lost += 255 - back if not is_seen and back >= 128 else 0
             self._left = self._place()
             self.sender, self._senders = self._senders, self._senders + 1
-            self._newest, self._seen, self._contents = sequence, _ALL_SEEN, {}
+            self._newest, self._seen, self._contents = sequence, _ALL_SEEN, None
             return
         if back < WINDOW:
             self._seen |= 1 << back
@@ -169,8 +176,11 @@ class SequenceCounter:
 
     def _differs(self, sequence: int, content: int | None) -> bool:
         """Return whether a frame that has come had the same number and another content."""
-        known, at = self._contents.get(sequence, (content, 0))
-        return content is not None and known != content and self.received - at <= 2 * WINDOW
+        known = self._contents[sequence] if self._contents else 0
+        if content is None or not known:
+            return False
+        return ((known ^ content) & _HASH_MASK != 0
+                and self.received - (known >> _HASH_BITS) <= 2 * WINDOW)
 
     def _place(self) -> _Place:
         return _Place(self.sender, self._newest, self._seen, self._contents, self.received)
@@ -192,7 +202,7 @@ class SequenceCounter:
         """Forget the numbers but not the counts: what comes next follows on nothing."""
         self._newest = self._next = -1
         self._left = None
-        self._contents = {}
+        self._contents = None
 
     def reset_loss(self) -> None:
         """Forget recent losses: the sequence numbers of the sender have restarted."""

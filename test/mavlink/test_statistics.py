@@ -67,6 +67,7 @@ def test_lost_duplicate_and_reordered_frames_are_counted_apart(
     ([(10, 1), (10, 1), (11, 2), (11, 3), (12, 4), (12, 5), (13, 6)], '0001100', 0),
     # One sender: repeated, late, lost, after a restart, and with unknown contents.
     ([(10, 1), (10, 1), (12, 3), (11, 2), (11, 2), (40, 4)], '000000', 27),
+    ([(10, 1), (9, 2), (11, 3)], '000', 0),
     ([(10, 1), (11, 2), (200, 3), (201, 4), (202, 5)], '00111', 0),
     # One that is later than the window, after which late ones do not lead back and forth.
     ([*((number, number) for number in range(100, 195) if number not in (129, 192)),
