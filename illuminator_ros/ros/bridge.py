@@ -76,7 +76,7 @@ class Bridge:
     """
 
     def __init__(
-        self, node: Node, arguments: Sequence[str], types: Mapping[str, PayloadType],
+        self, node: PayloadNode, arguments: Sequence[str], types: Mapping[str, PayloadType],
         payload: str, url: str = '',
     ) -> None:
         self.node = node
@@ -155,8 +155,9 @@ class Bridge:
         self.pool.join(deadline)
         for payload in self._payloads:
             payload.close()
-        # At once, so that other nodes learn of the end.
-        for node in self.nodes:
+        # At once, so that other nodes learn of the end; the first one last, whose publisher of
+        # parameter events the others use.
+        for node in reversed(self.nodes):
             node.destroy_node()
 
     def end(self) -> None:

@@ -50,13 +50,15 @@ class NodeManager:
     """
     The nodes of further devices, made and removed one at a time by :meth:`work`.
 
-    :param first: the process's first node; the others share its namespace and context.
+    :param first: the process's first node; the others share its namespace and context,
+        and its publisher of parameter events.
     :param arguments: the ROS arguments that the nodes follow.
     :param wake: requests a call of :meth:`work`.
     """
 
     def __init__(
-        self, first: Node, arguments: Sequence[str], log: NodeLog, wake: Callable[[], None],
+        self, first: PayloadNode, arguments: Sequence[str], log: NodeLog,
+        wake: Callable[[], None],
     ) -> None:
         self._first = first
         self._arguments = without_node_name(arguments)
@@ -139,8 +141,8 @@ class NodeManager:
     def _make(self, wanted: _Wanted) -> tuple[Node, NodeExecutor]:
         executor = self._executor()
         node = PayloadNode(
-            wanted.name, namespace=self._first.get_namespace(), context=self._first.context,
-            cli_args=self._arguments, use_global_arguments=False,
+            wanted.name, first=self._first, namespace=self._first.get_namespace(),
+            context=self._first.context, cli_args=self._arguments, use_global_arguments=False,
             # Its types are those of the first node, and the service takes 0.13 MB.
             parameter_overrides=[Parameter('start_type_description_service', value=False)])
         try:

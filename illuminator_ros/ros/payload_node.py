@@ -18,8 +18,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+PARAMETER_EVENTS = '/parameter_events'
 
 # Characters of a node's full name: services below it, with the prefixes and suffixes of the
 # middleware, may have 247.
@@ -32,18 +36,26 @@ class PayloadNode(Node):
 
     An executor would wait for an event of each publisher and subscription, which also take memory.
 
+    :param first: the first node of the process, whose publisher of parameter events this one uses:
+        each event names its node, and a publisher takes 31 KB.
     :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """
 
     # Untyped: rclpy's own signatures are long, and differ between its versions.
-    def __init__(self, name: str, **options: Any) -> None:
+    def __init__(self, name: str, *, first: PayloadNode | None = None, **options: Any) -> None:
+        self._events: Publisher[ParameterEvent] | None = first._events if first else None
         super().__init__(name, start_parameter_services=False, **options)
 
     def create_publisher(self, *arguments: Any, **options: Any) -> Any:
         """See :meth:`Node.create_publisher`."""
+        if PARAMETER_EVENTS in arguments and self._events is not None:
+            return self._events
         options.setdefault(
             'event_callbacks', PublisherEventCallbacks(use_default_callbacks=False))
-        return super().create_publisher(*arguments, **options)
+        publisher = super().create_publisher(*arguments, **options)
+        if PARAMETER_EVENTS in arguments:
+            self._events = publisher
+        return publisher
 
     def create_subscription(self, *arguments: Any, **options: Any) -> Any:
         """See :meth:`Node.create_subscription`."""

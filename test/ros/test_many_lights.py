@@ -52,7 +52,7 @@ def group(domain: int) -> Iterator[tuple[Program, Group]]:
 
 # Topics and services of the first node for the whole process.
 OF_PROCESS = {'/diagnostics', '/get_logger_levels', '/set_logger_levels',
-              '/get_type_description'}
+              '/get_type_description', '/parameter_events'}
 
 
 @pytest.fixture
@@ -101,6 +101,16 @@ def test_nodes_show_set_and_switch_their_own_lights(ros: Ros, lights: Group) -> 
     assert [light.fake.fields['brightness'] for light in lights.values()] == [20.0, 21.0, 22.0]
     assert ros.enable(node='/belly').success
     assert [name for name, light in lights.items() if light.commands(ON_OFF)] == ['/belly']
+
+
+def test_parameter_events_of_each_light_name_its_node(ros: Ros, lights: Group) -> None:
+    events = {node: Parameters(ros, node).events() for node in NODES}
+    for number, node in enumerate(NODES):
+        assert Parameters(ros, node).set(brightness=40.0 + number)[0].successful
+    for number, node in enumerate(NODES):
+        event = events[node].wait(lambda event: any(
+            one.name == 'brightness' for one in event.changed_parameters))
+        assert [one.value.double_value for one in event.changed_parameters] == [40.0 + number]
 
 
 def test_services_parameters_and_topics_of_other_lights_go_on_while_one_is_silent(
