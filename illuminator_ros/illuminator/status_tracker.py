@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from enum import Enum
 import math
@@ -262,10 +261,10 @@ class AddressConflict:
         self._evidence = 0
         # With the last one at the end, and when each was shown.
         self._states: list[tuple[Status, float]] = []
-        self._gaps: deque[float] = deque(maxlen=MAX_RECENT)
+        self._gaps: list[float] = []
         self._by_start = _Senders(_is_same_start)
         self._by_number = _Senders(operator.eq)
-        self._recent: deque[Status] = deque(maxlen=MAX_RECENT)
+        self._recent: list[Status] = []
 
     def take(self, status: Status, now: float, *, commanded: bool, sender: int = 0) -> None:
         """
@@ -282,7 +281,7 @@ class AddressConflict:
         if has_clock or not self._recent:
             self._by_start.take(now * 1000.0 - uptime, now)
         self._by_number.take(sender, now)
-        self._recent.append(status)
+        self._recent = [*self._recent[1 - MAX_RECENT:], status]
         if not commanded:
             repeated = self._take_state(status, now)
             self.can_follow = repeated or not self._evidence
@@ -318,7 +317,7 @@ class AddressConflict:
                 self._evidence += 1 if index else -REPEAT_PENALTY
                 self._evidence = min(max(self._evidence, 0), MAX_EVIDENCE)
                 if index:
-                    self._gaps.append(now - at)
+                    self._gaps = [*self._gaps[1 - MAX_RECENT:], now - at]
                 del self._states[-1 - index]
                 self._states.append((status, now))
                 return not index

@@ -229,7 +229,7 @@ class RttEstimator:
     def __init__(self) -> None:
         self._ambiguous_until = -math.inf
         # Each with whether it is unambiguous.
-        self._samples: deque[tuple[float, bool]] = deque()
+        self._samples: list[tuple[float, bool]] = []
         self._sorted: list[float] = []
 
     def __len__(self) -> int:
@@ -240,7 +240,7 @@ class RttEstimator:
         self._samples.append((seconds, now >= self._ambiguous_until))
         bisect.insort(self._sorted, seconds)
         if len(self._samples) > MAX_SAMPLES:
-            del self._sorted[bisect.bisect_left(self._sorted, self._samples.popleft()[0])]
+            del self._sorted[bisect.bisect_left(self._sorted, self._samples.pop(0)[0])]
 
     def expect_ambiguous(self, now: float) -> None:
         """Note that acknowledgements may belong to an earlier try or be copies from now on."""

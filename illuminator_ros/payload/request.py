@@ -22,7 +22,6 @@ command and shows the change makes the request a success.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -42,6 +41,8 @@ MAX_WAITING = 32
 OVERTAKEN = 'cancelled by a later request'
 # s by which the statuses of a device without a clock may be late, until that was measured.
 UNKNOWN_DELAY = 0.75
+# The last delays of statuses, from which the next delay is estimated.
+MAX_DELAYS = 8
 
 PERMANENT_RESULTS = frozenset((
     MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_UNSUPPORTED_MAV_FRAME,
@@ -74,7 +75,7 @@ class Target:
         self._ended = ended
         self._status_id = status_id
         self._status_requested = False
-        self._delays: deque[float] = deque(maxlen=8)
+        self._delays: list[float] = []
 
     def send(
         self, command: int, params: tuple[float, ...], now: float,
@@ -119,7 +120,7 @@ class Target:
 
     def note_status_delay(self, seconds: float) -> None:
         """Note how long after a command the first status showed the change."""
-        self._delays.append(seconds)
+        self._delays = [*self._delays[1 - MAX_DELAYS:], seconds]
 
 
 @dataclass(slots=True)
@@ -467,7 +468,7 @@ class RequestQueue(Generic[S]):
 
     def __init__(self, target: Target) -> None:
         self._target = target
-        self._requests: deque[Request[S]] = deque()
+        self._requests: list[Request[S]] = []
         self._status: S | None = None
 
     @property
@@ -497,15 +498,15 @@ class RequestQueue(Generic[S]):
     def overtake(self, request: Request[S], now: float) -> None:
         """Send a request before those that do not overtake, which are cancelled."""
         overtaken = [one for one in self._requests if not one.overtakes]
-        self._requests = deque(one for one in self._requests if one.overtakes)
+        self._requests = [one for one in self._requests if one.overtakes]
         self.submit(request, now)
         for one in overtaken:
             one.fail(OVERTAKEN, now)
 
     def cancel(self, message: str, now: float, *, only_waiting: bool = False) -> None:
         """End all requests, or only those that wait."""
-        kept = [self._requests.popleft()] if only_waiting and self._requests else []
-        ended, self._requests = self._requests, deque(kept)
+        kept = [self._requests.pop(0)] if only_waiting and self._requests else []
+        ended, self._requests = self._requests, kept
         for request in ended:
             request.fail(message, now)
 
@@ -526,7 +527,7 @@ class RequestQueue(Generic[S]):
         while self._requests:
             first = self._requests[0]
             if first.is_finished:
-                self._requests.popleft()
+                del self._requests[0]
             elif first.phase is Phase.WAITING:
                 first.start(self._status, now)
             else:

@@ -51,10 +51,11 @@ def serializer(type_: type) -> Callable[[object], object]:
 
     :param type_: a message class; messages of unknown classes are not serialised.
     """
-    pack = _PACK.get(type_)
-    if pack is not None:
-        return lambda value: pack(_HEADER, value)
-    return _string if type_ is String else lambda message: message
+    return _SERIALIZERS.get(type_, _unchanged)
+
+
+def _unchanged(message: object) -> object:
+    return message
 
 
 def _string(value: object) -> bytes:
@@ -145,6 +146,7 @@ def _layout(byte_order: str, formats: str, position: int) -> struct.Struct:
     return struct.Struct(text)
 
 
-_PACK: dict[type, Callable[..., bytes]] = {
-    Bool: struct.Struct('<4s?3x').pack, Float32: struct.Struct('<4sf').pack,
-    UInt32: struct.Struct('<4sI').pack, Float64: struct.Struct('<4sd').pack}
+_SERIALIZERS: dict[type, Callable[[object], object]] = {
+    **{type_: functools.partial(struct.Struct(layout).pack, _HEADER) for type_, layout in (
+        (Bool, '<4s?3x'), (Float32, '<4sf'), (UInt32, '<4sI'), (Float64, '<4sd'))},
+    String: _string}

@@ -264,8 +264,10 @@ class LightNode:
 
     def _heard(self) -> LightsHeard:
         client = self._client
-        some = itertools.islice(sorted({*client.lights, *client.ignored}), MAX_NAMED)
-        return LightsHeard(len(client.lights), tuple(some), client.limit_reached)
+        # Only a node without a light names them.
+        some = () if self._light() else tuple(itertools.islice(
+            sorted({*client.lights, *client.ignored}), MAX_NAMED))
+        return LightsHeard(len(client.lights), some, client.limit_reached)
 
 
 def _checked(overrides: Mapping[str, object], limits: SafetyLimits) -> dict[str, float]:
