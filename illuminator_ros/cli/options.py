@@ -26,7 +26,7 @@ from .entry_point import print_output
 from .. import __version__
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
-from ..mavlink.signing_files import keyed, TimestampStore
+from ..mavlink.signing_files import load_signing, TimestampStore
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite  # A name of type checkers only.
@@ -128,12 +128,7 @@ def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampS
     Return the signing that the options select.
 
     :param name: whose time stamps are kept.
-    :raises ValueError: if a key is given and not used, which would look like protection.
-    :raises KeyFileError: if the key cannot be used.
+    :raises KeyFileError: if the key cannot be used, or is given and not used.
     """
-    mode = SigningMode(options.signing_mode)
-    if mode is SigningMode.OFF:
-        if options.signing_key_file:
-            raise ValueError('--signing-key-file is given, but --signing-mode is off')
-        return Signing(), None
-    return keyed(mode, options.signing_key_file, name, time.time())
+    return load_signing(
+        SigningMode(options.signing_mode), options.signing_key_file, name, time.time())

@@ -169,17 +169,22 @@ class TimestampStore:
             self._failed = False
 
 
-def keyed(
+def load_signing(
     mode: SigningMode, key_file: str, name: str, unix_time: float,
-) -> tuple[Signing, TimestampStore]:
+) -> tuple[Signing, TimestampStore | None]:
     """
     Return what signs with the key of a file, and where its time stamps are kept.
 
-    :param mode: any but ``off``.
+    :param key_file: '' for none.
     :param name: whose time stamps those are.
     :param unix_time: now, s.
-    :raises KeyFileError: if the key cannot be used.
+    :raises KeyFileError: if the key cannot be used, or is given and not used, which would look
+        like protection.
     """
+    if mode is SigningMode.OFF:
+        if key_file:
+            raise KeyFileError('a key file is given, but the signing mode is off')
+        return Signing(), None
     key = load_key(key_file)
     store = TimestampStore(key_file, name)
     return Signing(mode, key, timestamp=store.begin(unix_time)), store

@@ -128,6 +128,7 @@ class Camera:
     The camera, identified by its component id: it adopts the system id of what it receives.
 
     :param own: our address.
+    :param heartbeat_timeout: silence after which it is lost, s.
     :param send: sends a message.
     :param emit: takes the events.
     :param sequence: of the first PING.

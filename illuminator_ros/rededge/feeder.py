@@ -125,7 +125,7 @@ class InputSnapshot:
 
     :param age: since the last accepted message, s; None if there was none.
     :param refusal: why the last refused message was refused, '' if none was.
-    :param refused_age: since then, s.
+    :param refused_age: since then, s; None if none was.
     :param refused: refused messages.
     """
 

@@ -32,7 +32,7 @@ import yaml
 
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
-from ..mavlink.signing_files import keyed, KeyFileError, TimestampStore
+from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
 from ..mavlink.url import parse_url, Url, UrlError
 
 # Values of parameters by name, each of the type of its default.
@@ -181,12 +181,8 @@ class LinkParameters:
 
         :raises ParameterError: if the key cannot be used, or is given and not used.
         """
-        if self.signing_mode is SigningMode.OFF:
-            if self.signing_key_file:
-                raise ParameterError('signing_key_file: is given, but signing_mode is off')
-            return Signing(), None
         try:
-            return keyed(
+            return load_signing(
                 self.signing_mode, self.signing_key_file, f'bridge {self.address}', time.time())
         except KeyFileError as error:
             raise ParameterError(f'signing_key_file: {error}') from None

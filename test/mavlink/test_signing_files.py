@@ -26,9 +26,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.signing import NEW_STREAM_TICKS, SigningMode
 from illuminator_ros.mavlink.signing_files import (
-    keyed,
     KeyFileError,
     load_key,
+    load_signing,
     MAX_KEY_FILE,
     TimestampStore,
 )
@@ -140,9 +140,9 @@ def test_clock_that_was_ahead_for_a_moment_locks_no_light_out(store: TimestampSt
 SIGN_UNTIL_KILLED = """
 import sys
 from illuminator_ros.mavlink.signing import SigningMode
-from illuminator_ros.mavlink.signing_files import keyed
+from illuminator_ros.mavlink.signing_files import load_signing
 now = float(sys.argv[2])
-signing, store = keyed(SigningMode.SIGN, sys.argv[1], 'bridge', now)
+signing, store = load_signing(SigningMode.SIGN, sys.argv[1], 'bridge', now)
 store.keep(signing.timestamp, now)
 while True:
     signing.sign(b'', now)
@@ -164,7 +164,7 @@ def test_kill_9_again_and_again_repeats_no_time_stamp_and_locks_no_light_out(
         used = [int.from_bytes(data[at:at + 8], 'big') for at in range(0, len(data) - 7, 8)]
         assert newest < used[0] < used[-1]
         newest = used[-1]
-    ours, light = (keyed(SigningMode.REQUIRE, key, name, NOW)[0]
+    ours, light = (load_signing(SigningMode.REQUIRE, key, name, NOW)[0]
                    for name in ('bridge', 'light'))
     for sender, receiver in ((ours, light), (light, ours)):
         frame = only(sender.sign(frame_of(signed=True), NOW))

@@ -116,7 +116,7 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', '--payload rededge --images /nowhere/x', '/nowhere/x: No such file'),
     ('simulator', '--signing-mode require', 'no key file is given'),
     ('simulator', '--signing-key-file /etc/hostname',
-     '--signing-key-file is given, but --signing-mode is off'),
+     'a key file is given, but the signing mode is off'),
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',
      "key file '/nonexistent': No such file or directory"),
 ])

@@ -49,8 +49,8 @@ from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
-from ...mavlink.signing_files import KeyFileError, TimestampStore
-from ...mavlink.url import parse_url, Url, UrlError
+from ...mavlink.signing_files import TimestampStore
+from ...mavlink.url import parse_url, Url
 from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
 from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
@@ -142,7 +142,7 @@ def run(args: Sequence[str] | None = None) -> int:
         url = parse_url(options.url)
         signs, store = signing(options, f'conformance {address}')
         conformance = Conformance(options, checks, address, url, signs, store)
-    except (UrlError, KeyFileError, ValueError) as error:
+    except ValueError as error:
         _complain(str(error))
         return 2
     try:

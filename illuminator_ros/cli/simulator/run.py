@@ -28,7 +28,7 @@ import sys
 import threading
 import time
 
-from .components import components, load, Scenario, SettingError, Types
+from .components import components, load, Scenario, Types
 from .console import execute
 from .csv_file import write_records
 from .options import parser, payload_types
@@ -37,8 +37,7 @@ from ..options import mavlink_version, signing
 from ..termination import Termination
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.messages import Address
-from ...mavlink.signing_files import KeyFileError
-from ...mavlink.url import parse_url, Url, UrlError
+from ...mavlink.url import parse_url, Url
 from ...payload.payload_type import PayloadType
 from ...payload.simulated import Description, SimulatedComponents, SimulatedDevice
 
@@ -153,7 +152,7 @@ def run(
         described = components(options, file, types)
         simulation = _Simulation(options, parse_url(label), label, described, types)
         write_records(options, types, described)
-    except (UrlError, SettingError, KeyFileError, ValueError) as error:
+    except ValueError as error:
         print(f'simulator: {error}', file=sys.stderr)
         return 2
     try:
