@@ -111,7 +111,8 @@ def test_frames_at_debug_level_are_logged_by_the_node_of_their_light_and_no_othe
     own_ros: Ros, port: int,
 ) -> None:
     level = ('--log-level', 'illuminator_1_244:=debug')
-    with running_bridge(own_ros.domain, port, *level) as bridge, ServedLight(port):
+    with (running_bridge(own_ros.domain, port, *level, system_id=7, component_id=42) as bridge,
+          ServedLight(port)):
         # The first light that is heard gets the node without a number.
         Parameters(own_ros).wait(brightness=100.0)
         with ServedLight(port, Address(1, 244)):
@@ -119,7 +120,7 @@ def test_frames_at_debug_level_are_logged_by_the_node_of_their_light_and_no_othe
             assert Parameters(own_ros, '/illuminator_1_244').set(brightness=40.0)[0].successful
             assert Parameters(own_ros).set(brightness=30.0)[0].successful
             bridge.wait_for(
-                'illuminator_1_244]: sent from 1/194: COMMAND_LONG target_system=1 '
+                'illuminator_1_244]: sent from 7/42: COMMAND_LONG target_system=1 '
                 'target_component=244 command=MAV_CMD_DO_ILLUMINATOR_CONFIGURE confirmation=0 '
                 'param1=1 param2=40 ')
             bridge.wait_for(

@@ -19,6 +19,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from support.light import ON_OFF, ServedLight
@@ -164,3 +165,24 @@ def test_all_names_follow_namespace_node_name_and_remapping(
         name = node.rpartition('/')[2]
         assert [status.name for status in array.status] == [f'{name}: link', f'{name}: lamp']
         assert foreign() == {'/parameter_events', '/rosout', diagnostics, *remapped}
+
+
+def test_simulated_time_without_a_clock_affects_stamps_only(own_ros: Ros, port: int) -> None:
+    with running_bridge(own_ros.domain, port, use_sim_time=True), ServedLight(port):
+        Parameters(own_ros).wait(brightness=100.0)
+        diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        temperature = own_ros.subscribe(Temperature, '/illuminator/temperature', STREAM)
+
+        assert own_ros.enable().success
+        assert Parameters(own_ros).set(brightness=20)[0].successful
+        diagnostics.clear()
+        CLOCK.forward(1.0)
+        diagnostics.wait()
+        assert temperature.wait().header.stamp.sec == 0
+
+        clock = own_ros.node.create_publisher(Clock, '/clock', 10)
+        message = Clock()
+        message.clock.sec = 1234
+        timer = own_ros.node.create_timer(0.05, lambda: clock.publish(message))
+        temperature.wait(lambda message: message.header.stamp.sec == 1234)
+        timer.cancel()

@@ -47,7 +47,6 @@ class _Recorder(FakeLight):
     A fake light that keeps what it got, and can answer late.
 
     :ivar held: commands that are not taken until they are released, by MAV_CMD.
-    :ivar heard_from: the addresses that commands have come from.
     """
 
     def __init__(self, source: Address, **how: Any) -> None:
@@ -55,12 +54,10 @@ class _Recorder(FakeLight):
         self.pushes = True
         self.received: Log[Any] = Log()
         self.held: dict[int, list[tuple[Address, Any]]] = {}
-        self.heard_from: set[Address] = set()
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         if not isinstance(message, CommandLong | CommandInt):
             return
-        self.heard_from.add(source)
         self.received.append(message)
         if message.command in self.held:
             self.held[message.command].append((source, message))
