@@ -78,6 +78,7 @@ from ..payload.mount_attitude import (
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
+    UNSET_VECTOR,
     YawFrame,
 )
 from ..payload.rate_limit import RateLimit
@@ -499,7 +500,9 @@ class GimbalManager(Payload):
         if attitude is not None:
             if self._offsets != STILL:
                 attitude = mix(attitude, self._offsets)
-            attitude, clipped = clip(attitude, self.model.ranges, ahead)
+            attitude, clipped = clip(
+                attitude, self.model.ranges, ahead,
+                setpoint.angles if attitude is setpoint.attitude else UNSET_VECTOR)
             self._limits_reached = 0
             if clipped:
                 self._report_clipped(clipped, now)

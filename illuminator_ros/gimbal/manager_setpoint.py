@@ -61,6 +61,7 @@ _PASSED_BITS = int(POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
 _POSE_BITS = int(POSES)
 _EARTH_BIT, _VEHICLE_BIT = int(YawFrame.EARTH.flag), int(YawFrame.VEHICLE.flag)
 _NO_FLAGS = MountFlags(0)
+_RIGHT_ANGLE = math.pi / 2
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
 # The capability that a flag needs.
@@ -178,7 +179,8 @@ class Demand(NamedTuple):
 
         :raises ValueError: if they name both, or a value is infinite.
         """
-        if math.inf in map(abs, (*angles, *rates)):
+        values = *angles, *rates
+        if math.inf in values or -math.inf in values:
             raise ValueError('an angle or a rate is infinite')
         if attitude is None and not math.isnan(sum(angles)):
             attitude = _from_angles(angles)
@@ -261,6 +263,7 @@ class Setpoint(NamedTuple):
     :param rates: rad/s, that the device follows; NaN where it chooses.
     :param turning: rad/s, by which the manager turns the attitude.
     :param since: when the attitude applies, s.
+    :param angles: roll, pitch and yaw that were asked for, rad; NaN where none was.
     """
 
     flags: int
@@ -269,6 +272,7 @@ class Setpoint(NamedTuple):
     rates: Vector = UNSET_VECTOR
     turning: Vector = STILL
     since: float = 0.0
+    angles: Vector = UNSET_VECTOR
 
     @property
     def is_pose(self) -> bool:
@@ -307,7 +311,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     if flags & _POSE_BITS:
         return Setpoint(flags, frame, None, since=now)
     if demand.attitude is not None:
-        return Setpoint(flags, frame, demand.attitude, demand.rates, since=now)
+        return Setpoint(flags, frame, demand.attitude, demand.rates, STILL, now, demand.angles)
     given = [math.isfinite(angle) for angle in demand.angles]
     rates = demand.rates
     only_rate = [not has_angle and math.isfinite(rate)
@@ -357,19 +361,30 @@ class Clipped(NamedTuple):
 
 def clip(
     attitude: Quaternion, ranges: tuple[Range, Range, Range], offset: float | None,
+    made_of: Vector = UNSET_VECTOR,
 ) -> tuple[Quaternion, list[Clipped]]:
     """
     Return an attitude within the ranges, and the angles that were clipped.
 
     :param offset: the direction from which the range of the yaw counts, rad in the frame of the
         attitude; None where it is not known, which leaves the yaw as it is.
+    :param made_of: the angles that made the attitude, if they are known.
     """
+    if offset is not None:
+        # The angles of a quaternion take as long as all of the rest.
+        roll, pitch, yaw = made_of
+        (roll_low, roll_high), (low, high), (yaw_low, yaw_high) = ranges
+        if (roll_low <= roll <= roll_high and yaw_low <= yaw - offset <= yaw_high
+                and low <= pitch <= high and -_RIGHT_ANGLE <= pitch <= _RIGHT_ANGLE):
+            return attitude, []
     clipped = []
     angles = list(attitude.euler())
     for index, range_ in enumerate(ranges):
         zero = offset if index == 2 else 0.0
-        if (zero is None or range_.low <= angles[index] - zero <= range_.high
-                or range_.is_endless):
+        if zero is None:
+            continue
+        low, high = range_
+        if low <= angles[index] - zero <= high or range_.is_endless:
             continue
         asked = _nearest(angles[index] - zero, range_)
         limit = range_.clip(asked)
@@ -406,7 +421,9 @@ def _each(function: Callable[..., float], *values: Sequence[float]) -> Vector:
 
 def _from_angles(angles: Sequence[float]) -> Quaternion:
     roll, pitch, yaw = angles
-    return Quaternion.from_euler(roll, max(-math.pi / 2, min(math.pi / 2, pitch)), yaw)
+    if abs(pitch) > _RIGHT_ANGLE:
+        pitch = math.copysign(_RIGHT_ANGLE, pitch)
+    return Quaternion.from_euler(roll, pitch, yaw)
 
 
 class GeoPoint(NamedTuple):

@@ -20,6 +20,7 @@ ROS has ENU for the earth and FLU for bodies (REP-103), MAVLink has NED and FRD.
 from __future__ import annotations
 
 import math
+from math import cos, sin
 from typing import NamedTuple
 
 Vector = tuple[float, float, float]
@@ -45,9 +46,9 @@ class Quaternion(NamedTuple):
     @staticmethod
     def from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
         """Return the rotation by yaw about z, then pitch about the new y, roll about x, rad."""
-        cos_r, sin_r = math.cos(roll / 2), math.sin(roll / 2)
-        cos_p, sin_p = math.cos(pitch / 2), math.sin(pitch / 2)
-        cos_y, sin_y = math.cos(yaw / 2), math.sin(yaw / 2)
+        cos_r, sin_r = cos(roll / 2), sin(roll / 2)
+        cos_p, sin_p = cos(pitch / 2), sin(pitch / 2)
+        cos_y, sin_y = cos(yaw / 2), sin(yaw / 2)
         return Quaternion(
             cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
             sin_r * cos_p * cos_y - cos_r * sin_p * sin_y,
