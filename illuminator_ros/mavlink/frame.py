@@ -110,12 +110,11 @@ def encode_frame(
         if message_id > MAX_ID_V1 or signed:
             raise ValueError(f'MAVLink 1 carries no message {message_id}' if not signed else
                              'MAVLink 1 frames cannot be signed')
-        head: tuple[int, ...] = (
-            STX_V1, len(payload), sequence, source.system, source.component, message_id)
+        head: tuple[int, ...] = STX_V1, len(payload), sequence, *source, message_id
     else:
         payload = payload.rstrip(b'\0') or payload[:1]
-        head = (STX_V2, len(payload), FLAG_SIGNED if signed else 0, 0, sequence, source.system,
-                source.component, message_id & 0xFF, message_id >> 8 & 0xFF, message_id >> 16)
+        head = (STX_V2, len(payload), FLAG_SIGNED if signed else 0, 0, sequence, *source,
+                message_id & 0xFF, message_id >> 8 & 0xFF, message_id >> 16)
     frame = bytes(head) + payload
     checksum = mcrf4xx(frame[1:] + bytes((crc_extra,)))
     return frame + checksum.to_bytes(CHECKSUM, 'little')
@@ -170,11 +169,17 @@ class Decoder:
             A frame that is signed, cut in two or of MAVLink 1 is returned all the same.
         """
         self.taken += len(data)
-        data = self.rest + data if self.rest else data
+        if self.rest:
+            data = self.rest + data
         frames: list[Frame | ForeignFrames] = []
         count = 0
         position = end = 0
         signature_end = self._signature_end
+        if not signature_end:
+            position = end = self._take_plain(data, 0, foreign, frames)
+            if end == len(data):
+                self.rest = b''
+                return frames
         while position < len(data):
             start = position
             if data[start] != STX_V2:

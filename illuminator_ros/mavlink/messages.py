@@ -155,12 +155,14 @@ def _with_arrays(
     :param read: returns the values of a message in wire order.
     :param arrays: position and size of each.
     """
+    last_first = arrays[::-1]
+
     def encode(message: Message) -> bytes:
-        values = [*read(message)]
-        for index, _ in reversed(arrays):
+        values = read(message)
+        for index, _ in last_first:
             array = values[index]
             assert isinstance(array, tuple)
-            values[index:index + 1] = array
+            values = values[:index] + array + values[index + 1:]
         return layout.pack(*values)
 
     def unpack(payload: bytes) -> tuple[object, ...]:

@@ -78,7 +78,7 @@ class RoutingTable:
         if not system or len(peers) < 2:
             return peers
         target = system, getattr(message, 'target_component', 0)
-        if now - self._overflowed.get(target, -math.inf) <= EXPIRY:
+        if self._overflowed and now - self._overflowed.get(target, -math.inf) <= EXPIRY:
             return peers
         route = self._routes.get(target, {})
         known = [peer for peer in peers if now - route.get(peer, -math.inf) <= EXPIRY]

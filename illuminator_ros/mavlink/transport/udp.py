@@ -20,10 +20,11 @@ from collections.abc import Iterator, Sequence
 import contextlib
 import errno
 import ipaddress
+import itertools
 import selectors
 import socket
 
-from .base import Channel, ChannelLost, Peer, resolve
+from .base import Channel, ChannelLost, Peer, resolve, SocketName
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
@@ -84,16 +85,31 @@ class UdpChannel(Channel):
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
+        # Before a generator runs: it is mostly the only datagram, and an answer may wait for it.
+        try:
+            datagram, peer = self._socket.recvfrom(65536)
+        except (BlockingIOError, ConnectionError):
+            return self._receive_more(None, False, 0)
+        except OSError as error:
+            raise ChannelLost(error.errno, error.strerror) from None
+        is_heard = self._is_heard(peer)
+        more = self._receive_more(peer, is_heard, len(datagram))
+        return itertools.chain([(peer, datagram)], more) if is_heard else more
+
+    def _receive_more(
+        self, sender: object, is_heard: bool, size: int,
+    ) -> Iterator[tuple[Peer, bytes]]:
+        """
+        Read the datagrams that wait behind the first one of a sender.
+
+        :param size: of that one.
+        """
         receive = self._socket.recvfrom
-        # Datagrams of one peer are decoded together, at a third of the cost. The first is decoded
-        # alone: it is mostly the only one, and an answer may wait for it.
-        sender: object = None
-        is_heard = False
+        # Datagrams of one peer are decoded together, at a third of the cost, but for the first.
         datagrams: list[bytes] = []
         lost = None
         self.more = True
-        size = 0
-        for _ in range(BATCH):
+        for _ in range(BATCH - 1):
             if size >= BATCH_SIZE:
                 break
             try:
@@ -111,7 +127,7 @@ class UdpChannel(Channel):
                 if datagrams:
                     yield sender, b''.join(datagrams)
                     datagrams = []
-                sender, is_heard = peer, self._hears_all or self._is_of_remote(peer[0])
+                sender, is_heard = peer, self._is_heard(peer)
                 if is_heard:
                     yield peer, datagram
             elif is_heard:
@@ -121,8 +137,11 @@ class UdpChannel(Channel):
         if lost:
             raise lost
 
-    def _is_of_remote(self, host: str) -> bool:
+    def _is_heard(self, peer: SocketName) -> bool:
+        if self._hears_all:
+            return True
         assert self._remote is not None
+        host = peer[0]
         # Each loopback address, such as 127.0.0.2, is this machine.
         return host == self._remote[0] or all(
             ipaddress.ip_address(one.partition('%')[0]).is_loopback
@@ -132,9 +151,11 @@ class UdpChannel(Channel):
         """See :meth:`Channel.peers`."""
         if not self._hears_all or self._broadcast == 'always':
             return (self._remote,)
-        if now - min(self._peers.values(), default=now) > PEER_EXPIRY:
-            self._peers = {peer: heard for peer, heard in self._peers.items()
-                           if now - heard <= PEER_EXPIRY}
+        for heard in self._peers.values():
+            if now - heard > PEER_EXPIRY:
+                self._peers = {peer: at for peer, at in self._peers.items()
+                               if now - at <= PEER_EXPIRY}
+                break
         if self._broadcast and not self._peers:
             return (self._remote,)
         return tuple(self._peers)
