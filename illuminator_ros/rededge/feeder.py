@@ -155,7 +155,8 @@ class FeederSnapshot:
     All inputs at one moment.
 
     :param needed: groups of inputs, of each of which one must be there.
-    :param positions: sent positions, and ``attitudes``, sent pairs of attitude and mount.
+    :param positions: sent positions, and ``attitudes``, sent pairs of attitude and mount; those
+        that are made while the link is closed are dropped, and not counted.
     """
 
     inputs: Mapping[Input, InputSnapshot]
@@ -295,6 +296,7 @@ class Feeder:
         self._mount_parent = MountParent.VEHICLE
         # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a publisher.
         self._fixed_mount: Vector | None = (0.0, 0.0, 0.0)
+        self._link_open = False
         self._mount_due = math.inf
         self._pair_due = -math.inf
         self._pair_time = 0
@@ -339,7 +341,7 @@ class Feeder:
             self._send(conversions.system_time(utc, boot_ms))
             self._send(placed)
         self._fix_time = stamp.time
-        self._positions += 1
+        self._positions += self._link_open
 
     def _utc(self, stamp: Stamp) -> int:
         """Return the UTC of a stamp, us."""
@@ -468,7 +470,7 @@ class Feeder:
         """Set roll, pitch and yaw of a fixed mount, degrees; no effect with ``~/mount``."""
         if self._fixed_mount is not None:
             self._fixed_mount = angles
-            self._mount_due = now
+            self._mount_due = now if self._link_open else math.inf
 
     def _send_pair(self, now: float) -> None:
         """Send attitude and mount of one instant, back to back, the newest that are known."""
@@ -497,7 +499,7 @@ class Feeder:
         self._pair_due = max(self._pair_due + interval, now + interval / 2)
         self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
         self._send_mount(angles, now)
-        self._pairs += 1
+        self._pairs += self._link_open
 
     def _send_mount(self, angles: Vector, now: float) -> None:
         self._send(conversions.mount_status(angles, self._target()))
@@ -531,12 +533,14 @@ class Feeder:
 
     def link_opened(self, now: float) -> None:
         """Send the fixed mount soon."""
+        self._link_open = True
         # The link repeats the call while it hears no peer.
         if self._fixed_mount is not None and self._mount_due == math.inf:
             self._mount_due = now
 
     def link_closed(self) -> None:
         """Send nothing by itself until the link is open again."""
+        self._link_open = False
         self._mount_due = math.inf
 
     def poll(self, now: float) -> None:

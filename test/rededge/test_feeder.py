@@ -302,7 +302,19 @@ def test_a_fixed_mount_is_sent_each_second_without_attitude_and_after_a_change_r
     rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
     assert rig.run(0.0) == [MountStatus(*CAMERA, -200, 100, 350)]
     rig.feeder.link_closed()
+    rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
     assert rig.run(3.0) == []
+
+
+def test_what_is_dropped_since_the_link_is_closed_is_not_counted() -> None:
+    rig = Rig()
+    for opened in (False, True):
+        rig.fix()
+        rig.imu()
+        snapshot = rig.feeder.snapshot(rig.now)
+        assert (snapshot.positions, snapshot.attitudes) == (opened, opened)
+        rig.feeder.link_opened(rig.now)
+        rig.run(0.1)
 
 
 def test_a_mount_that_moves_is_sent_with_the_attitude_of_the_same_instant_re_26() -> None:
@@ -401,6 +413,7 @@ def test_an_attitude_that_cannot_be_trusted_is_refused_with_the_reason_re_30(
 
 def test_each_input_reports_when_it_comes_and_when_it_is_missing_re_30() -> None:
     rig = Rig()
+    rig.feeder.link_opened(rig.now)
     assert rig.state(Input.FIX) == (InputState.MISSING, '')
     rig.fix()
     rig.imu()
