@@ -32,7 +32,6 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload.arbitration import Policy
-from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion
@@ -60,8 +59,7 @@ class Rig(ManagerRig):
     def make(
         self, commands: CommandSender, settings: ManagerSettings,
     ) -> tuple[GimbalManager, Component]:
-        self.both = ManagerWithClient(commands, settings, GimbalSettings(
-            sources=SourceSettings(('safety', 'autonomy', 'default'))))
+        self.both = ManagerWithClient(commands, settings, GimbalSettings())
         self.told: list[Any] = []
         self.both.client.events.subscribe(self.told.append)
         return self.both.manager, Component(commands, [self.both])
@@ -142,28 +140,6 @@ def test_gm_22_ros_turns_a_device_without_mavlink_that_reports_no_attitude() -> 
     assert attitude is not None
     assert attitude.rotation.euler() == pytest.approx((0.0, 0.2, 0.3))
     assert rig.messages(GimbalDeviceSetAttitude) == []
-
-
-def test_only_the_source_that_holds_reaches_the_device_and_ros_stays_one_player() -> None:
-    rig = Rig()
-    rig.ask(rig.gimbal.take_control)
-
-    for source, yaw, refusal in (('autonomy', 0.1, ''), ('safety', 0.2, ''),
-                                 ('autonomy', 0.3, 'held by safety')):
-        assert rig.gimbal.claim(source, rig.now) == refusal
-        if not refusal:
-            rig.gimbal.set_angles((0.0, 0.0, yaw), YawFrame.VEHICLE, rig.now)
-        rig.run(0.1)
-    # The other player is refused, whichever source holds the gimbal.
-    assert rig.take(PILOT) is MavResult.DENIED
-    rig.gimbal.release('safety', rig.now)
-
-    assert rig.gimbal.snapshot(rig.now).holder == 'autonomy'
-    assert rig.manager.control.holder(Role.PRIMARY) == OURS
-    sent = [euler(one)[2] for one in rig.messages(GimbalDeviceSetAttitude)]
-    assert set(sent) >= {-0.1, -0.2}
-    assert -0.3 not in sent
-    assert sent[-1] == -0.2
 
 
 def test_the_client_ends_its_requests_when_the_link_is_lost() -> None:
