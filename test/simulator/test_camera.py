@@ -30,21 +30,10 @@ from illuminator_ros.rededge.simulated import COLUMNS
 import pytest
 from support.frames import frame_of
 from support.processes import ended, python
+from support.strict_mavlink_1 import strict_frames
 from support.waiting import eventually, PATIENCE
 
 HOST = Address(1, 191)
-# Length of the payload by message id, of which MAVLink 1 has no other.
-LENGTHS = {0: 9, 4: 14, 179: 29, 180: 45}
-
-
-def split_strictly(data: bytes) -> list[int]:
-    """Return the message ids of MAVLink 1 frames; an error for any other byte."""
-    ids = []
-    while len(data) >= 8 and len(data) >= data[1] + 8:
-        assert (data[0], data[1]) == (0xFE, LENGTHS[data[5]])
-        ids.append(data[5])
-        data = data[data[1] + 8:]
-    return ids
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -58,7 +47,7 @@ def test_camera_answers_in_mavlink_1_only_and_writes_each_image_at_once_re_1_re_
         os.write(device, frame_of(Ping(0, 1, 0, 0), source=HOST, version=1))
         os.write(device, frame_of(DigicamControl(1, 100, 1, 1, 0, 0, 1, 0, 0, 0.0), source=HOST))
         data = b''
-        while 180 not in (ids := split_strictly(data)):
+        while 180 not in (ids := [one.message_id for one in strict_frames(data)[0]]):
             assert select.select([device], [], [], PATIENCE)[0], ids
             data += os.read(device, 4096)
         os.close(device)
