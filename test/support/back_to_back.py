@@ -26,12 +26,13 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.frame import Decoder, encode_frame
+from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
+from support.frames import Codec
 from support.records import Answer, Recorder
 from support.simulated_lights import simulated_lights
 
@@ -53,7 +54,7 @@ class _End:
         self.classes = {cls.id: cls for cls in endpoint.messages}
         self.sent: list[tuple[float, Any]] = []
         self.received: list[tuple[float, mav.Address, Any]] = []
-        self._sequences: dict[mav.Address, int] = {}
+        self._codec = Codec()
         self._traffic = Traffic()
 
     def flush(self, now: float) -> None:
@@ -62,11 +63,7 @@ class _End:
             if not self.wire.is_open:
                 continue
             self.sent.append((now, message))
-            sequence = self._sequences.get(source, 0)
-            self._sequences[source] = (sequence + 1) & 0xFF
-            self.wire.send(encode_frame(
-                message.id, mav.encode_payload(message), sequence=sequence, source=source,
-                crc_extra=mav.LAYOUTS[message.id].crc_extra), now)
+            self.wire.send(self._codec.frame(source, message), now)
 
     def take(self, data: bytes, now: float) -> None:
         for frame in self.decoder.feed(data):
