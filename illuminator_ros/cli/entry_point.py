@@ -84,6 +84,9 @@ def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n'
     :param complain: takes the reason why they cannot be written, once.
     :return: whether they were written, or the reader has closed the pipe.
     """
+    if sys.stdout is None:
+        complain('standard output is closed')
+        return False
     try:
         print(*texts, sep='\n', end=end, flush=True)
     except OSError as error:

@@ -171,6 +171,15 @@ def test_help_that_cannot_be_written_is_one_line_with_status_1(
         1, f'{program}: standard output: No space left on device\n')
 
 
+@pytest.mark.parametrize(('program', 'option'), [
+    ('bridge', '--help'), ('bridge', '--version'), ('conformance', '--list')])
+def test_a_text_that_is_asked_for_needs_standard_output(program: str, option: str) -> None:
+    outcome = run(f'illuminator_ros.{program}', option, redirection='>&-')
+
+    assert (outcome.returncode, outcome.stderr) == (
+        1, f'{program}: standard output is closed\n')
+
+
 @pytest.mark.parametrize('option', ['--hel', '--versio', '--payl=rededge'])
 @pytest.mark.parametrize('program', ['bridge', 'simulator', 'conformance', 'monitor'])
 def test_an_abbreviated_option_is_refused_with_status_2(program: str, option: str) -> None:
