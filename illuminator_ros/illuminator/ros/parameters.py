@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+import functools
 import re
 import reprlib
 
@@ -128,6 +129,7 @@ def settings(values: Values) -> Settings:
                     sources, off)
 
 
+@functools.cache
 def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
     """Return the parameters of a light, with limits in their descriptions."""
     notes = {}
