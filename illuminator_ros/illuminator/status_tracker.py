@@ -251,12 +251,16 @@ class AddressConflict:
     numbers. Lights of one component with the same state and start time cannot be distinguished.
 
     :ivar detected: whether several lights send.
+    :ivar sender: the light that has sent the newest status.
+    :ivar senders: the lights that have sent lately, as far as they can be distinguished.
     :ivar can_follow: whether the newest status can be followed: it does not go back to a state
         shown before, or it has been repeated.
     """
 
     def __init__(self) -> None:
         self.detected = False
+        self.sender = 0
+        self.senders: frozenset[int] = frozenset()
         self.can_follow = True
         self._evidence = 0
         # With the last one at the end, and when each was shown.
@@ -265,6 +269,7 @@ class AddressConflict:
         self._by_start = _Senders(_is_same_start)
         self._by_number = _Senders(operator.eq)
         self._recent: list[Status] = []
+        self._recent_uptimes: list[int] = []
 
     def take(self, status: Status, now: float, *, commanded: bool, sender: int = 0) -> None:
         """
@@ -274,14 +279,17 @@ class AddressConflict:
         :param commanded: whether a command of ours may have changed the light.
         """
         uptime = status.uptime_ms
-        has_clock = any(one.uptime_ms != uptime for one in self._recent)
-        if has_clock and status in self._recent:
+        # The uptimes are kept apart, so that eight old statuses need not be read for each.
+        equal = self._recent_uptimes.count(uptime)
+        has_clock = equal < len(self._recent)
+        if has_clock and equal and status in self._recent:
             # The same frame, by another way, on which its number may lag far behind.
             return
         if has_clock or not self._recent:
             self._by_start.take(now * 1000.0 - uptime, now)
         self._by_number.take(sender, now)
         self._recent = [*self._recent[1 - MAX_RECENT:], status]
+        self._recent_uptimes = [*self._recent_uptimes[1 - MAX_RECENT:], uptime]
         if not commanded:
             repeated = self._take_state(status, now)
             self.can_follow = repeated or not self._evidence
@@ -290,23 +298,18 @@ class AddressConflict:
             self._states.clear()
             self._evidence = 0
             self.can_follow = True
+        by_start, by_number = self._by_start.proved(now), self._by_number.proved(now)
+        if len(by_number) > len(by_start):
+            self.sender, self.senders = self._by_number.newest, by_number
+        else:
+            self.sender, self.senders = self._by_start.newest, by_start
         self.detected = (self._evidence >= (1 if self.detected else ENOUGH_EVIDENCE)
-                         or len(self.senders(now)) > 1)
+                         or len(self.senders) > 1)
 
-    def _senders(self, now: float) -> _Senders:
-        return max(self._by_start, self._by_number, key=lambda one: len(one.proved(now)))
-
-    def sender(self, now: float) -> int:
-        """Return the light that has sent the newest status."""
-        return self._senders(now).newest
-
-    def senders(self, now: float) -> frozenset[int]:
-        """Return the lights that have sent lately, as far as they can be distinguished."""
-        return self._senders(now).proved(now)
-
-    def span(self, now: float) -> float:
+    @property
+    def span(self) -> float:
         """Return s in which each light sends a status; 0 where they can be distinguished."""
-        if not self.detected or len(self.senders(now)) > 1:
+        if not self.detected or len(self.senders) > 1:
             return 0.0
         return GAP_MARGIN * max(self._gaps, default=0.0)
 
@@ -384,17 +387,16 @@ class StatusTracker:
         if conflict.detected:
             # The uptimes of several lights say nothing about one another.
             self._clock = UptimeClock()
-            return Report(status, now, False, True, conflict.sender(now), conflict.senders(now),
-                          conflict.span(now)), False
+            return Report(status, now, False, True, conflict.sender, conflict.senders,
+                          conflict.span), False
         if uptime is Uptime.LATE:
             return None, False
         restarted = uptime is Uptime.RESTARTED or uptime is Uptime.NO_CLOCK and was_lost
         if restarted:
             self._sending_times = SendingTimes()
         sent_by, has_clock = self._sending_times.take(status, now)
-        newest = conflict.sender(now)
-        return Report(status, sent_by, has_clock, sender=newest,
-                      senders=frozenset((newest,))), restarted
+        return Report(status, sent_by, has_clock, sender=conflict.sender,
+                      senders=conflict.senders), restarted
 
     def lost(self) -> None:
         """Forget the other lights at the address: the light is lost."""
