@@ -239,8 +239,8 @@ def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: live_link.R
 SILENCE = 30.0
 
 
-# Our side and that of a light: over UDP it has another port each time, and a pseudo-terminal is
-# another device.
+# The URLs of the bridge and of the light. Over UDP the light has another port each time, and a
+# pseudo-terminal is another device.
 URLS = {'tcp': ('tcp://127.0.0.1:{port}', 'tcpin://127.0.0.1:{port}'),
         'udp': ('udpin://127.0.0.1:{port}', 'udpout://127.0.0.1:{port}'),
         'serial': ('serial://{path}:57600', 'pty://{path}')}
