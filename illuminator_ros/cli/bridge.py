@@ -181,32 +181,37 @@ def _serve(
     # On a terminal rcutils colours its lines; its stderr is a pipe.
     if termination.is_terminal:
         os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
-    # rclpy has an exception of its own for each thing that can be wrong with an argument.
-    failed = 'wrong ROS arguments'
     try:
         rclpy.init(
             args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
         node = PayloadNode(executable.payload)
         # Other participants discover the node while all this is imported.
         from ..ros.bridge import Bridge
-        executable.load()
-        # Such as two topics with one name.
-        failed = 'cannot create the node'
-        bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
-    except Exception as error:
         from ..ros.parameters import ParameterError
-        if isinstance(error, ParameterError):
-            return executable.refuse(f'parameter {error}')
-        # For a lack of descriptors or threads the middleware has none.
-        if isinstance(error, OSError) or type(error) is RuntimeError:
-            failed = 'cannot start'
-        return executable.refuse(f'{failed}: {error}')
+        executable.load()
+    except Exception as error:
+        # rclpy has an exception of its own for each thing that can be wrong with an argument.
+        return executable.refuse(_start_failure(error, 'wrong ROS arguments'))
+    try:
+        bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
+    except ParameterError as error:
+        return executable.refuse(f'parameter {error}')
+    except Exception as error:
+        # Such as two topics with one name.
+        return executable.refuse(_start_failure(error, 'cannot create the node'))
     # Existing objects stay: a collector that visits them would only delay answers.
     gc.freeze()
     termination.calls(bridge.end)
     bridge.run()
     rclpy.try_shutdown()
     return 0
+
+
+def _start_failure(error: Exception, failed: str) -> str:
+    # For a lack of descriptors or threads the middleware has no exception of its own.
+    if isinstance(error, OSError) or type(error) is RuntimeError:
+        failed = 'cannot start'
+    return f'{failed}: {error}'
 
 
 def _limit_memory() -> None:
