@@ -133,23 +133,6 @@ def test_a_light_whose_clock_is_coarse_or_wrong_is_confirmed(
         pair.run(0.17)
 
 
-@pytest.mark.parametrize('lower_ms', [0, 50, 3000])
-def test_a_late_status_from_before_the_command_does_not_confirm(
-    fake: FakeLight, faked: Pair, lower_ms: int,
-) -> None:
-    faked.enable(True)
-    shown_on = fake.status(faked.now)
-    change(fake, fields={'enable': 0}, stream=0.0, applies=False)
-    faked.run(0.4)
-    faked.light.request_status(faked.now)
-    faked.run(0.1)
-    answer = faked.ask_enable(True)
-    faked.run(0.005)
-    shown_on.uptime_ms -= lower_ms
-    fake.send(shown_on)
-    assert not faked.wait_for(answer).success
-
-
 def test_a_newer_status_that_was_sent_before_the_command_does_not_confirm(
     fake: FakeLight, faked: Pair,
 ) -> None:
