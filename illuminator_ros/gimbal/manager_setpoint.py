@@ -149,7 +149,7 @@ class Demand(NamedTuple):
     :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
     :param rates: of the axes, rad/s; NaN where none is given.
-    :param attitude: given, or that of the angles if none of them is NaN, else None.
+    :param attitude: given, or made of the angles if none of them is NaN, else None.
     """
 
     flags: int = 0
