@@ -444,8 +444,8 @@ class GimbalManager(Payload):
         current = demand.attitude or (
             Quaternion() if demand.is_pose else self._pointing(demand.frame, now))
         if current is None or (
-                demand.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
-                and self._heading(now) is None):
+                demand.frame is YawFrame.EARTH and not demand.is_pose
+                and not self._accepts_earth_frame(now) and self._heading(now) is None):
             return 'the heading of the vehicle is unknown'
         self._roi = None
         self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
@@ -492,18 +492,20 @@ class GimbalManager(Payload):
         ahead: float | None = 0.0
         converts = False
         if setpoint.frame is YawFrame.EARTH:
-            ahead, converts = self._heading(now), not self._accepts_earth_frame(now)
+            converts = not self._accepts_earth_frame(now)
+            # The device has the attitude of a pose.
+            ahead = 0.0 if setpoint.is_pose else self._heading(now)
         turns = setpoint.turning != STILL
         attitude = setpoint.at(now) if turns else setpoint.attitude
         self._send_due = now + (
             FOLLOW_INTERVAL if turns or converts or self._roi is not None else HOLD_INTERVAL)
+        self._limits_reached = 0
         if attitude is not None:
             if self._offsets != STILL:
                 attitude = mix(attitude, self._offsets)
             attitude, clipped = clip(
                 attitude, self.model.ranges, ahead,
                 setpoint.angles if attitude is setpoint.attitude else UNSET_VECTOR)
-            self._limits_reached = 0
             if clipped:
                 self._report_clipped(clipped, now)
         sent = setpoint

@@ -27,6 +27,7 @@ from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
     AutopilotStateForGimbalDevice,
     Capabilities,
+    ErrorFlags,
     GimbalCommand,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
@@ -371,6 +372,15 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_that_knows_no_north(
     assert euler(last(rig)) == (0.0, 0.1, 0.1)
 
 
+@pytest.mark.parametrize('flag', [F.NEUTRAL, F.RETRACT])
+def test_a_pose_with_a_locked_yaw_needs_no_heading(flag: MountFlags) -> None:
+    rig = in_control(device=information(FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME))
+
+    [sent] = of(GimbalDeviceSetAttitude, rig.give(PILOT, pitch_yaw(flags=flag | F.YAW_LOCK)))
+
+    assert F(sent.flags) == flag | F.YAW_IN_VEHICLE_FRAME
+
+
 # GM-9: nudging adds, overriding replaces; limits come last
 
 @pytest.mark.parametrize(('asked', 'pitch'), [(0.1, 0.3), (-0.1, 0.1), (1.0, 0.4), (-1.0, 0.0)])
@@ -560,6 +570,18 @@ def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:
     assert manager.cap_flags & Capabilities.HAS_PITCH_AXIS
     status = rig.messages(GimbalDeviceAttitudeStatus)[-1]
     assert (status.gimbal_device_id, status.q) == (1, HALF)
+
+
+def test_gm_22_a_limit_that_neutral_leaves_is_not_reported_any_more() -> None:
+    rig = in_control(device_id=1, ranges=(Range(), Range(-1.5, 0.5), Range()))
+    flags = []
+    for setpoint in (pitch_yaw(1.0, 0.0), pitch_yaw(flags=F.NEUTRAL)):
+        rig.give(PILOT, setpoint)
+        rig.manager.take_attitude(attitude_status(), rig.now)
+        rig.give(PILOT)
+        flags.append(rig.messages(GimbalDeviceAttitudeStatus)[-1].failure_flags)
+
+    assert flags == [ErrorFlags.AT_PITCH_LIMIT, 0]
 
 
 # GM-20, GM-23: the device and the vehicle
