@@ -22,6 +22,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
+from illuminator_ros.payload.rotation import Vector
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
@@ -168,6 +169,21 @@ def test_image_has_the_injected_values_and_their_ages() -> None:
         'mount_pitch_deg': '25.66', 'mount_yaw_deg': '16.10',
         'camera_roll_deg': row['camera_roll_deg'], 'camera_pitch_deg': row['camera_pitch_deg'],
         'camera_yaw_deg': row['camera_yaw_deg']}
+
+
+@pytest.mark.parametrize(('vehicle', 'camera', 'earth'), [
+    # Panning a camera that looks down is its roll, and turns the top of the image.
+    ((0, 0, 40), (30, 0, 0), (0, 0, 70)),
+    # A stabilised gimbal below a vehicle that pitches and rolls.
+    ((10, -15, 40), (0, 15, 10), (0, 0, 40)),
+    ((0, 0, 0), (0, 45, 0), (0, 45, 0))])
+def test_camera_attitude_is_composed_of_those_of_vehicle_and_mount(
+    vehicle: Vector, camera: Vector, earth: Vector,
+) -> None:
+    image = Camera().image(attitude(*vehicle), mount(*camera))
+
+    assert (image.camera_roll_deg, image.camera_pitch_deg,
+            image.camera_yaw_deg) == pytest.approx(earth, abs=1e-6)
 
 
 @pytest.mark.parametrize('message', [
