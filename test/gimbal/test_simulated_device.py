@@ -171,6 +171,15 @@ def test_gm_18_the_manager_stays_until_it_is_silent() -> None:
     assert bench.angles(1.0) == (0.0, 0.0, 0.0)
 
 
+def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() -> None:
+    bench = Bench(announced=False, manager_id=191)
+    bench.now += 2 * MANAGER_TIMEOUT
+    bench.announce(OTHER)
+    for source, pitch in ((OTHER, 0.0), (MANAGER, -10.0)):
+        bench.point(0.0, -10.0, 0.0, source=source)
+        assert bench.angles(1.0) == (0.0, pitch, 0.0)
+
+
 def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
     bench = Bench()
     down = Quaternion.from_euler(0.0, -0.5, 0.0)
