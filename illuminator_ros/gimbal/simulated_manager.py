@@ -251,8 +251,9 @@ class SimulatedManager(simulated.SimulatedDevice):
 
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         if isinstance(message, Attitude):
-            self.mount.motion.take_heading(
-                message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
+            if message.is_finite:
+                self.mount.motion.take_heading(
+                    message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:
             self._position = GeoPoint(
                 message.lat / 1e7, message.lon / 1e7, message.alt / 1000.0)

@@ -24,6 +24,7 @@ from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand
 from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED, SimulatedManager
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.payload.messages import (
+    Attitude,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
@@ -161,6 +162,15 @@ def test_gm_2_the_flags_tell_the_frame_of_a_yaw(profile: str, flags: int, yaw: f
     frame = bench.message(GimbalDeviceAttitudeStatus).flags & 96
     earth = profile == 'reference' and flags != FOLLOW or profile == 'px4' and flags == LOCK
     assert frame == (YawFrame.EARTH if earth else YawFrame.VEHICLE).flag
+
+
+@pytest.mark.parametrize('value', [NAN, math.inf])
+def test_an_attitude_of_the_vehicle_that_is_not_a_rotation_is_ignored(value: float) -> None:
+    bench = Bench()
+    bench.point(0.0, -20.0, 30.0, flags=LOCK)
+    bench.endpoint.receive(mav.Address(1, 1), Attitude(
+        0, 0.0, 0.0, value, 0.0, 0.0, 0.0), bench.now)
+    assert bench.angles() == (0.0, -20.0, 30.0)
 
 
 @every_profile
