@@ -208,8 +208,10 @@ def _serve(
 
 
 def _start_failure(error: Exception, failed: str) -> str:
+    if isinstance(error, ModuleNotFoundError):
+        raise error
     # For a lack of descriptors or threads the middleware has no exception of its own.
-    if isinstance(error, OSError) or type(error) is RuntimeError:
+    if isinstance(error, OSError | ImportError) or type(error) is RuntimeError:
         failed = 'cannot start'
     return f'{failed}: {error}'
 

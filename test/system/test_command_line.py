@@ -143,16 +143,19 @@ def test_bridge_takes_the_url_as_its_argument(domain: int) -> None:
         bridge.wait_for(f'link open: udp 127.0.0.1:{port}')
 
 
-@pytest.mark.parametrize(('name', 'package', 'remedy'), [
+@pytest.mark.parametrize(('command', 'package', 'remedy'), [
     ('bridge', 'rclpy', ROS_REMEDY), ('monitor', 'rclpy', ROS_REMEDY),
     ('monitor', 'rich', "sudo apt install python3-rich, or pip install 'rich>=13.3'"),
     ('bridge', 'fastcrc', 'pip install fastcrc'),
+    ('bridge --ros-args -p beam_range:=5.0', 'visualization_msgs',
+     'sudo apt install ros-jazzy-visualization-msgs'),
     ('simulator', 'fastcrc', 'pip install fastcrc'),
 ])
 def test_missing_package_is_one_line_with_its_remedy_and_status_1(
-    name: str, package: str, remedy: str, tmp_path: Path,
+    command: str, package: str, remedy: str, tmp_path: Path,
 ) -> None:
-    outcome = run_without(package, tmp_path, name)
+    name, *arguments = command.split()
+    outcome = run_without(package, tmp_path, name, *arguments)
 
     assert (outcome.returncode, outcome.stderr) == (
         1, f'{name}: {package} is not installed: {remedy}\n')
