@@ -188,7 +188,8 @@ class Light:
             if self._tracker.is_suspecting:
                 self._status_due = min(self._status_due, now + RESTART_PROOF_TIME)
             return
-        self._note(status, now)
+        if not is_first:
+            self._note(status, now)
         self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
         if restarted:
             self._restarted(now)

@@ -55,7 +55,7 @@ N = TypeVar('N', bound=DeviceNode)
 
 class DeviceNodes(Generic[K, N]):
     """
-    Gives devices their nodes; for the link's thread.
+    Gives devices their nodes; for turns of the link.
 
     :param kind: a noun for a device, such as ``light``.
     :param first: the payload's own node.

@@ -251,8 +251,6 @@ class _Entities:
         self._subscriptions = {one.handle.pointer: one for one in subscriptions}
         self._wait_set = wait_set = _rclpy.WaitSet(
             len(subscriptions), len(guards), 0, 0, len(services), 0, context.handle)
-        # A method is a new object each time that it is looked up.
-        add_service, add_subscription = wait_set.add_service, wait_set.add_subscription
         # Looked up once: a method is a new object each time.
         add_service, add_subscription = wait_set.add_service, wait_set.add_subscription
         self._added = [

@@ -37,7 +37,7 @@ class PayloadNode(Node):
     An executor would wait for an event of each publisher and subscription, which also take memory.
 
     :param first: the first node of the process, whose publisher of parameter events this one uses:
-        each event names its node, and a publisher takes 31 KB.
+        each event names its node, and each publisher takes memory.
     :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """
 

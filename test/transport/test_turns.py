@@ -170,6 +170,7 @@ def test_link_ends_in_the_turn_of_a_caller_which_does_not_wait_for_the_thread(ru
         link.link.stop(PATIENCE)
         waited.append(link.link.clock() - now)
 
+    selector.begins.clear()
     assert selector.begins.wait(PATIENCE)
     link.link.run_turn(stop)
     assert waited.wait_for(lambda seconds: True) < PATIENCE
