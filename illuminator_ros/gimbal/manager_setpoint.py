@@ -373,9 +373,9 @@ def clip(
     if offset is not None:
         # The angles of a quaternion take as long as all of the rest.
         roll, pitch, yaw = made_of
-        (roll_low, roll_high), (low, high), (yaw_low, yaw_high) = ranges
-        if (roll_low <= roll <= roll_high and yaw_low <= yaw - offset <= yaw_high
-                and low <= pitch <= high and -_RIGHT_ANGLE <= pitch <= _RIGHT_ANGLE):
+        (roll_low, roll_high), (pitch_low, pitch_high), (yaw_low, yaw_high) = ranges
+        if (roll_low <= roll <= roll_high and pitch_low <= pitch <= pitch_high
+                and yaw_low <= yaw - offset <= yaw_high):
             return attitude, []
     clipped = []
     angles = list(attitude.euler())

@@ -324,7 +324,7 @@ def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
     GimbalManagerSetAttitude(*OURS, 0, 0, (0.0, 0.0, 0.0, 0.0), NAN, NAN, NAN),
     GimbalManagerSetAttitude(*OURS, 0, 0, (1.0, NAN, 0.0, 0.0), NAN, NAN, NAN),
     GimbalManagerSetAttitude(*OURS, 0, 0, UNSET_QUATERNION, math.inf, NAN, NAN),
-    pitch_yaw(math.inf, 0.0), pitch_yaw(0.0, 0.0, flags=32 | 64),
+    pitch_yaw(math.inf, 0.0), pitch_yaw(yaw_rate=-math.inf), pitch_yaw(0.0, 0.0, flags=32 | 64),
     GimbalManagerSetManualControl(*OURS, 0, 0, 1.5, 0.0, NAN, NAN),
     pitch_yaw_command(math.inf, 0.0), pitch_yaw_command(0.0, 0.0, flags=96)], ids=repr)
 def test_an_invalid_setpoint_is_refused_and_named(message: Any) -> None:
@@ -368,7 +368,8 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_that_knows_no_north(
     assert F(sent[0].flags) == F.YAW_IN_VEHICLE_FRAME
     # It follows the vehicle when that turns.
     rig.heading = 1.1
-    rig.run(1.0)
+    rig.report()
+    rig.run(gimbal_manager.FOLLOW_INTERVAL)
     assert euler(last(rig)) == (0.0, 0.1, 0.1)
 
 

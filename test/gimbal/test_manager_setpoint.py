@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.manager_setpoint import (
@@ -97,6 +97,7 @@ RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda end
                      for _ in range(3)))
 
 
+@example((0.0, 0.0, 0.5), (Range(-1.0, 1.0),) * 3, 2.0)
 @given(ATTITUDES, RANGES, st.none() | ANGLES)
 def test_a_clipped_attitude_is_within_all_ranges_and_its_violations_are_named(
         angles: tuple[float, float, float], ranges: tuple[Range, Range, Range],
@@ -115,6 +116,7 @@ def test_a_clipped_attitude_is_within_all_ranges_and_its_violations_are_named(
                    for turn in (-4 * math.pi, -2 * math.pi, 0, 2 * math.pi, 4 * math.pi))
     assert (inside == attitude) == (not clipped)
     assert clip(inside, ranges, zero)[0].angle_to(inside) < 1e-3
+    assert clip(attitude, ranges, zero, angles) == (inside, clipped)
 
 
 @pytest.mark.parametrize(('yaw', 'range_', 'limit'), [
