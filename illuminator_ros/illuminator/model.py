@@ -112,8 +112,8 @@ class Limits:
     """
     The strobe periods that a light reports to be possible, s.
 
-    As sent, so they may be anything: see :attr:`known`. Both 0 are no information: ArduSub
-    sends zeros for what it does not measure.
+    As sent, so they may be anything: see :attr:`known`. Both are 0 where they are not known, as
+    in ArduSub.
     """
 
     min_strobe_period: float = 0.0

@@ -144,7 +144,7 @@ class EarlierCommand(NamedTuple):
     :param result: its MAV_RESULT, None if there was no answer.
     :param ended_at: s, on the clock of the calls.
     :param tries: how often it was sent.
-    :param elapsed: s, from the first sending; 0 where that is no measure of a round trip.
+    :param elapsed: s, from the first sending; 0 where that does not measure a round trip.
     """
 
     command: Command
@@ -468,7 +468,7 @@ class CommandSender:
         Take the round trip of a command whose every try seems to be acknowledged.
 
         Otherwise each command would be sent twice for ever where a line has become slower than the
-        wait for one try, since those that are sent again are no measure.
+        wait for one try, since a command that is sent again is not measured.
         """
         for key, earlier in self._earlier.items():
             if key[:2] == (source, command) and earlier.elapsed:

@@ -164,7 +164,7 @@ class Link:
         # s that the loop must wait at least next time: there was a fault.
         self._pause = 0.0
         self._fault_log_due = -math.inf
-        # Held during each turn, so always by the thread but while that waits; and until when it
+        # Held during each turn: by the thread always, except while it waits. Then until when it
         # waits, s, unless it is woken before.
         self._turn = threading.Lock()
         self._turn.acquire()
@@ -216,9 +216,10 @@ class Link:
 
     def run_turn(self, function: Callable[[float], None]) -> None:
         """
-        Take a turn of the link here if its thread only waits, otherwise as :meth:`call`.
+        Call ``function(now)`` in a turn here if the link's thread waits, else as :meth:`call`.
 
-        The function and the sending of what follows take less time than a change of threads.
+        The function and the sending of what follows take less time than a change of threads. The
+        caller must not hold a lock that is taken in a turn.
         """
         if self._calls or not self._turn.acquire(blocking=False):
             self.call(function)

@@ -29,7 +29,7 @@ MAX_SOURCES = 256
 # are two frames: the number has 8 bits.
 WINDOW = 64
 _ALL_SEEN = (1 << WINDOW) - 1
-# Consecutive numbers, more than a read brings.
+# Consecutive numbers, more than most reads bring.
 _CONSECUTIVE = bytes(range(256)) * 8
 # A sender is distinguished from another one with its address if its numbers continue within this
 # many frames, by at most this many.

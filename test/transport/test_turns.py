@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Turns of a link: one after the other, in its thread or in that of a caller."""
+"""Turns of a link: one after the other, in its thread or in a caller's thread."""
 
 from __future__ import annotations
 

@@ -221,7 +221,7 @@ class Conformance:
         return 0 if suite.passed and self._written else 1
 
     def _write_line(self, *texts: str) -> None:
-        # Without standard output, reports in files may be all that is wanted.
+        # Reports in files do not need standard output.
         if texts and sys.stdout:
             self._written &= _print(*texts)
 

@@ -105,7 +105,7 @@ class UdpChannel(Channel):
         :param size: of that one.
         """
         receive = self._socket.recvfrom
-        # Datagrams of one peer are decoded together, at a third of the cost, but for the first.
+        # Datagrams of one peer, except the first, are decoded together, at a third of the cost.
         datagrams: list[bytes] = []
         lost = None
         self.more = True
