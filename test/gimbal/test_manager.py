@@ -222,7 +222,8 @@ def test_gm_28_messages_and_commands_of_other_devices_are_refused(device_id: int
 def test_a_setpoint_to_another_manager_is_ignored() -> None:
     rig = in_control()
 
-    assert rig.give(PILOT, pitch_yaw(0.1, 0.1, to=mav.Address(1, 1))) == []
+    for other in (mav.Address(1, 1), mav.Address(2, OURS.component)):
+        assert rig.give(PILOT, pitch_yaw(0.1, 0.1, to=other)) == []
 
 
 def test_gm_16_the_gimbal_stays_where_it_points_when_its_player_falls_silent() -> None:
@@ -371,6 +372,23 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_that_knows_no_north(
     rig.report()
     rig.run(gimbal_manager.FOLLOW_INTERVAL)
     assert euler(last(rig)) == (0.0, 0.1, 0.1)
+    rig.heading, count = NAN, len(rig.messages(GimbalDeviceSetAttitude))
+    rig.report()
+    rig.run(0.2)
+    assert len(rig.messages(GimbalDeviceSetAttitude)) == count
+    assert of(gimbal_manager.ReferenceLost, rig.events) == [
+        gimbal_manager.ReferenceLost('heading')]
+
+
+def test_gm_2_an_axis_without_an_angle_keeps_its_direction_in_another_yaw_frame() -> None:
+    rig = in_control()
+    rig.heading = 1.0
+    rig.report()
+    rig.points(PILOT, 0.1, 0.2)
+
+    for flag, yaw in ((F.YAW_IN_EARTH_FRAME, 1.2), (F.YAW_IN_VEHICLE_FRAME, 0.2)):
+        rig.give(PILOT, pitch_yaw(0.3, flags=flag))
+        assert euler(last(rig)) == (0.0, 0.3, yaw)
 
 
 @pytest.mark.parametrize('flag', [F.NEUTRAL, F.RETRACT])

@@ -39,6 +39,8 @@ from support.gimbal_manager import (
     AUTOPILOT,
     configure,
     DEVICE,
+    euler,
+    GUEST,
     information,
     ManagerRig,
     of,
@@ -131,6 +133,18 @@ def test_gm_19_an_inactive_manager_gives_the_device_no_setpoint() -> None:
     rig.run(2.0, each=rig.heartbeats(PILOT))
 
     assert rig.points(PILOT) == rig.messages(GimbalDeviceSetAttitude, begun) == []
+
+
+def test_an_offset_ends_when_the_manager_becomes_inactive() -> None:
+    rig = ManagerRig()
+    rig.take(PILOT)
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+    rig.points(GUEST, 0.1)
+    rig.give(OTHER, status())
+    rig.run(MANAGER_TIMEOUT + 5.0, each=rig.heartbeats(PILOT, GUEST))
+
+    assert rig.manager.tracker.state is ManagerState.ACTIVE
+    assert [euler(one) for one in rig.points(PILOT, 0.2)] == [(0.0, 0.2, 0.0)]
 
 
 def test_gm_24_a_device_with_a_manager_of_its_own_keeps_ours_inactive() -> None:
