@@ -321,7 +321,7 @@ class GimbalManager(Payload):
         return min(self.tracker.next_deadline(), self.control.next_deadline(),
                    self._information_due, self._status_due, self._send_due)
 
-    # The device and the vehicle, as ROS knows them
+    # The device and the vehicle, from the link or from ROS
 
     def _report(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         self._status, self._status_at = status, now
@@ -349,7 +349,7 @@ class GimbalManager(Payload):
         self._report(status, now)
 
     def vehicle_changed(self, now: float) -> None:
-        """Tell the device the vehicle's state, unless an autopilot does."""
+        """Send the device the vehicle's state, unless an autopilot does."""
         if (self.tracker.device is None or self.tracker.state is not ManagerState.ACTIVE
                 or now < self._autopilot_at + AUTOPILOT_SILENCE
                 or now < self._state_sent_at + AUTOPILOT_INTERVAL):
@@ -476,7 +476,7 @@ class GimbalManager(Payload):
         return self._status if now < self._status_at + ATTITUDE_AGE else None
 
     def _heading(self, now: float) -> float | None:
-        """Return the vehicle's heading as the device knows it, or else the vehicle."""
+        """Return the vehicle's heading as the device reports it, or else the vehicle."""
         if (self._attitude is not None and self._attitude.heading is not None
                 and self._device_status(now) is not None):
             return self._attitude.heading

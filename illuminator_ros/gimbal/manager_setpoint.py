@@ -263,7 +263,7 @@ class Setpoint(NamedTuple):
     :param rates: rad/s, that the device follows; NaN where it chooses.
     :param turning: rad/s, by which the manager turns the attitude.
     :param since: when the attitude applies, s.
-    :param angles: roll, pitch and yaw that were asked for, rad; NaN where none was.
+    :param angles: roll, pitch and yaw that made the attitude, rad; NaN if anything else did.
     """
 
     flags: int

@@ -351,7 +351,7 @@ def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
 
 
 @pytest.mark.parametrize('heading', [NAN, 1.0])
-def test_gm_2_a_yaw_from_north_is_converted_for_a_device_that_knows_no_north(
+def test_gm_2_a_yaw_from_north_is_converted_for_a_device_without_north(
         heading: float) -> None:
     rig = in_control(device=information(
         FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME & ~Capabilities.HAS_YAW_LOCK))
@@ -613,7 +613,7 @@ def test_gm_20_the_attitude_of_the_device_is_not_sent_again() -> None:
     assert rig.messages(GimbalDeviceAttitudeStatus) == []
 
 
-def test_the_device_learns_the_vehicle_from_an_autopilot_that_knows_no_gimbal() -> None:
+def test_the_device_gets_the_state_of_an_autopilot_that_sends_it_to_no_gimbal() -> None:
     rig = ManagerRig()
 
     [message] = of(AutopilotStateForGimbalDevice, rig.give(AUTOPILOT, vehicle_yaw(0.5)))
@@ -634,7 +634,7 @@ def test_an_attitude_of_the_vehicle_that_is_not_finite_is_ignored(
 
 
 @pytest.mark.parametrize('autopilot_sends', [False, True])
-def test_the_device_learns_the_vehicle_from_ros_where_no_autopilot_tells_it(
+def test_the_device_gets_the_vehicles_state_from_ros_where_no_autopilot_sends_it(
         autopilot_sends: bool) -> None:
     rig = ManagerRig()
     vehicle = rig.manager.vehicle

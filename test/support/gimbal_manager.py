@@ -122,7 +122,7 @@ class ManagerRig:
         self.now = until
 
     def report(self, q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)) -> None:
-        """Let the device report its attitude, and whether it knows where north is."""
+        """Let the device report its attitude, and whether it accepts a yaw from north."""
         north = self.device_information.cap_flags & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
         flags = MountFlags.YAW_IN_VEHICLE_FRAME | (
             MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME if north else MountFlags(0))

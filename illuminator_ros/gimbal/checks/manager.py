@@ -108,7 +108,7 @@ class ManagerTester(GimbalTester):
     # Control
 
     async def control(self) -> Control:
-        """Return who has control; raise Skipped if the manager does not tell."""
+        """Return who has control; raise Skipped if the manager does not report it."""
         streamed = await self.session.receive_more(MANAGER_STATUS, 1.0)
         message = streamed[-1][1] if streamed else await self.session.request(MANAGER_STATUS)
         if message is None:

@@ -189,7 +189,7 @@ class GimbalTester(ABC):
         """
         Return what the gimbal can do.
 
-        :raises Skipped: if it does not tell.
+        :raises Skipped: if it does not report it.
         """
         if self._limits is None:
             self._limits = Limits.from_message(await self.session.required(self.information))

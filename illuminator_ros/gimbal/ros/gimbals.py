@@ -62,7 +62,7 @@ class Gimbals(ServedPayload):
     """
     Gives each gimbal on the link a node; for turns of the link.
 
-    :param why_none: returns why there is no gimbal, as far as this process knows; '' if not.
+    :param why_none: returns the reason of this process why there is no gimbal, '' if it has none.
     :raises ParameterError: if a parameter is wrong.
     """
 
