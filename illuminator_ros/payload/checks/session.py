@@ -367,7 +367,7 @@ class Session(Endpoint):
         self._open = False
 
     def inspect(self, frame: Frame, cls: type[Message]) -> None:
-        """See :meth:`Endpoint.inspect`."""
+        """See :class:`Endpoint`."""
         if self._same_device(frame.source, self.found):
             self.versions[frame.version] += 1
             if frame.version == 1 and len(frame.payload) != cls.base_size:
