@@ -38,8 +38,9 @@ from .model import (
 from ..payload.rate_limit import RateLimit, RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
-# s; rqt_reconfigure gives up after 1.0 s, and a set must have answered by then.
-CONFIGURE_LIMIT = 0.85
+# s; rqt_reconfigure gives up after 1.0 s, and the answer must have come by then. The middleware
+# waits up to 0.1 s before it sends an answer to a client that it does not know yet.
+CONFIGURE_LIMIT = 0.78
 # s between tries of overrides and restored configurations that got no answer.
 RESTORE_INTERVAL = 2.0
 # Attempts before giving up on a light that accepts a configuration but does not apply it.

@@ -153,7 +153,7 @@ def test_light_whose_frames_come_again_over_a_slower_line_is_one_light() -> None
 
 def test_a_set_makes_two_lights_equal_again(different: Pair) -> None:
     result = different.configure(brightness=70.0)
-    # Within 0.85 s a second light that reports once a second may not have sent a status.
+    # Within 0.78 s a second light that reports once a second may not have sent a status.
     assert 'not each of several lights that answer as 1/1' in result.message
     different.enable(True)
     different.run(6.0)
