@@ -441,16 +441,23 @@ class GimbalManager(Payload):
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
             return f'the gimbal does not have {lacking.name}'
-        current = demand.attitude or (
-            Quaternion() if demand.is_pose else self._pointing(demand.frame, now))
-        if current is None or (
-                demand.frame is YawFrame.EARTH and not demand.is_pose
-                and not self._accepts_earth_frame(now) and self._heading(now) is None):
+        current = self._current(demand, now)
+        if current is None:
             return 'the heading of the vehicle is unknown'
         self._roi = None
         self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
         self._send(now)
         return ''
+
+    def _current(self, demand: Demand, now: float) -> Quaternion | None:
+        """Return the attitude that a demand changes, None if that needs an unknown heading."""
+        if demand.is_pose or (demand.has_rates_only and self.tracker.has_mavlink):
+            # The device needs no attitude.
+            return Quaternion()
+        if (demand.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
+                and self._heading(now) is None):
+            return None
+        return demand.attitude or self._pointing(demand.frame, now)
 
     def _pointing(self, frame: YawFrame, now: float) -> Quaternion | None:
         """Return the attitude of the setpoint, or else of the device, with a yaw in a frame."""
@@ -493,8 +500,8 @@ class GimbalManager(Payload):
         converts = False
         if setpoint.frame is YawFrame.EARTH:
             converts = not self._accepts_earth_frame(now)
-            # The device has the attitude of a pose.
-            ahead = 0.0 if setpoint.is_pose else self._heading(now)
+            # A pose and rates have no attitude that is converted.
+            ahead = 0.0 if setpoint.attitude is None else self._heading(now)
         turns = setpoint.turning != STILL
         attitude = setpoint.at(now) if turns else setpoint.attitude
         self._send_due = now + (

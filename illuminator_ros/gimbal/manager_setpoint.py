@@ -164,6 +164,12 @@ class Demand(NamedTuple):
         return bool(self.flags & _POSE_BITS)
 
     @property
+    def has_rates_only(self) -> bool:
+        """Whether it has a rate, and neither attitude nor angle."""
+        return (self.attitude is None and any(map(math.isfinite, self.rates))
+                and not any(map(math.isfinite, self.angles)))
+
+    @property
     def target(self) -> Vector:
         """Return roll, pitch and yaw of the angles or the attitude, rad; NaN where none is."""
         if self.attitude is None or not math.isnan(self.angles[0]):
@@ -304,7 +310,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     Return the setpoint that a demand makes.
 
     :param current: the attitude in the frame of the demand, from which axes without an angle
-        begin, and which a demand with attitude or pose does not need.
+        begin; not used with an attitude, a pose or, unless ``turns``, with rates only.
     :param turns: whether the manager must turn the gimbal where only rates are given.
     """
     flags, frame = demand.flags, demand.frame
@@ -312,13 +318,13 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
         return Setpoint(flags, frame, None, since=now)
     if demand.attitude is not None:
         return Setpoint(flags, frame, demand.attitude, demand.rates, STILL, now, demand.angles)
-    given = [math.isfinite(angle) for angle in demand.angles]
     rates = demand.rates
-    only_rate = [not has_angle and math.isfinite(rate)
-                 for has_angle, rate in zip(given, rates, strict=True)]
-    if any(only_rate) and not any(given) and not turns:
+    if demand.has_rates_only and not turns:
         return Setpoint(flags, frame, None, _each(
             lambda rate: rate if math.isfinite(rate) else 0.0, rates), since=now)
+    given = [math.isfinite(angle) for angle in demand.angles]
+    only_rate = [not has_angle and math.isfinite(rate)
+                 for has_angle, rate in zip(given, rates, strict=True)]
     angles = _each(lambda asked, has_angle, angle: asked if has_angle else angle,
                    demand.angles, given, current.euler())
     return Setpoint(

@@ -400,6 +400,23 @@ def test_a_pose_with_a_locked_yaw_needs_no_heading(flag: MountFlags) -> None:
     assert F(sent.flags) == flag | F.YAW_IN_VEHICLE_FRAME
 
 
+def test_a_gimbal_with_a_locked_yaw_can_be_stopped_after_the_heading_is_lost() -> None:
+    rig = in_control(device=information(FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME))
+    rig.heading = 1.0
+    rig.report()
+    rig.give(PILOT, pitch_yaw(yaw_rate=0.2, flags=F.YAW_LOCK))
+    rig.heading, count = NAN, len(rig.messages(GimbalDeviceSetAttitude))
+    rig.report()
+    rig.run(1.0)
+    assert len(rig.messages(GimbalDeviceSetAttitude)) > count
+
+    [sent] = of(GimbalDeviceSetAttitude,
+                rig.give(PILOT, pitch_yaw(yaw_rate=0.0, flags=F.YAW_LOCK)))
+
+    assert F(sent.flags) == F.YAW_IN_VEHICLE_FRAME
+    assert sent.angular_velocity_z == 0.0
+
+
 # GM-9: nudging adds, overriding replaces; limits come last
 
 @pytest.mark.parametrize(('asked', 'pitch'), [(0.1, 0.3), (-0.1, 0.1), (1.0, 0.4), (-1.0, 0.0)])
