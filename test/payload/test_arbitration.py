@@ -36,6 +36,14 @@ def arbiter(policy: Policy, *, remembers: bool = False) -> Arbiter[str]:
     return Arbiter(policy, RANKS.__getitem__, lease=LEASE, remembers=remembers)
 
 
+def test_priority_does_not_take_the_device_from_a_source_of_the_same_rank() -> None:
+    one: Arbiter[str] = Arbiter(PRIORITY)
+    one.claim('first', 0.0)
+
+    assert one.claim('second', 1.0) is None
+    assert one.holder == 'first'
+
+
 # How a claim ends: what happens to the arbiter in which 'high' holds.
 ENDS: dict[Cause, Callable[[Arbiter[str]], HolderChanged[str] | None]] = {
     Cause.RELEASE: lambda one: one.release('high', 2.5),
