@@ -425,3 +425,8 @@ def test_each_input_reports_when_it_comes_and_when_it_is_missing_re_30() -> None
     assert snapshot.inputs[Input.FIX].age == pytest.approx(1.5)
     assert snapshot.inputs[Input.VELOCITY].age is None
     assert (snapshot.positions, snapshot.attitudes) == (1, 1)
+
+    rig.fix(replace(HERE, latitude=math.nan))
+    rig.run(1.5)
+    assert [(one.input, one.state) for one in rig.events[4:]] == [
+        (Input.FIX, InputState.REFUSED), (Input.FIX, InputState.STALE)]

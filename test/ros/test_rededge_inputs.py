@@ -59,7 +59,8 @@ class Rig:
         monkeypatch.setattr('illuminator_ros.rededge.ros.inputs.time.monotonic',
                             lambda: self.steady)
         monkeypatch.setattr('illuminator_ros.rededge.ros.inputs.time.time_ns',
-                            lambda: round(self.clock.seconds * 1e9))
+                            lambda: round(self.clock.seconds * 1e9)
+                            if not self.clock.ros_time_is_active else 0)
         # Any: a clock in place of a node.
         node: Any = self.clock
         self.reader = StampReader(node, self.jumped)
@@ -95,7 +96,8 @@ def test_simulated_time_may_run_fast_and_rclpy_tells_of_its_jumps(
         monkeypatch: pytest.MonkeyPatch) -> None:
     rig = Rig(monkeypatch)
     rig.clock.ros_time_is_active = True
-    assert rig.run(1.0, 9.0).simulated
+    stamp = rig.run(1.0, 9.0)
+    assert (stamp.simulated, stamp.age) == (True, pytest.approx(0.25))
     rig.run(1.0, 9.0)
     assert rig.jumps == 0
     rig.clock.jump(None)
