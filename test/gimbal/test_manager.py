@@ -319,6 +319,7 @@ def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
     assert (sent.angular_velocity_x, sent.angular_velocity_y,
             sent.angular_velocity_z) == pytest.approx(rates, nan_ok=True)
     assert (euler(sent) == angles) if angles else all(map(math.isnan, sent.q))
+    assert of(gimbal_manager.SetpointSent, rig.events) == []
 
 
 @pytest.mark.parametrize('message', [
@@ -683,14 +684,16 @@ def test_the_device_is_told_no_velocity_that_is_not_finite() -> None:
 
 # A forged address
 
-@pytest.mark.parametrize(('second', 'shared'), [
-    (mav.MavType.GCS, False), (mav.MavType.SUBMARINE, True)])
+@pytest.mark.parametrize(('second', 'after', 'shared'), [
+    (mav.MavType.GCS, 0.5, False), (mav.MavType.SUBMARINE, 0.5, True),
+    # The player was restarted as another program.
+    (mav.MavType.SUBMARINE, gimbal_manager.IDENTITY_TIME, False)])
 def test_two_senders_with_the_address_of_the_player_in_control_are_reported(
-        second: mav.MavType, shared: bool) -> None:
-    rig = in_control()
+        second: mav.MavType, after: float, shared: bool) -> None:
+    rig = in_control(control=ControlSettings(lease=60.0))
     rig.give(PILOT, mav.heartbeat(mav.MavType.GCS))
 
-    rig.run(0.5)
+    rig.run(after)
     rig.give(PILOT, mav.heartbeat(second))
 
     assert of(gimbal_manager.AddressShared, rig.events) == [

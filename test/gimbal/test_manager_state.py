@@ -20,6 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 import re
 
+from illuminator_ros.gimbal.manager import DemandRefused
 from illuminator_ros.gimbal.manager_state import (
     MANAGER_TIMEOUT,
     ManagerInput,
@@ -135,15 +136,20 @@ def test_gm_19_an_inactive_manager_gives_the_device_no_setpoint() -> None:
     assert rig.points(PILOT) == rig.messages(GimbalDeviceSetAttitude, begun) == []
 
 
-def test_an_offset_ends_when_the_manager_becomes_inactive() -> None:
+def test_setpoints_and_offsets_end_when_the_manager_becomes_inactive() -> None:
     rig = ManagerRig()
     rig.take(PILOT)
     rig.give(GUEST, configure(-1, -1, *GUEST))
     rig.points(GUEST, 0.1)
     rig.give(OTHER, status())
+    begun = rig.now
+    rig.points(PILOT, 0.3)
+    [refused] = of(DemandRefused, rig.events)
+    assert refused.reason == 'the manager is not active: inactive'
     rig.run(MANAGER_TIMEOUT + 5.0, each=rig.heartbeats(PILOT, GUEST))
 
     assert rig.manager.tracker.state is ManagerState.ACTIVE
+    assert rig.messages(GimbalDeviceSetAttitude, begun) == []
     assert [euler(one) for one in rig.points(PILOT, 0.2)] == [(0.0, 0.2, 0.0)]
 
 

@@ -93,6 +93,13 @@ def test_ros_takes_control_sets_the_attitude_and_releases() -> None:
     assert rig.manager.control.holder(Role.PRIMARY) is None
 
 
+def test_a_setpoint_of_another_player_reaches_the_device_once() -> None:
+    rig = Rig()
+    rig.take(PILOT)
+
+    assert [euler(one) for one in rig.points(PILOT, 0.2)] == [(0.0, 0.2, 0.0)]
+
+
 @pytest.mark.parametrize(('policy', 'overrules', 'refused'), [
     (Policy.HOLD, False, True), (Policy.HOLD, True, False), (Policy.TAKEOVER, False, False)])
 def test_ros_is_subject_to_the_policy(policy: Policy, overrules: bool, refused: bool) -> None:

@@ -97,7 +97,8 @@ def test_simulated_time_may_run_fast_and_rclpy_tells_of_its_jumps(
     rig = Rig(monkeypatch)
     rig.clock.ros_time_is_active = True
     stamp = rig.run(1.0, 9.0)
-    assert (stamp.simulated, stamp.age) == (True, pytest.approx(0.25))
+    assert stamp.simulated
+    assert stamp.age == pytest.approx(0.25)
     rig.run(1.0, 9.0)
     assert rig.jumps == 0
     rig.clock.jump(None)
