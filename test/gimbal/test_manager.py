@@ -401,7 +401,9 @@ def test_a_pose_with_a_locked_yaw_needs_no_heading(flag: MountFlags) -> None:
     assert F(sent.flags) == flag | F.YAW_IN_VEHICLE_FRAME
 
 
-def test_a_gimbal_with_a_locked_yaw_can_be_stopped_after_the_heading_is_lost() -> None:
+@pytest.mark.parametrize('is_silent', [False, True])
+def test_gm_16_a_locked_yaw_is_stopped_by_its_player_or_its_silence_without_a_heading(
+        is_silent: bool) -> None:
     rig = in_control(device=information(FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME))
     rig.heading = 1.0
     rig.report()
@@ -411,11 +413,13 @@ def test_a_gimbal_with_a_locked_yaw_can_be_stopped_after_the_heading_is_lost() -
     rig.run(1.0)
     assert len(rig.messages(GimbalDeviceSetAttitude)) > count
 
-    [sent] = of(GimbalDeviceSetAttitude,
-                rig.give(PILOT, pitch_yaw(yaw_rate=0.0, flags=F.YAW_LOCK)))
+    if is_silent:
+        rig.run(3.0)
+    else:
+        rig.give(PILOT, pitch_yaw(yaw_rate=0.0, flags=F.YAW_LOCK))
 
-    assert F(sent.flags) == F.YAW_IN_VEHICLE_FRAME
-    assert sent.angular_velocity_z == 0.0
+    assert F(last(rig).flags) == F.YAW_IN_VEHICLE_FRAME
+    assert last(rig).angular_velocity_z == 0.0
 
 
 # GM-9: nudging adds, overriding replaces; limits come last
