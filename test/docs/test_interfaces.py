@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The nodes as they run, compared with the pages, the SROS2 policies and the files in config/."""
 
 from collections.abc import Iterator

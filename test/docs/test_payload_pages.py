@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The pages about gimbals and the camera: their rules, poses and fields."""
 
 import math

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """MAVSDK's Gimbal plugin as player of our manager, and beside our client at a simulated one."""
 
 from __future__ import annotations
