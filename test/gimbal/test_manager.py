@@ -541,6 +541,7 @@ def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
     (region(47.1, 8.0, 100.0, frame=3), mav.MavResult.ACCEPTED),
     (region(47.1, 8.0, 100.0, frame=10), mav.MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
     (region(97.1, 8.0, 100.0), mav.MavResult.DENIED),
+    (region(47.1, 180.1, 100.0), mav.MavResult.DENIED),
     (region(47.1, 8.0, NAN), mav.MavResult.DENIED),
     (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, 47, 8, 0), mav.MavResult.ACCEPTED),
     (long(GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, 0, 0, NAN, 8, 0), mav.MavResult.DENIED)])
