@@ -144,7 +144,9 @@ class EarlierCommand(NamedTuple):
     :param result: its MAV_RESULT, None if there was no answer.
     :param ended_at: s, on the clock of the calls.
     :param tries: how often it was sent.
-    :param elapsed: s, from the first sending; 0 where that does not measure a round trip.
+    :param elapsed: s, from the first sending to the end.
+    :param last_ack_at: from when on an acknowledgement, which is then that of the last try, proves
+        that ``elapsed`` was a round trip; infinity where none does.
     """
 
     command: Command
@@ -152,6 +154,7 @@ class EarlierCommand(NamedTuple):
     ended_at: float
     tries: int = 1
     elapsed: float = 0.0
+    last_ack_at: float = math.inf
 
 
 class CommandResult(NamedTuple):
@@ -465,14 +468,15 @@ class CommandSender:
 
     def _measure_resent(self, source: Address, command: int, now: float) -> None:
         """
-        Take the round trip of a command whose every try seems to be acknowledged.
+        Take the round trip of a command whose last try is acknowledged as late as the first was.
 
-        Otherwise each command would be sent twice for ever where a line has become slower than the
-        wait for one try, since a command that is sent again is not measured.
+        One that comes sooner may be a copy. Otherwise each command would be sent twice for ever
+        where a line has become slower than the wait for one try, since a command that is sent
+        again is not measured.
         """
         for key, earlier in self._earlier.items():
-            if key[:2] == (source, command) and earlier.elapsed:
-                self._earlier[key] = earlier._replace(elapsed=0.0)
+            if key[:2] == (source, command) and now >= earlier.last_ack_at:
+                self._earlier[key] = earlier._replace(last_ack_at=math.inf)
                 self._estimator(source).add(earlier.elapsed, now)
                 return
 
@@ -588,9 +592,11 @@ class CommandSender:
         while self._earlier and now > (
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
             del self._earlier[oldest.command.key]
+        is_measure = answered and request.tries > 1 and not request.rejected
+        between = request.last_sent - request.first_sent
         self._earlier[command.key] = EarlierCommand(
-            command, request.result if answered else None, now, request.tries,
-            result.elapsed if answered and request.tries > 1 and not request.rejected else 0.0)
+            command, request.result if answered else None, now, request.tries, result.elapsed,
+            now + between / 2 if is_measure else math.inf)
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering[command.target] = None

@@ -110,6 +110,18 @@ def test_a_line_that_becomes_slower_than_the_wait_is_measured_again() -> None:
     assert (tries[0], tries[-1]) == (2, 1)
 
 
+def test_a_copy_of_an_acknowledgement_is_not_taken_for_that_of_another_try() -> None:
+    rig = taught(0.02, 0.5)
+    for _ in range(5):
+        run = rig.start()
+        rig.run(0.4)
+        rig.ack(ACCEPTED)
+        rig.run(0.05)
+        rig.ack(ACCEPTED)
+        rig.run(1.0)
+        assert run.outcome.tries == 2
+
+
 @pytest.mark.parametrize(('seconds', 'timeout', 'times'), [
     # Each wait is twice the one before it, up to the given time-out.
     (0.06, 1.0, [0.0, 0.24, 0.72, 1.68, 2.68]), (0.4, 0.5, [0.0, 0.5, 1.0, 1.5, 2.0])])
