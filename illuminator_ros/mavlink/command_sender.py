@@ -145,8 +145,8 @@ class EarlierCommand(NamedTuple):
     :param ended_at: s, on the clock of the calls.
     :param tries: how often it was sent.
     :param elapsed: s, from the first sending to the end.
-    :param last_ack_at: from when on an acknowledgement, which is then that of the last try, proves
-        that ``elapsed`` was a round trip; infinity where none does.
+    :param last_ack_at: from when on an acknowledgement answers the last try, so that ``elapsed``
+        was a round trip; infinity where it was none.
     """
 
     command: Command

@@ -200,7 +200,7 @@ class _Tracker:
         return InputState.MISSING
 
     def change(self, now: float) -> InputChanged | None:
-        """Return the state if it differs from that of the last call."""
+        """Return the state if it has changed since the last call."""
         state = self.state(now)
         if state is self._reported:
             return None
