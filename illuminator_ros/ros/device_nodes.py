@@ -16,14 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Hashable, Iterator
-import functools
+from collections.abc import Callable, Hashable, Iterator
 import math
 from typing import Generic, Protocol, TypeVar
 
 from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsSource
+from .node_manager import NodeRequest
 from .parameters import ignored_parameters
 from .payload import Host
 from .throttled_log import NodeLog
@@ -58,26 +58,23 @@ class DeviceNodes(Generic[K, N]):
     Gives devices their nodes; for turns of the link.
 
     :param kind: a noun for a device, such as ``light``.
-    :param first: the payload's own node.
     :param make: gives the node of a further device its interface; in the thread that makes nodes.
     :param bind: has a node serve a device from then on, given its key and the time (s).
-    :param devices: returns the devices that are there, by key.
-    :ivar first: see above.
+    :ivar first: the payload's own node.
     """
 
     def __init__(
         self, host: Host, kind: str, first: N, make: Callable[[Node, NodeLog], N],
-        bind: Callable[[N, K, float], None], devices: Callable[[], Container[K]],
+        bind: Callable[[N, K, float], None],
     ) -> None:
         self.first = first
         self._host = host
         self._kind = kind
         self._make = make
         self._bind_node = bind
-        self._devices = devices
         self._nodes: dict[K, N] = {}
-        # The names of the nodes of further devices, also before they are made.
-        self._names: dict[K, str] = {}
+        # Of the nodes of further devices, also before they are made.
+        self._requests: dict[K, NodeRequest] = {}
         self._absence_due = host.link.clock() + ABSENCE_DELAY
         host.diagnostics.add(first.source)
 
@@ -90,7 +87,7 @@ class DeviceNodes(Generic[K, N]):
 
     def has_name(self, name: str) -> bool:
         """Return whether the node of a further device has a name, without namespace."""
-        return name in self._names.values()
+        return any(request.name == name for request in self._requests.values())
 
     @property
     def first_is_free(self) -> bool:
@@ -99,31 +96,35 @@ class DeviceNodes(Generic[K, N]):
 
     def serve(self, key: K, name: str) -> bool:
         """Give a further device a node of its own; return False if that was done before."""
-        if key in self._names:
+        if key in self._requests:
             return False
-        self._names[key] = name
-        self._host.nodes.make(
-            key, f'{self._kind} {key}', name, functools.partial(self._serve, key))
+        request = self._requests[key] = NodeRequest(
+            f'{self._kind} {key}', name, lambda node: self._serve(key, request, node))
+        self._host.nodes.make(request)
         return True
 
-    def _serve(self, key: K, node: Node) -> None:
+    def _serve(self, key: K, request: NodeRequest, node: Node) -> None:
         log = NodeLog(node.get_logger())
         served = self._make(node, log)
         for warning in ignored_parameters(node, self._host.node):
             log.warning(warning)
         self._host.log.info(f'{self._kind} {key} is served by {served.full_name}', 'served')
-        self._host.link.call(lambda now: self.bind(served, key, now))
+
+        def bind(now: float) -> None:
+            # The device may have been forgotten meanwhile, and found again.
+            if self._requests.get(key) is request:
+                self.bind(served, key, now)
+
+        self._host.link.call(bind)
 
     def bind(self, node: N, key: K, now: float) -> None:
-        """Have a node serve a device from now on, if that is there."""
-        if key in self._devices():
-            self._nodes[key] = node
-            self._bind_node(node, key, now)
-            self._host.diagnostics.add(node.source)
+        """Have a node serve a device from now on."""
+        self._nodes[key] = node
+        self._bind_node(node, key, now)
+        self._host.diagnostics.add(node.source)
 
     def forget(self, key: K) -> None:
         """Remove the node of a device that was forgotten; the payload's own one stays."""
-        self._names.pop(key, None)
         node = self._nodes.pop(key, None)
         if node is not None:
             node.release()
@@ -131,7 +132,8 @@ class DeviceNodes(Generic[K, N]):
                 self._host.diagnostics.remove(node.source)
                 self._host.log.info(f'{self._kind} {key} was silent for long: {node.full_name} is '
                                     'removed', 'forgotten')
-        self._host.nodes.remove(key)
+        if request := self._requests.pop(key, None):
+            self._host.nodes.remove(request)
 
     def poll(self, now: float) -> None:
         """Log once why there is no device."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import dataclass
 import functools
@@ -31,24 +31,33 @@ from .parameters import ParameterError
 from .payload_node import PayloadNode
 from .throttled_log import NodeLog
 
-# Threads for all nodes except the first. Each further node on a thread costs 5 us a callback.
-EXECUTORS = 1
 # s to the next attempt to make a node, from the first to the longest.
 RETRY_DELAYS = (0.5, 30.0)
 
 
-@dataclass
-class _Wanted:
+@dataclass(eq=False)
+class NodeRequest:
+    """
+    A node that is needed; each request is one of its own, also where others have its values.
+
+    :param device: the device of the node, for people.
+    :param serve: gives the node its interface; called by :meth:`NodeManager.work`.
+    :ivar due: s, monotonic, for the next attempt to make the node.
+    :ivar delay: s from a failed attempt to the next one.
+    """
+
     device: str
     name: str
     serve: Callable[[Node], None]
-    due: float
+    due: float = 0.0
     delay: float = RETRY_DELAYS[0]
 
 
 class NodeManager:
     """
     The nodes of further devices, made and removed one at a time by :meth:`work`.
+
+    One thread runs all of them: each node on a thread costs 5 us a callback.
 
     :param first: the process's first node; the others share its namespace and context,
         and its publisher of parameter events.
@@ -65,31 +74,26 @@ class NodeManager:
         self._log = log
         self._wake = wake
         self._lock = threading.Lock()
-        self._wanted: dict[Hashable, _Wanted] = {}
-        self._unwanted: list[Hashable] = []
-        self._nodes: dict[Hashable, tuple[Node, NodeExecutor]] = {}
-        self._executors: list[tuple[NodeExecutor, threading.Thread]] = []
+        self._wanted: list[NodeRequest] = []
+        self._unwanted: list[NodeRequest] = []
+        self._nodes: dict[NodeRequest, Node] = {}
+        self._executor = NodeExecutor(first.context, log)
+        self._thread = threading.Thread(target=self._executor.run, name='nodes', daemon=True)
 
-    def make(
-        self, key: Hashable, device: str, name: str, serve: Callable[[Node], None],
-    ) -> None:
+    def make(self, request: NodeRequest) -> None:
         """
         Make a node soon; callable from any thread.
 
         A failure is tried again.
-
-        :param device: the device of the node, for people.
-        :param serve: gives the node its interface; called by :meth:`work`.
         """
         with self._lock:
-            self._wanted[key] = _Wanted(device, name, serve, time.monotonic())
+            self._wanted.append(request)
         self._wake()
 
-    def remove(self, key: Hashable) -> None:
+    def remove(self, request: NodeRequest) -> None:
         """Remove a node soon, or do not make it; callable from any thread."""
         with self._lock:
-            self._wanted.pop(key, None)
-            self._unwanted.append(key)
+            self._unwanted.append(request)
         self._wake()
 
     def work(self) -> bool:
@@ -97,76 +101,63 @@ class NodeManager:
         now = time.monotonic()
         with self._lock:
             unwanted, self._unwanted = self._unwanted, []
-            due = [(key, one) for key, one in self._wanted.items() if one.due <= now]
-        for key in unwanted:
-            if key in self._nodes:
-                node, executor = self._nodes.pop(key)
-                executor.call(functools.partial(_discard, node, executor))
+            self._wanted = [one for one in self._wanted if one not in unwanted]
+            due = [one for one in self._wanted if one.due <= now]
+        for request in unwanted:
+            if node := self._nodes.pop(request, None):
+                self._executor.call(functools.partial(self._discard, node))
         if not due:
             return False
-        key, wanted = due[0]
+        request = due[0]
         try:
-            made = self._make(wanted)
+            self._nodes[request] = self._make(request)
         except ParameterError as error:
-            self._log.error(f'{wanted.device} gets no node: {error}')
+            self._log.error(f'{request.device} gets no node: {error}')
         except Exception as error:
             # Threads, descriptors or memory may be short temporarily.
-            self._log.error(f'{wanted.device} gets no node yet: {error}; trying again in '
-                            f'{wanted.delay:g} s', f'node {key}')
-            wanted.due = time.monotonic() + wanted.delay
-            wanted.delay = min(2 * wanted.delay, RETRY_DELAYS[1])
+            self._log.error(f'{request.device} gets no node yet: {error}; trying again in '
+                            f'{request.delay:g} s', f'node of {request.device}')
+            request.due = time.monotonic() + request.delay
+            request.delay = min(2 * request.delay, RETRY_DELAYS[1])
             return len(due) > 1
-        else:
-            self._nodes[key] = made
         with self._lock:
-            if self._wanted.get(key) is wanted:
-                del self._wanted[key]
+            self._wanted.remove(request)
         return len(due) > 1
 
     def end(self) -> None:
         """Stop running callbacks; callable from any thread."""
-        for executor, _ in list(self._executors):
-            executor.end()
+        self._executor.end()
 
     def join(self, deadline: float) -> None:
-        """Wait until ``deadline`` (s, monotonic) for the threads."""
-        for _, thread in list(self._executors):
-            thread.join(max(deadline - time.monotonic(), 0.0))
+        """Wait until ``deadline`` (s, monotonic) for the thread."""
+        if self._thread.ident is not None:
+            self._thread.join(max(deadline - time.monotonic(), 0.0))
 
     @property
     def nodes(self) -> list[Node]:
         """Return the nodes that were made."""
-        return [node for node, _ in list(self._nodes.values())]
+        return list(self._nodes.values())
 
-    def _make(self, wanted: _Wanted) -> tuple[Node, NodeExecutor]:
-        executor = self._executor()
+    def _make(self, request: NodeRequest) -> Node:
+        if self._thread.ident is None:
+            self._thread.start()
         node = PayloadNode(
-            wanted.name, first=self._first, namespace=self._first.get_namespace(),
+            request.name, first=self._first, namespace=self._first.get_namespace(),
             context=self._first.context, cli_args=self._arguments, use_global_arguments=False,
             # Its types are those of the first node, and the service takes 0.13 MB.
             parameter_overrides=[Parameter('start_type_description_service', value=False)])
         try:
-            wanted.serve(node)
+            request.serve(node)
         except BaseException:
             node.destroy_node()
             raise
-        executor.add_node(node)
-        return node, executor
+        self._executor.add_node(node)
+        return node
 
-    def _executor(self) -> NodeExecutor:
-        if len(self._executors) < EXECUTORS:
-            executor = NodeExecutor(self._first.context, self._log)
-            thread = threading.Thread(target=executor.run, name='nodes', daemon=True)
-            thread.start()
-            self._executors.append((executor, thread))
-        return min((executor for executor, _ in self._executors),
-                   key=lambda executor: len(executor.get_nodes()))
-
-
-def _discard(node: Node, executor: NodeExecutor) -> None:
-    executor.remove_node(node)
-    with contextlib.suppress(Exception):
-        node.destroy_node()
+    def _discard(self, node: Node) -> None:
+        self._executor.remove_node(node)
+        with contextlib.suppress(Exception):
+            node.destroy_node()
 
 
 def without_node_name(arguments: Sequence[str]) -> list[str]:

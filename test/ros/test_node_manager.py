@@ -14,9 +14,14 @@
 
 """Nodes of further devices: a failure is tried again, and a node goes with its device."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import cast
 
-from illuminator_ros.ros.node_manager import NodeManager
+from illuminator_ros.ros.device_nodes import DeviceNodes
+from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
+from illuminator_ros.ros.node_manager import NodeManager, NodeRequest
+from illuminator_ros.ros.payload import Host
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
@@ -26,13 +31,23 @@ from support.waiting import eventually
 
 
 @pytest.fixture
-def pool(own_ros: Ros) -> Iterator[NodeManager]:
-    first = PayloadNode('first', context=own_ros.context)
+def first(own_ros: Ros) -> Iterator[PayloadNode]:
+    node = PayloadNode('first', context=own_ros.context)
+    yield node
+    node.destroy_node()
+
+
+@pytest.fixture
+def pool(first: PayloadNode) -> Iterator[NodeManager]:
     pool = NodeManager(first, [], NodeLog(first.get_logger()), lambda: None)
     yield pool
     pool.end()
-    for node in (first, *pool.nodes):
+    for node in pool.nodes:
         node.destroy_node()
+
+
+def request(serve: Callable[[Node], None] = lambda node: None) -> NodeRequest:
+    return NodeRequest('light 1/244', 'further', serve)
 
 
 def names(ros: Ros) -> list[str]:
@@ -48,7 +63,7 @@ def test_node_that_cannot_be_made_is_tried_again_and_logged(
         if failures:
             raise failures.pop()
 
-    pool.make('1/244', 'light 1/244', 'further', serve)
+    pool.make(request(serve))
 
     pool.work()
     assert 'light 1/244 gets no node yet: too many threads' in ''.join(capfd.readouterr())
@@ -56,11 +71,12 @@ def test_node_that_cannot_be_made_is_tried_again_and_logged(
 
 
 def test_node_is_removed_with_its_device(own_ros: Ros, pool: NodeManager) -> None:
-    pool.make('1/244', 'light 1/244', 'further', lambda node: None)
+    wanted = request()
+    pool.make(wanted)
     pool.work()
     eventually(lambda: 'further' in names(own_ros))
 
-    pool.remove('1/244')
+    pool.remove(wanted)
     pool.work()
 
     eventually(lambda: 'further' not in names(own_ros))
@@ -70,8 +86,57 @@ def test_node_is_removed_with_its_device(own_ros: Ros, pool: NodeManager) -> Non
 def test_device_that_goes_before_its_node_is_made_gets_none(
     own_ros: Ros, pool: NodeManager,
 ) -> None:
-    pool.make('1/244', 'light 1/244', 'further', lambda node: None)
-    pool.remove('1/244')
+    wanted = request()
+    pool.make(wanted)
+    pool.remove(wanted)
 
     assert not pool.work()
     assert pool.nodes == []
+
+
+class Served:
+    """The node of a device, in name only."""
+
+    def __init__(self, node: Node) -> None:
+        self.full_name = node.get_fully_qualified_name()
+        self.source = DiagnosticsSource(
+            node.get_name(), self.full_name, lambda now: lambda link: ())
+
+    def release(self) -> None:
+        """Serve no device."""
+
+    def absence(self, now: float) -> str:
+        """Return why there is no device."""
+        return ''
+
+
+def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnostics_source(
+    first: PayloadNode, pool: NodeManager,
+) -> None:
+    turns: list[Callable[[float], None]] = []
+    sources: set[DiagnosticsSource] = set()
+    made: list[Served] = []
+
+    def make(node: Node, log: NodeLog) -> Served:
+        made.append(Served(node))
+        if len(made) == 1:
+            nodes.forget(7)
+            nodes.serve(7, 'further')
+        return made[-1]
+
+    nodes = DeviceNodes[int, Served](
+        cast(Host, SimpleNamespace(
+            node=first, nodes=pool, log=NodeLog(first.get_logger()),
+            link=SimpleNamespace(clock=lambda: 0.0, call=turns.append),
+            diagnostics=SimpleNamespace(add=sources.add, remove=sources.discard))),
+        'light', Served(first), make, lambda node, key, now: None)
+    nodes.serve(7, 'further')
+    while pool.work():
+        pass
+    pool.work()
+    for turn in turns:
+        turn(0.0)
+
+    assert len(pool.nodes) == 1
+    assert nodes.get(7) is made[1]
+    assert sources == {nodes.first.source, made[1].source}

@@ -75,7 +75,7 @@ class Gimbals(ServedPayload):
         self._nodes = DeviceNodes[GimbalKey, GimbalNode](
             host, 'gimbal', GimbalNode(host.node, host, host.log, client, gimbals, why_none),
             lambda node, log: GimbalNode(node, host, log, client, gimbals, why_none),
-            GimbalNode.bind, lambda: client.gimbals)
+            GimbalNode.bind)
         client.events.subscribe(self._take)
 
     def _take(self, event: GimbalEvent) -> None:

@@ -61,7 +61,7 @@ class Lights(ServedPayload):
                 services=(RequestService('enable_all', SetBool, self._enable_all),),
                 commands=(CommandTopic('cmd/enable_all', Bool, self._switching.offer),)),
             lambda node, log: LightNode(node, host, log, client, geometry.declare(node)),
-            LightNode.bind, lambda: client.lights)
+            LightNode.bind)
         self._second_reported = False
         self._names_due = math.inf
         client.events.subscribe(self._take)
