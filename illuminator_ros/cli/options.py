@@ -26,7 +26,7 @@ from .entry_point import print_output
 from .. import __version__
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
-from ..mavlink.signing_files import load_signing, TimestampStore
+from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite  # A name of type checkers only.
@@ -130,5 +130,8 @@ def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampS
     :param name: whose time stamps are kept.
     :raises KeyFileError: if the key cannot be used, or is given and not used.
     """
-    return load_signing(
-        SigningMode(options.signing_mode), options.signing_key_file, name, time.time())
+    try:
+        return load_signing(
+            SigningMode(options.signing_mode), options.signing_key_file, name, time.time())
+    except KeyFileError as error:
+        raise KeyFileError(f'--signing-key-file: {error}') from None

@@ -114,11 +114,11 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('simulator', '--mavlink-version 1', '--mavlink-version 1: a light needs MAVLink 2'),
     ('simulator', '--payload rededge,gimbal', 'a gimbal needs MAVLink 2: a link sends'),
     ('simulator', '--payload rededge --images /nowhere/x', '/nowhere/x: No such file'),
-    ('simulator', '--signing-mode require', 'no key file is given'),
+    ('simulator', '--signing-mode require', '--signing-key-file: no key file is given'),
     ('simulator', '--signing-key-file /etc/hostname',
-     'a key file is given, but the signing mode is off'),
+     '--signing-key-file: a key file is given, but the signing mode is off'),
     ('simulator', '--signing-mode sign --signing-key-file /nonexistent',
-     "key file '/nonexistent': No such file or directory"),
+     "--signing-key-file: key file '/nonexistent': No such file or directory"),
 ])
 def test_wrong_argument_is_one_line_with_status_2(
     domain: int, tmp_path: Path, name: str, arguments: str, text: str,
