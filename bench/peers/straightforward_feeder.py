@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A straightforward feeder of the camera: rclpy subscribers that pack with pymavlink.
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A camera that is fed over a line of 57,600 baud, beside what a user would write.
 

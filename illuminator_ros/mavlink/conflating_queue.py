@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Messages of which only the newest is worth sending; no I/O, no clock."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The camera on a link: heartbeat, PING, captures and their feedback."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The camera as a payload of a component."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 Conversions between ROS and the camera: pure functions, and one table of all fields.
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 Position, UTC, attitude and mount for the camera: checked, and never repeated.
 

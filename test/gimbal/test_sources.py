@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Sources of ROS share a gimbal: only the setpoints of the one that holds it are sent."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Streams on a slow line: the newest in time, the urgent first, the rest dropped and counted."""
 
 from __future__ import annotations

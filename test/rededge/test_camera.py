@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The client's side of a camera: liveness, PING and captures, message by message."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Messages that the camera gets, and above all inputs that it must not get."""
 
 from __future__ import annotations

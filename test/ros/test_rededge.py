@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The node over a serial line, against a camera that is none of ours."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A camera behind a pseudo-terminal that runs on pymavlink and a strict parser alone."""
 
 from __future__ import annotations

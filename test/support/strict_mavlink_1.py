@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A MAVLink 1 parser that accepts nothing else, and no length but the defined one.
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The node of the camera: topics, services, parameters."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The reports of the camera's node on /diagnostics: pure functions of snapshots."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The subscribed topics: their messages as the feeder takes them, and jumps of ROS time."""
 
 from __future__ import annotations
