@@ -42,9 +42,9 @@ from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbals import ALL, FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import ended, Program, python  # noqa: E402
+from support.processes import ended, Program, slow_python  # noqa: E402
 from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM  # noqa: E402
-from support.slow import pass_time_until  # noqa: E402
+from support.slow import pass_time_until, SlowLink, time_passes  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
 EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
@@ -55,16 +55,17 @@ LOST = 'control of gimbal 1/154 lost: 1/195 has taken primary control'
 
 
 def start_gimbal(ros: Ros, port: int, **parameters: Any) -> Program:
-    return python('illuminator_ros.gimbal', *bridge_arguments(port, **parameters),
-                  env={'ROS_DOMAIN_ID': str(ros.domain)})
+    return slow_python(
+        'illuminator_ros.gimbal', *bridge_arguments(port, **parameters),
+        env={'ROS_DOMAIN_ID': str(ros.domain)})
 
 
 @contextlib.contextmanager
 def bridge(ros: Ros, *managers: FakeManager, **parameters: Any) -> Iterator[Program]:
-    """Run a bridge that serves gimbals, and fake managers that are connected to it."""
+    """Run a bridge that serves gimbals, and fake managers that are connected to it, in time."""
     port = free_port()
     with (ended(start_gimbal(ros, port, **parameters)) as program,
-          served_gimbals(port, *managers)):
+          served_gimbals(port, *managers, link=SlowLink), time_passes()):
         program.wait_for('connected, manager')
         yield program
 
@@ -371,9 +372,9 @@ def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:
 def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
         own_ros: Ros) -> None:
     port = free_port()
-    # By the slow clock of tests.
     with running_bridge(own_ros.domain, port, payloads='[gimbal]') as program:
-        with served_gimbals(port, FakeManager(), FakeManager(device_id=2)):
+        with (served_gimbals(port, FakeManager(), FakeManager(device_id=2), link=SlowLink),
+              time_passes()):
             program.wait_for('is served by /illuminator_1_')
             eventually(lambda: len(own_ros.node.get_node_names()) == 3)
         pass_time_until(lambda: len(own_ros.node.get_node_names()) == 2, step=5.0)

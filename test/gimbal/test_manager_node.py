@@ -60,7 +60,8 @@ from support.gimbals import FakeManager, served_gimbals  # noqa: E402
 from support.live_link import EndpointLink  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program  # noqa: E402
-from support.ros import Ros, start_bridge, STREAM  # noqa: E402
+from support.ros import Ros, start_slow_bridge, STREAM  # noqa: E402
+from support.slow import CLOCK, SlowLink, time_passes  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
 NODE = '/gimbal_manager'
@@ -69,17 +70,17 @@ VEHICLE = Header(frame_id='base_link_stabilized')
 
 @contextlib.contextmanager
 def device(port: int) -> Iterator[SimulatedGimbal]:
-    """Serve a simulated gimbal over UDP."""
+    """Serve a simulated gimbal over UDP, by the slow clock."""
     gimbal = SimulatedGimbal(GimbalProperties(DEVICE))
     with EndpointLink(f'udpout://127.0.0.1:{port}', SimulatedComponents([
-            Description(DEVICE, gimbal)], 0.0)):
+            Description(DEVICE, gimbal)], CLOCK()), kind=SlowLink):
         yield gimbal
 
 
 @contextlib.contextmanager
 def manager(ros: Ros, port: int, **parameters: Any) -> Iterator[Program]:
-    with ended(start_bridge(ros.domain, port, '-r', f'__node:={NODE[1:]}',
-                            payloads='[gimbal_manager]', **parameters)) as program:
+    with ended(start_slow_bridge(ros.domain, port, '-r', f'__node:={NODE[1:]}',
+                                 payloads='[gimbal_manager]', **parameters)) as program:
         yield program
 
 
@@ -111,37 +112,41 @@ def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
         own_ros: Ros) -> None:
     port = free_port()
     with manager(own_ros, port) as program, device(port) as gimbal:
-        own_ros.subscribe(Bool, f'{NODE}/connected').wait_value(True)
-        program.wait_for('gimbal 1/154 is managed')
-        answer = trigger(own_ros, 'take_control')
-        assert answer.success, answer.message
-        own_ros.subscribe(String, f'{NODE}/controller').wait_value(
-            f'primary {OURS}, secondary none')
-        own_ros.publisher(geometry.QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
-            geometry.QuaternionStamped(header=VEHICLE, quaternion=turned(0, 20, 10)))
-        # ROS: pitch down and yaw left are positive.
-        eventually(lambda: [round(math.degrees(one)) for one in gimbal.mount.motion.angles] == [
-            0, -20, -10])
+        with time_passes():
+            own_ros.subscribe(Bool, f'{NODE}/connected').wait_value(True)
+            program.wait_for('gimbal 1/154 is managed')
+            answer = trigger(own_ros, 'take_control')
+            assert answer.success, answer.message
+            own_ros.subscribe(String, f'{NODE}/controller').wait_value(
+                f'primary {OURS}, secondary none')
+            own_ros.publisher(geometry.QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
+                geometry.QuaternionStamped(header=VEHICLE, quaternion=turned(0, 20, 10)))
+            # ROS: pitch down and yaw left are positive.
+            eventually(lambda: [round(math.degrees(one)) for one in gimbal.mount.motion.angles]
+                       == [0, -20, -10])
+            status = report(own_ros, 'active')
+            assert status.level == DiagnosticStatus.OK
+            assert {one.key: one.value for one in status.values}['primary_control'] == str(OURS)
 
-        # The vehicle heads north, 10 m/s; ROS counts yaw from the east.
-        imu = Imu(orientation=turned(0, 0, 90), angular_velocity=geometry.Vector3(z=0.0))
-        odometry = Odometry(twist=geometry.TwistWithCovariance(
-            twist=geometry.Twist(linear=geometry.Vector3(x=10.0))))
-        odometry.pose.pose.orientation = imu.orientation
-        publishers = [(own_ros.publisher(type(one), f'{NODE}/{name}', NODE), one)
-                      for name, one in (('imu', imu), ('odometry', odometry))]
+            # The vehicle heads north, 10 m/s; ROS counts yaw from the east.
+            imu = Imu(orientation=turned(0, 0, 90), angular_velocity=geometry.Vector3(z=0.0))
+            odometry = Odometry(twist=geometry.TwistWithCovariance(
+                twist=geometry.Twist(linear=geometry.Vector3(x=10.0))))
+            odometry.pose.pose.orientation = imu.orientation
+            publishers = [(own_ros.publisher(type(one), f'{NODE}/{name}', NODE), one)
+                          for name, one in (('imu', imu), ('odometry', odometry))]
 
-        def north_is_known() -> bool:
-            for publisher, message in publishers:
-                publisher.publish(message)
-            return gimbal.mount.motion.heading_known(gimbal.mount.motion.now)
+            def north_is_known() -> bool:
+                for publisher, message in publishers:
+                    publisher.publish(message)
+                return gimbal.mount.motion.heading_known(gimbal.mount.motion.now)
 
-        eventually(north_is_known)
+            eventually(north_is_known)
+        # The heading does not get out of date while time hardly passes.
+        north_is_known()
+        own_ros.synchronize(NODE)
         assert own_ros.call(
             SetBool, f'{NODE}/set_yaw_lock', SetBool.Request(data=True)).success
-        status = report(own_ros, 'active')
-        assert status.level == DiagnosticStatus.OK
-        assert {one.key: one.value for one in status.values}['primary_control'] == str(OURS)
         assert program.end() == 0
 
 
@@ -150,7 +155,7 @@ def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:
     port = free_port()
     # The link is open once a peer is heard.
     with manager(own_ros, port, gimbal_device_id=1, pitch_max=0.5, auto_take_control='true'), \
-            device(port):
+            device(port), time_passes():
         setpoint = own_ros.subscribe(geometry.QuaternionStamped, f'{NODE}/device/setpoint', STREAM)
         attitude = own_ros.subscribe(geometry.QuaternionStamped, f'{NODE}/attitude', STREAM)
         own_ros.subscribe(Bool, f'{NODE}/in_control').wait_value(True)
@@ -170,7 +175,7 @@ def test_gm_22_ros_drives_a_gimbal_without_mavlink(own_ros: Ros) -> None:
 
 @pytest.mark.timeout(180)
 def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
-        own_ros: Ros) -> None:  # noqa: F811
+        own_ros: Ros) -> None:
     def point(source: str, yaw: float) -> None:
         own_ros.publisher(geometry.Vector3Stamped, f'{NODE}/{source}cmd/angles', NODE).publish(
             geometry.Vector3Stamped(header=VEHICLE, vector=geometry.Vector3(z=math.radians(yaw))))
@@ -178,7 +183,7 @@ def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
     port = free_port()
     names = "['safety', 'operator', 'autonomy']"
     with manager(own_ros, port, sources=names, diagnostics_period=0.1) as program, \
-            device(port) as gimbal:
+            device(port) as gimbal, time_passes():
         def turned_to(yaw: float) -> bool:
             return round(math.degrees(gimbal.mount.motion.angles[2])) == -yaw
 
@@ -224,7 +229,8 @@ def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
 def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:
     port = free_port()
     other = FakeManager(Address(1, 191), device_alive=False)
-    with manager(own_ros, port) as program, device(port), served_gimbals(port, other):
+    with (manager(own_ros, port) as program, device(port),
+          served_gimbals(port, other, link=SlowLink), time_passes()):
         program.wait_for('[ERROR]')
         program.wait_for('1/191 manages gimbal 1/154 too: this manager is inactive')
         assert report(own_ros, '1/191 manages').level == DiagnosticStatus.ERROR

@@ -52,6 +52,8 @@ OURS, FIRST, SECOND, DEVICE = (
 GIMBAL = 1
 # MAVSDK's name of MAV_RESULT_DENIED.
 DENIED = 'ERROR'
+# s: MAVSDK lives by the clock of the machine, which may stand still between two heartbeats.
+LEASE = 60.0
 T = TypeVar('T')
 
 
@@ -100,7 +102,7 @@ def turns(device: SimulatedGimbal) -> Callable[[], bool]:
 
 @pytest.mark.timeout(180)
 def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None:
-    manager, device, vehicle = managed_vehicle(ControlSettings(), 0.0)
+    manager, device, vehicle = managed_vehicle(ControlSettings(lease=LEASE), 0.0)
     with served(vehicle) as port, player(FIRST, port) as gimbal, player(SECOND, port) as second:
         [item] = gimbal.gimbal_list().gimbals
         assert (item.gimbal_device_id, item.gimbal_manager_component_id) == (154, 194)
@@ -144,7 +146,8 @@ def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None
 
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize('control', [
-    ControlSettings(Policy.TAKEOVER), ControlSettings(overruling=frozenset({SECOND}))])
+    ControlSettings(Policy.TAKEOVER, lease=LEASE),
+    ControlSettings(overruling=frozenset({SECOND}), lease=LEASE)])
 def test_a_second_mavsdk_wins_under_takeover_or_when_it_overrules(
         control: ControlSettings) -> None:
     manager, _, vehicle = managed_vehicle(control, 0.0)

@@ -78,6 +78,12 @@ class SlowClock:
         """Let time pass, s of this clock."""
         self._ahead[0] += seconds
 
+    def step(self, seconds: float) -> None:
+        """Let time pass if all links have done their work since the clock was set forward."""
+        with self._locked():
+            if self.is_caught_up():
+                self.forward(seconds)
+
     @property
     def environment(self) -> Mapping[str, str]:
         """Return what tells another process of this clock."""
@@ -146,11 +152,33 @@ def pass_time_until(condition: Callable[[], Any], step: float = 1.0) -> None:
     is; a step must be shorter than any limit that must hold.
     """
     def passed() -> Any:
-        if not (result := condition()) and CLOCK.is_caught_up():
-            CLOCK.forward(step)
+        if not (result := condition()):
+            CLOCK.step(step)
         return result
 
     eventually(passed, 'what time was to bring')
+
+
+@contextlib.contextmanager
+def time_passes(step: float = 0.2) -> Iterator[None]:
+    """
+    Let time pass meanwhile, as fast as all links do the work that is due in it.
+
+    :param step: see :func:`pass_time_until`.
+    """
+    ended = threading.Event()
+
+    def run() -> None:
+        while not ended.wait(0.005):
+            CLOCK.step(step)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 class _SlowSelector(selectors.DefaultSelector):

@@ -25,6 +25,7 @@ from typing import Any
 
 # Where each of them has what it makes that has a clock: a link, or a monitor.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.bridge',
+          'illuminator_ros.gimbal': 'illuminator_ros.ros.bridge',
           'illuminator_ros.rededge': 'illuminator_ros.ros.bridge',
           'illuminator_ros.simulator': 'illuminator_ros.cli.simulator.run',
           'illuminator_ros.monitor': 'illuminator_ros.cli.monitor.run'}
