@@ -31,6 +31,7 @@ from .messages import (
     GimbalManagerInformation,
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
+    ROI_COMMANDS,
 )
 from ..mavlink.command_sender import (
     Command,
@@ -69,10 +70,8 @@ STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
-# Commands that move a gimbal, with the index of the param that is the gimbal device id.
-_MOVES: dict[int, int] = {
-    GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: 6, GimbalCommand.DO_SET_ROI_LOCATION: 0,
-    GimbalCommand.DO_SET_ROI_NONE: 0}
+# Commands that move a gimbal.
+_MOVES = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, *ROI_COMMANDS)
 
 
 @dataclass
@@ -493,8 +492,8 @@ class Gimbal:
             # The manager may have other gimbals.
             self._commands.end_all(
                 now, CommandStatus.CANCELLED, self._manager, lambda command: (
-                    command.command in _MOVES
-                    and command.params[_MOVES[command.command]] == self.key.device_id))
+                    command.command in _MOVES and self.key.device_id == command.params[
+                        0 if command.command in ROI_COMMANDS else 6]))
         self._emit(events.GimbalHeld(self.key, change))
 
     # Requests

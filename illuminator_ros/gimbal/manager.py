@@ -62,6 +62,7 @@ from .messages import (
     MAV_TYPE_GIMBAL,
     NO_COMPONENT,
     NON_MAVLINK_IDS,
+    ROI_COMMANDS,
 )
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
@@ -104,7 +105,6 @@ IDENTITY_TIME = 3.0
 # s between two reports of one kind, and kinds that have a limit of their own.
 REPORT_INTERVAL = 1.0
 MAX_REPORTS = 256
-_ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
 @dataclass(frozen=True)
@@ -294,7 +294,7 @@ class GimbalManager(Payload):
         handler = self._handlers.get(command.command)
         if handler is None:
             return None
-        device_id = params[0] if command.command in _ROI_COMMANDS else params[6]
+        device_id = params[0] if command.command in ROI_COMMANDS else params[6]
         if device_id not in (0, self.tracker.device_id):
             return MavResult.DENIED
         if self.tracker.state is not ManagerState.ACTIVE:

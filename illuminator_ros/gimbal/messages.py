@@ -50,6 +50,10 @@ class GimbalCommand(IntEnum):
     DO_GIMBAL_MANAGER_CONFIGURE = 1001
 
 
+# Those that have the gimbal device id as param1; the others have it as param7.
+ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
+
+
 class Capabilities(IntFlag):
     """GIMBAL_DEVICE_CAP_FLAGS, and GIMBAL_MANAGER_CAP_FLAGS, which has the same values."""
 

@@ -41,7 +41,7 @@ from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, MountFlags, yaw_frame, YawFrame
-from ..payload.rotation import Quaternion, Vector
+from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 
 # s without an announcement after which a component is no longer the manager.
@@ -166,15 +166,12 @@ class SimulatedMount:
         self.motion.advance(now)
         self.motion.fail(behaviour.frozen_axis, limited=behaviour.limits_range)
 
-    def set(  # noqa: A003 - the word of the messages
-        self, flags: int, frame: YawFrame, angles: Vector, rates: Vector,
-        behaviour: GimbalBehaviour, now: float,
-    ) -> None:
-        """Take a setpoint, see :meth:`GimbalMotion.set`."""
-        rate_only = not any(map(math.isfinite, angles)) and any(map(math.isfinite, rates))
-        stop = rate_only and not any(rate for rate in rates if math.isfinite(rate))
+    def obey(self, demand: Demand, behaviour: GimbalBehaviour, now: float) -> None:
+        """Take a setpoint, see :meth:`GimbalMotion.obey`."""
+        stop = demand.has_rates_only and not any(
+            rate for rate in demand.rates if math.isfinite(rate))
         if not behaviour.ignores_changes and (behaviour.stops or not stop):
-            self.motion.set(flags, frame, angles, rates, now)
+            self.motion.obey(demand, now)
 
     def flags(self, behaviour: GimbalBehaviour) -> MountFlags:
         """Return the flags of the setpoint as they are reported."""
@@ -330,7 +327,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         elif ((source == self.manager or not behaviour.enforces_control)
               and (isinstance(message, gimbal.GimbalDeviceSetAttitude)
                    or behaviour.takes_manager_set)):
-            self._set(message, now)
+            self._obey(message, now)
         return ()
 
     def _expire(self, now: float) -> None:
@@ -346,7 +343,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         self.mount.motion.take_heading(
             roll, pitch, yaw, message.angular_velocity_z or math.nan, now)
 
-    def _set(
+    def _obey(
         self, message: gimbal.GimbalDeviceSetAttitude | gimbal.GimbalManagerSetAttitude,
         now: float,
     ) -> None:
@@ -355,8 +352,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         except ValueError:
             return
         if demand.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):
-            self.mount.set(message.flags, demand.frame, demand.target, demand.rates,
-                           self.behaviour, now)
+            self.mount.obey(demand, self.behaviour, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""

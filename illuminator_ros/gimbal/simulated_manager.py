@@ -31,8 +31,8 @@ from typing import Any, NamedTuple
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
-from .manager_setpoint import direction, GeoPoint, read_demand, read_roi
-from .messages import Capabilities, GimbalCommand, NO_COMPONENT
+from .manager_setpoint import Demand, direction, GeoPoint, read_demand, read_roi
+from .messages import Capabilities, GimbalCommand, NO_COMPONENT, ROI_COMMANDS
 from .simulated_device import (
     COMMANDS,
     GIMBAL_FAULTS,
@@ -53,8 +53,7 @@ from ..mavlink.messages import (
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
-from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
-from ..payload.rotation import Vector
+from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
 from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
@@ -164,15 +163,6 @@ class ManagerProperties:
     heading: float = 0.0
 
 
-class _Setpoint(NamedTuple):
-    """A setpoint of a player: the arguments of :meth:`GimbalMotion.set`."""
-
-    flags: int
-    frame: YawFrame
-    angles: Vector
-    rates: Vector
-
-
 class SimulatedManager(simulated.SimulatedDevice):
     """
     A simulated gimbal with a manager, without the link: see :class:`SimulatedDevice`.
@@ -244,9 +234,9 @@ class SimulatedManager(simulated.SimulatedDevice):
             if source.system == self.properties.gimbal.address.system:
                 self._take_vehicle(message, now)
         elif self._is_for_device(message.gimbal_device_id):
-            setpoint = self._of_message(message)
-            if setpoint is not None and self._may_control(source):
-                self._obey(source, setpoint, now)
+            demand = self._read(message)
+            if demand is not None and self._may_control(source):
+                self._obey(source, demand, now)
         return ()
 
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
@@ -270,8 +260,8 @@ class SimulatedManager(simulated.SimulatedDevice):
         frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
         return flags & ~frames if self.behaviour.frame_is_lock else flags
 
-    def _of_message(self, message: Any) -> _Setpoint | None:
-        """Return the setpoint of a message, None if it is ignored."""
+    def _read(self, message: Any) -> Demand | None:
+        """Return the demand of a message, None if it is ignored."""
         behaviour = self.behaviour
         if (isinstance(message, gimbal.GimbalManagerSetPitchyaw) and not behaviour.takes_pitchyaw
                 or isinstance(message, gimbal.GimbalManagerSetManualControl)
@@ -282,34 +272,29 @@ class SimulatedManager(simulated.SimulatedDevice):
                                  self.mount.motion.mechanics.ranges)
         except ValueError:
             return None
-        angles, rates = demand.target, demand.rates
-        if not behaviour.angles_with_rates and all(map(math.isfinite, (*angles, *rates[1:]))):
-            return None
-        return self._complete(_Setpoint(message.flags, demand.frame, angles, rates))
+        has_both = all(map(math.isfinite, (*demand.target, *demand.rates[1:])))
+        ignored = has_both and not behaviour.angles_with_rates or self._lacks_an_axis(demand)
+        return None if ignored else demand
 
-    def _complete(self, setpoint: _Setpoint) -> _Setpoint | None:
-        """Return a setpoint as the profile reads it, None if it is ignored."""
-        _, pitch, yaw = setpoint.angles
-        if math.isnan(pitch) and math.isnan(yaw):
-            # Roll stays level where only rates are set.
-            return setpoint._replace(angles=UNSET_VECTOR)
-        if (math.isnan(pitch) or math.isnan(yaw)) and self.behaviour.partial_angles is not None:
-            return None
-        return setpoint
+    def _lacks_an_axis(self, demand: Demand) -> bool:
+        """Return whether a demand has the angle of one axis, which the profile does not take."""
+        _, pitch, yaw = demand.target
+        return math.isnan(pitch) is not math.isnan(yaw) and (
+            self.behaviour.partial_angles is not None)
 
-    def _obey(self, source: Address, setpoint: _Setpoint, now: float) -> None:
+    def _obey(self, source: Address, demand: Demand, now: float) -> None:
         if self.behaviour.enforces_control and source == self.secondary != self.primary:
             # Nudging adds angles; a rate would move what primary control holds.
             nudge = Range(-NUDGE_LIMIT, NUDGE_LIMIT)
-            base = [own if math.isfinite(own) else 0.0 for own in self._base]
-            angles = [own + nudge.clip(added) if math.isfinite(added) else math.nan
-                      for own, added in zip(base, setpoint.angles, strict=True)]
-            setpoint = setpoint._replace(
-                angles=(angles[0], angles[1], angles[2]), rates=UNSET_VECTOR)
+            roll, pitch, yaw = (
+                (own if math.isfinite(own) else 0.0) + nudge.clip(added)
+                if math.isfinite(added) else math.nan
+                for own, added in zip(self._base, demand.target, strict=True))
+            demand = Demand(demand.flags, demand.frame, (roll, pitch, yaw))
         else:
-            self._base = setpoint.angles
+            self._base = demand.target
         self._roi = None
-        self.mount.set(*setpoint, self.behaviour, now)
+        self.mount.obey(demand, self.behaviour, now)
 
     # Commands
 
@@ -317,19 +302,16 @@ class SimulatedManager(simulated.SimulatedDevice):
         self, source: Address, command: AnyCommand, now: float,
     ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
-        *first, flags, _, device_id = command.params
-        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
-            if not self._is_for_device(device_id):
-                return simulated.CommandReply(MavResult.DENIED)
-            return self._pitchyaw(source, first, flags, now)
-        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
-            if not self._is_for_device(device_id):
-                return simulated.CommandReply(MavResult.DENIED)
-            return self._configure(source, first)
         if command.command not in self.changes:
             return None
-        if not self._is_for_device(command.param1):
+        *first, flags, _, device_id = command.params
+        if not self._is_for_device(
+                command.param1 if command.command in ROI_COMMANDS else device_id):
             return simulated.CommandReply(MavResult.DENIED)
+        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
+            return self._pitchyaw(source, first, flags, now)
+        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+            return self._configure(source, first)
         change: simulated.Change = partial(self._clear_roi, now)
         if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
             read = read_roi(command)
@@ -345,23 +327,20 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _pitchyaw(
         self, source: Address, values: Sequence[float], flags: float, now: float,
     ) -> simulated.CommandReply:
-        pitch, yaw, pitch_rate, yaw_rate = map(math.radians, values)
-        if not self.behaviour.rates_in_degrees:
-            pitch_rate, yaw_rate = values[2:]
+        pitch, yaw, *rates = map(math.radians, values)
+        pitch_rate, yaw_rate = rates if self.behaviour.rates_in_degrees else values[2:]
         try:
             # NaN and infinity cannot be converted: ValueError, OverflowError.
-            bits = int(flags)
-            frame = yaw_frame(self._flags(bits))
+            demand = Demand.from_pitch_yaw(
+                self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
             return simulated.CommandReply(MavResult.DENIED)
-        complete = self._complete(_Setpoint(
-            bits, frame, (0.0, pitch, yaw), (math.nan, pitch_rate, yaw_rate)))
-        if complete is None:
+        if self._lacks_an_axis(demand):
             assert self.behaviour.partial_angles is not None
             return simulated.CommandReply(self.behaviour.partial_angles)
         return simulated.CommandReply(
             MavResult.ACCEPTED if self._may_control(source) else MavResult.DENIED,
-            partial(self._obey, source, complete, now))
+            partial(self._obey, source, demand, now))
 
     def _configure(
         self, source: Address, values: Sequence[float],
@@ -400,13 +379,12 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.set(MountFlags.NEUTRAL | LEVEL, YawFrame.VEHICLE, UNSET_VECTOR,
-                       UNSET_VECTOR, self.behaviour, now)
+        self.mount.obey(Demand(MountFlags.NEUTRAL | LEVEL), self.behaviour, now)
 
     def _point_at_roi(self, now: float) -> None:
         if self._roi is not None and (angles := direction(self._position, self._roi)):
-            self.mount.set(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH, (0.0, *angles),
-                           UNSET_VECTOR, self.behaviour, now)
+            self.mount.obey(Demand(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH, (0.0, *angles)),
+                            self.behaviour, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""

@@ -22,6 +22,7 @@ import math
 from typing import NamedTuple
 
 from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, RESOLUTION
+from .manager_setpoint import Demand
 from .messages import Capabilities, ErrorFlags
 from ..payload.mount_attitude import AXES, MountFlags, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
@@ -183,18 +184,16 @@ class GimbalMotion:
                        for axis, angle in enumerate((vehicle.roll, vehicle.pitch)))
         return roll, pitch, -self._heading(now) if self.locked(2) else 0.0
 
-    def set(  # noqa: A003 - the word of the messages
-        self, flags: int, frame: YawFrame, angles: Vector, rates: Vector, now: float,
-    ) -> None:
+    def obey(self, demand: Demand, now: float) -> None:
         """
         Take a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
 
-        :param angles: roll, pitch and yaw, rad; NaN leaves an axis to its rate.
-        :param rates: rad/s; beside an angle the rate at which it is approached, NaN for none.
-            An axis with neither keeps its angle.
+        A rate beside an angle is that at which it is approached; an axis with neither keeps its
+        angle.
         """
         self.advance(now)
-        self.flags, self.frame = MountFlags(flags) & SETTABLE, frame
+        flags, angles, rates = demand.flags, demand.target, demand.rates
+        self.flags, self.frame = MountFlags(flags) & SETTABLE, demand.frame
         if flags & (MountFlags.RETRACT | MountFlags.NEUTRAL):
             # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).
             mechanics = self.mechanics

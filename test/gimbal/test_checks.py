@@ -24,11 +24,12 @@ from typing import Any
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
+from illuminator_ros.gimbal.manager_setpoint import Demand
 from illuminator_ros.gimbal.messages import GimbalCommand
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
+from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.simulated import Description, SimulatedComponents, SimulatedType
 import pytest
 from support.checks_run import ChecksRun
@@ -164,13 +165,12 @@ def _changed(cls: type[Any], **fields: Any) -> Callable[[ChecksRun], None]:
 
 def _moves_when_unset(one: ChecksRun) -> None:
     mount = one.device.mount
-    original = mount.set
+    original = mount.obey
 
-    def moved(flags: int, frame: YawFrame, angles: Any, rates: Any, *others: Any) -> None:
-        unset = all(map(math.isnan, (*angles, *rates))) and not flags & 3
-        original(flags, frame, (0.0, 0.5, 0.0) if unset else angles,
-                 UNSET_VECTOR if unset else rates, *others)
-    mount.set = moved
+    def moved(demand: Demand, *others: Any) -> None:
+        unset = all(map(math.isnan, (*demand.target, *demand.rates))) and not demand.is_pose
+        original(Demand(angles=(0.0, 0.5, 0.0)) if unset else demand, *others)
+    mount.obey = moved
 
 
 def _forgets_at_minus_1(one: ChecksRun) -> None:
@@ -284,7 +284,7 @@ def test_a_gimbal_that_cannot_be_turned_back_is_reported_with_its_former_pose() 
 def test_the_gimbal_keeps_its_yaw_lock(kind: str) -> None:
     one = run(kind, drift=0.0)
     motion, lock = one.device.mount.motion, MountFlags.YAW_LOCK | MountFlags.PITCH_LOCK
-    motion.set(lock, YawFrame.VEHICLE, (0.0, -0.2, 0.1), UNSET_VECTOR, one.link.now)
+    motion.obey(Demand(lock, angles=(0.0, -0.2, 0.1)), one.link.now)
     one.finish()
     assert motion.flags == lock
     assert motion.angles[1:] == pytest.approx((-0.2, 0.1), abs=0.05)
