@@ -16,11 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 import math
+from typing import TypeAlias, TypeVar
 
 from .tester import (
     GimbalTester,
@@ -42,8 +43,9 @@ from ...payload.checks.requirement import (
     MESSAGES,
     Requirement,
     requirement,
+    Specification,
 )
-from ...payload.checks.session import Failed, Skipped
+from ...payload.checks.session import Failed, Skipped, Transaction
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import MountFlags, yaw_frame
 from ...payload.rotation import Quaternion
@@ -53,7 +55,68 @@ STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
 JUMP = 8.0
 FRAMES = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
 
+T = TypeVar('T', bound=GimbalTester)
+# Sends a setpoint, and returns the command if it is one.
+Send: TypeAlias = Callable[[T, Pose], Awaitable[Transaction | None]]
+
 moves = partial(requirement, needs_consent=True)
+
+
+def reaches(
+    name: str, title: str, specification: Specification, section: str, send: Send[T],
+    yaw: float = STEP,
+) -> Requirement[T]:
+    """Return the requirement that a gimbal turns down, and to a yaw, when that is sent."""
+    @moves(name, title, specification, section)
+    async def check(tester: T) -> str:
+        await tester.begin()
+        target = await tester.target(-2 * STEP, yaw)
+        if one := await send(tester, target):
+            one.expect(accepted=True)
+        await tester.reach(target)
+        return str(await tester.pose())
+    return check
+
+
+def ignores(
+    name: str, title: str, specification: Specification, section: str, cause: str, send: Send[T],
+) -> Requirement[T]:
+    """Return the requirement that a gimbal stays where it is when something is sent."""
+    @moves(name, title, specification, section)
+    async def check(tester: T) -> None:
+        before = await tester.begin()
+        one = await send(tester, await tester.target(-2 * STEP, STEP))
+        await tester.stays(before, cause)
+        if one:
+            one.expect(accepted=False)
+    return check
+
+
+def turns(
+    name: str, title: str, specification: Specification, section: str,
+    send: Callable[[T, float], Awaitable[Transaction | None]], speed: float = -RATE,
+    fastest: float = 3.0,
+) -> Requirement[T]:
+    """
+    Return the requirement that a gimbal turns for a second when a speed is sent, deg/s.
+
+    :param fastest: how much faster than commanded it may be.
+    """
+    @moves(name, title, specification, section)
+    async def check(tester: T) -> str:
+        before = await tester.begin()
+        one = await send(tester, speed)
+        await tester.pause(1.0)
+        after = await tester.pose()
+        await send(tester, 0.0)
+        if one:
+            one.expect(accepted=True)
+        turned = after.pitch - before.pitch
+        text = f'commanded {speed:g} deg/s, turned {turned:.1f} deg in 1 s'
+        if not fastest * speed < turned < 0.25 * speed:
+            raise Failed(text)
+        return text
+    return check
 
 
 # INFORMATION
@@ -201,37 +264,13 @@ async def failures_at_rest(tester: GimbalTester) -> None:
 
 # Motion
 
-@moves('hold', 'keeps its attitude when attitude and rates are unset', MESSAGES,
-       'GIMBAL_DEVICE_SET_ATTITUDE')
-async def hold(tester: GimbalTester) -> None:
-    """Send a setpoint of NaN."""
-    before = await tester.begin()
-    tester.point(None)
-    await tester.stays(before, 'a setpoint of NaN')
-
-
-@moves('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE')
-async def rate(tester: GimbalTester) -> str:
-    """Turn down for a second and a half."""
-    before = await tester.begin()
-    tester.point(None, rates=(NAN, -RATE, NAN))
-    await tester.pause(1.5)
-    after = await tester.pose()
-    tester.point(None, rates=(NAN, 0.0, NAN))
-    turned = after.pitch - before.pitch
-    text = f'commanded {-RATE:g} deg/s, turned {turned:.1f} deg in 1.5 s'
-    if not -3.0 * RATE < turned < -0.5 * RATE:
-        raise Failed(text)
-    return text
-
-
 @moves('stop', 'stops at a rate of 0', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE')
 async def stop(tester: GimbalTester) -> None:
     """Turn down, then send a rate of 0."""
     await tester.begin()
-    tester.point(None, rates=(NAN, -RATE, NAN))
+    await tester.point(None, rates=(NAN, -RATE, NAN))
     await tester.pause(0.8)
-    tester.point(None, rates=(NAN, 0.0, NAN))
+    await tester.point(None, rates=(NAN, 0.0, NAN))
     await tester.pause(0.5)
     await tester.stays(await tester.steady(), 'after a rate of 0')
 
@@ -254,7 +293,7 @@ async def within_range(tester: GimbalTester) -> str:
     limit, beyond = _beyond(await tester.limits())
     start = await tester.begin()
     target = replace(start, roll=0.0, pitch=beyond)
-    tester.point(target)
+    await tester.point(target)
     reached = await tester.until(lambda pose: abs(pose.pitch - limit) < 0.5)
     await tester.pause(0.5)
     reached = await tester.pose()
@@ -270,7 +309,7 @@ async def limit_flags(tester: GimbalTester) -> None:
     """Command a pitch beyond the range, and wait for AT_PITCH_LIMIT."""
     limit, beyond = _beyond(await tester.limits())
     start = await tester.begin()
-    tester.point(replace(start, roll=0.0, pitch=beyond))
+    await tester.point(replace(start, roll=0.0, pitch=beyond))
     pose = await tester.until(lambda pose: bool(pose.failures & ErrorFlags.AT_PITCH_LIMIT))
     if abs(pose.pitch - limit) > TOLERANCE:
         raise Skipped(f'its pitch is {pose.pitch:.1f} deg, and its limit {limit:.1f} deg')
@@ -286,7 +325,7 @@ def _position(flag: MountFlags, capability: Capabilities) -> Requirement[GimbalT
     async def check(tester: GimbalTester) -> str:
         await tester.requires(capability)
         await tester.begin()
-        tester.point(None, flags=flag | LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME)
+        await tester.point(None, flags=flag | LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME)
         pose = await tester.until(lambda pose: bool(pose.flags & flag), 2.0)
         if not pose.flags & flag:
             raise Failed(f'flags 0x{pose.flags:x}')
@@ -298,7 +337,12 @@ def _position(flag: MountFlags, capability: Capabilities) -> Requirement[GimbalT
 POSITIONS = (_position(MountFlags.NEUTRAL, Capabilities.HAS_NEUTRAL),
              _position(MountFlags.RETRACT, Capabilities.HAS_RETRACT))
 MOTION: tuple[AnyRequirement, ...] = (
-    hold, rate, stop, within_range, limit_flags, *POSITIONS)
+    ignores('hold', 'keeps its attitude when attitude and rates are unset', MESSAGES,
+            'GIMBAL_DEVICE_SET_ATTITUDE', 'a setpoint of NaN',
+            lambda tester, pose: tester.point(None)),
+    turns('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE',
+          lambda tester, speed: tester.point(None, rates=(NAN, speed, NAN))),
+    stop, within_range, limit_flags, *POSITIONS)
 
 
 def earth_yaw(poses: Iterable[Pose]) -> list[float]:

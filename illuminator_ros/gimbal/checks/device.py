@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 
 from . import attitude
-from .attitude import earth_yaw, moves
+from .attitude import earth_yaw, ignores, moves, reaches
 from .tester import (
     describe,
     free_address,
@@ -106,7 +106,7 @@ class DeviceTester(GimbalTester):
             self.announce(self.manager)
             await self.session.runner.sleep(min(ANNOUNCE_INTERVAL, left))
 
-    def point(
+    async def point(
         self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
         rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
         target: Address | None = None,
@@ -156,55 +156,24 @@ async def north_needs_heading(tester: DeviceTester) -> None:
 
 # Setpoints, and their senders
 
-@moves('setpoint', 'turns to an attitude that its manager commands', GIMBAL,
-       'Control of a Gimbal Device')
-async def setpoint(tester: DeviceTester) -> str:
-    """Turn down and right, then back."""
-    await tester.begin()
-    for pitch, yaw in ((-2 * STEP, STEP), (-STEP, 0.0)):
-        target = await tester.target(pitch, yaw)
-        tester.point(target)
-        await tester.reach(target)
-    return str(await tester.pose())
-
-
-async def _ignores(tester: DeviceTester, cause: str, *sources: Address) -> None:
-    before = await tester.begin()
-    for source in sources:
-        tester.point(await tester.target(-2 * STEP, STEP), sender=source)
-    await tester.stays(before, cause)
-
-
-@moves('only-manager', 'ignores setpoints of components that are not its manager (GM-19)', GIMBAL,
-       'Gimbal Manager and Gimbal Device')
-async def only_manager(tester: DeviceTester) -> None:
+async def _point_from_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints from our own address and from another component of its system."""
-    await _ignores(tester, 'a setpoint of a component that is not its manager',
-                   tester.session.address, free_address(tester.session))
+    for source in (tester.session.address, free_address(tester.session)):
+        await tester.point(pose, sender=source)
 
 
-@moves('one-manager', 'keeps its manager while another component announces itself (GM-18)',
-       PROPOSAL, 'Proposed Architecture')
-async def one_manager(tester: DeviceTester) -> None:
+async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
     """Announce a second manager, and send setpoints from it."""
-    before, other = await tester.begin(), free_address(tester.session)
+    other = free_address(tester.session)
     tester.announce(other)
     await tester.pause(2 * ANNOUNCE_INTERVAL)
     tester.announce(other)
-    await _point_from(tester, other)
-    await tester.stays(before, f'a setpoint of the second manager {other}')
+    await tester.point(pose, sender=other)
 
 
-async def _point_from(tester: DeviceTester, source: Address) -> None:
-    tester.point(await tester.target(-2 * STEP, STEP), sender=source)
-
-
-@moves('manager-set', 'ignores the messages and commands to gimbal managers (GM-19)', MESSAGES,
-       'GIMBAL_MANAGER_SET_PITCHYAW')
-async def manager_set(tester: DeviceTester) -> None:
-    """Send each of them from its manager."""
-    session, before = tester.session, await tester.begin()
-    pose, device, own = await tester.target(-2 * STEP, STEP), session.device, tester.manager
+async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:
+    """Send what only gimbal managers take, from its manager."""
+    device = tester.session.device
     pitch, yaw = math.radians(pose.pitch), math.radians(pose.yaw)
     ids = (*device, int(LEVEL), device.component)
     for message in (
@@ -213,20 +182,15 @@ async def manager_set(tester: DeviceTester) -> None:
             gimbal.GimbalManagerSetManualControl(*ids, -0.5, 0.5, NAN, NAN),
             CommandLong(*device, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,
                         pose.yaw, NAN, NAN, float(LEVEL), 0.0, float(device.component))):
-        session.send(message, own)
-    await tester.stays(before, 'messages to gimbal managers')
+        tester.session.send(message, tester.manager)
 
 
-@moves('other-target', 'ignores setpoints for other components and systems', ROUTING,
-       'Routing Detail')
-async def other_target(tester: DeviceTester) -> None:
+async def _point_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints to addresses that do not exist."""
-    before, device = await tester.begin(), tester.session.device
-    system = next(n for n in range(240, 0, -1)
-                  if n not in {one.system for one in tester.session.heard})
+    device, heard = tester.session.device, {one.system for one in tester.session.heard}
+    system = next(n for n in range(240, 0, -1) if n not in heard)
     for target in (free_address(tester.session, 200), Address(system, device.component)):
-        tester.point(await tester.target(-2 * STEP, STEP), target=target)
-    await tester.stays(before, 'setpoints for other addresses')
+        await tester.point(pose, target=target)
 
 
 # Yaw relative to north
@@ -246,7 +210,8 @@ async def earth_frame(tester: DeviceTester) -> str:
     """Send a heading of 40 degrees, and command a yaw of 55 degrees."""
     try:
         await _with_heading(tester, 40.0)
-        tester.point(Pose(0.0, -STEP, 40.0 + STEP), flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
+        await tester.point(Pose(0.0, -STEP, 40.0 + STEP),
+                           flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
         target = Pose(0.0, -STEP, STEP)
         pose = await tester.settle(target)
         (yaw,) = earth_yaw([pose])
@@ -265,7 +230,8 @@ async def yaw_lock(tester: DeviceTester) -> str:
     await tester.requires(Capabilities.HAS_YAW_LOCK)
     try:
         await _with_heading(tester, 40.0)
-        tester.point(Pose(0.0, -STEP, 0.0), flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
+        await tester.point(Pose(0.0, -STEP, 0.0),
+                           flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
         await tester.pause(0.5)
         tester.heading = 40.0 + STEP
         target = Pose(0.0, -STEP, -STEP)
@@ -290,8 +256,21 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     attitude.pitch_axis(INFORMATION), device_id,
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
-    setpoint, *attitude.MOTION, earth_frame, yaw_lock, only_manager, one_manager, manager_set,
-    other_target, *component.interval_requirements(AttitudeStatus, optional=True),
+    reaches('setpoint', 'turns to an attitude that its manager commands', GIMBAL,
+            'Control of a Gimbal Device', lambda tester, pose: tester.point(pose)),
+    *attitude.MOTION, earth_frame, yaw_lock,
+    ignores('only-manager', 'ignores setpoints of components that are not its manager (GM-19)',
+            GIMBAL, 'Gimbal Manager and Gimbal Device',
+            'a setpoint of a component that is not its manager', _point_from_others),
+    ignores('one-manager', 'keeps its manager while another component announces itself (GM-18)',
+            PROPOSAL, 'Proposed Architecture', 'a setpoint of the second manager',
+            _announce_other),
+    ignores('manager-set', 'ignores the messages and commands to gimbal managers (GM-19)',
+            MESSAGES, 'GIMBAL_MANAGER_SET_PITCHYAW', 'messages to gimbal managers',
+            _send_to_manager),
+    ignores('other-target', 'ignores setpoints for other components and systems', ROUTING,
+            'Routing Detail', 'setpoints for other addresses', _point_others),
+    *component.interval_requirements(AttitudeStatus, optional=True),
     component.heartbeat_rate, *attitude.CONTENT, status_to_all, attitude.continuous,
     attitude.uptime, *component.ACKNOWLEDGEMENTS, component.checksums,
 )

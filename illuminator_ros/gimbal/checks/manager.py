@@ -27,7 +27,7 @@ import math
 from typing import Any
 
 from . import attitude
-from .attitude import earth_yaw, moves
+from .attitude import earth_yaw, ignores, moves, reaches, turns
 from .tester import (
     Control,
     control_of,
@@ -67,6 +67,11 @@ INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalMana
 PITCHYAW, CONFIGURE = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW,
                        GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE)
 VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
+# Sections of the specifications.
+PITCHYAW_COMMAND = 'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW'
+CONFIGURE_COMMAND = 'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE'
+STARTING = 'Starting / Configuring Gimbal Control'
+ADDRESSING = 'Addressing of Gimbal MAVLink Devices'
 # s from an acknowledgement to the status that shows the control.
 SHOWN_TIMEOUT = 1.5
 # Degrees 1e7 and mm: the vehicle that is played, which heads 15 degrees from north, and degrees
@@ -133,9 +138,12 @@ class ManagerTester(GimbalTester):
     async def take(self, primary: Address, secondary: Address = NO_COMPONENT) -> None:
         """Give control to two players; raise Failed if that is refused or not shown."""
         one = await self.configure(*primary, *secondary)
-        one.expect(accepted=True)
-        wanted = (primary, secondary)
-        if (control := await self.shown(lambda control: control == wanted)) != wanted:
+        await self.leads_to(one, lambda control: control == (primary, secondary))
+
+    async def leads_to(self, one: Transaction, wanted: Callable[[Control], bool]) -> None:
+        """Raise Failed if a command is refused, or control is another one after it."""
+        control = await self.shown(wanted)
+        if not one.accepted or not wanted(control):
             raise one.failure(f'{one.answer}, and then {control_text(control)}')
 
     async def prepare(self) -> None:
@@ -158,7 +166,7 @@ class ManagerTester(GimbalTester):
 
     # Setpoints
 
-    def point(
+    async def point(
         self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
         rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
         device_id: int | None = None,
@@ -168,8 +176,9 @@ class ManagerTester(GimbalTester):
             *self.session.device, flags, self.device_id if device_id is None else device_id,
             quaternion_of(pose), *radians(rates)), sender)
 
-    def send(self, cls: type[Any], pitch: float, yaw: float, pitch_rate: float,
-             yaw_rate: float, sender: Address | None = None) -> None:
+    async def send(self, cls: type[Any], pitch: float = NAN, yaw: float = NAN,
+                   pitch_rate: float = NAN, yaw_rate: float = NAN,
+                   sender: Address | None = None) -> None:
         """Send SET_PITCHYAW (rad) or SET_MANUAL_CONTROL."""
         self.session.send(
             cls(*self.session.device, int(LEVEL | VEHICLE_FRAME), self.device_id, pitch, yaw,
@@ -248,7 +257,7 @@ async def attitude_stream(tester: ManagerTester) -> str:
 # Control
 
 @controls('take', 'gives primary control to a component that asks, and shows it', GIMBAL,
-          'Starting / Configuring Gimbal Control')
+          STARTING)
 async def take(tester: ManagerTester) -> str:
     """Take it."""
     await tester.take(tester.session.address)
@@ -256,18 +265,16 @@ async def take(tester: ManagerTester) -> str:
 
 
 @controls('release', 'ends the control of a component that releases it', MESSAGES,
-          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+          CONFIGURE_COMMAND)
 async def release(tester: ManagerTester) -> None:
     """Send -3."""
     await tester.prepare()
     one = await tester.configure(-3, -3, -3, -3)
-    control = await tester.shown(lambda control: control[0] == NO_COMPONENT)
-    if not one.accepted or control[0] != NO_COMPONENT:
-        raise one.failure(f'{one.answer}, and then {control_text(control)}')
+    await tester.leads_to(one, lambda control: control[0] == NO_COMPONENT)
 
 
 @controls('release-others', 'keeps the control of a component when another one releases', MESSAGES,
-          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+          CONFIGURE_COMMAND)
 async def release_others(tester: ManagerTester) -> None:
     """Send -3 from two other components: one has our component id, one our system id."""
     await tester.prepare()
@@ -284,7 +291,7 @@ async def release_others(tester: ManagerTester) -> None:
 
 
 @controls('secondary', 'gives secondary control, and shows it', MESSAGES,
-          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+          CONFIGURE_COMMAND)
 async def secondary(tester: ManagerTester) -> None:
     """Give it to the second player."""
     try:
@@ -295,20 +302,18 @@ async def secondary(tester: ManagerTester) -> None:
 
 
 @controls('unchanged', 'leaves control as it is at -1', MESSAGES,
-          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+          CONFIGURE_COMMAND)
 async def unchanged(tester: ManagerTester) -> None:
     """Send -1."""
     await tester.prepare()
     before = await tester.control()
     one = await tester.configure(-1, -1, -1, -1)
     await tester.pause(0.5)
-    control = await tester.control()
-    if not one.accepted or control != before:
-        raise one.failure(f'{one.answer}, and then {control_text(control)}')
+    await tester.leads_to(one, lambda control: control == before)
 
 
 @controls('configure-values', 'rejects ids that do not exist', MESSAGES,
-          'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE')
+          CONFIGURE_COMMAND)
 async def configure_values(tester: ManagerTester) -> None:
     """Send -4 and 256."""
     await tester.prepare()
@@ -327,134 +332,35 @@ async def one_player(tester: ManagerTester) -> str:
     if one.accepted is not (holder == other):
         raise one.failure(f'{one.answer}, and then primary {holder}')
     loser = tester.session.address if holder == other else other
-    tester.point(await tester.target(-2 * STEP, STEP), sender=loser)
+    await tester.point(await tester.target(-2 * STEP, STEP), sender=loser)
     await tester.stays(before, f'primary {holder}, a setpoint of {loser}')
     return 'the second player took it at will' if holder == other else 'its holder kept it'
 
 
-# Players without control
-
-@moves('no-control-command', 'rejects MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW of a component without '
-       'control (GM-19)', GIMBAL, 'Starting / Configuring Gimbal Control')
-async def no_control_command(tester: ManagerTester) -> None:
-    """Send it from the second player."""
-    before = await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN, sender=tester.other)
-    await tester.stays(before, f'{one.text} of {tester.other}')
-    one.expect(accepted=False)
-
-
-@moves('no-control-messages', 'ignores setpoint messages of a component without control (GM-19)',
-       GIMBAL, 'Starting / Configuring Gimbal Control')
-async def no_control_messages(tester: ManagerTester) -> None:
-    """Send each of them from the second player."""
-    before = await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    angles = math.radians(target.pitch), math.radians(target.yaw)
-    tester.point(target, sender=tester.other)
-    tester.send(gimbal.GimbalManagerSetPitchyaw, *angles, NAN, NAN, tester.other)
-    tester.send(gimbal.GimbalManagerSetManualControl, NAN, NAN, -0.3, 0.3, tester.other)
-    await tester.stays(before, f'setpoints of {tester.other}')
-
-
-@moves('no-control-roi', 'rejects a region of interest of a component without control (GM-11)',
-       GIMBAL, 'Starting / Configuring Gimbal Control')
-async def no_control_roi(tester: ManagerTester) -> None:
-    """Clear it from the second player, which would turn the gimbal to its neutral position."""
-    await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
-    before = await tester.begin()
-    one = await tester.session.command(
-        GimbalCommand.DO_SET_ROI_NONE, tester.device_id, sender=tester.other)
-    await tester.stays(before, f'{one.text} of {tester.other}')
-    one.expect(accepted=False)
-
-
 # Setpoints
 
-@moves('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
-       'Controlling Gimbal Angle and/or Angular Rate using MAVLink')
-async def set_attitude(tester: ManagerTester) -> str:
-    """Turn down and right."""
-    await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    tester.point(target)
-    await tester.reach(target)
-    return str(await tester.pose())
+async def _send_messages(tester: ManagerTester, pose: Pose) -> None:
+    """Send each message that sets an attitude from the second player."""
+    other = tester.other
+    await tester.point(pose, sender=other)
+    await tester.send(gimbal.GimbalManagerSetPitchyaw, math.radians(pose.pitch),
+                      math.radians(pose.yaw), sender=other)
+    await tester.send(gimbal.GimbalManagerSetManualControl, pitch_rate=-0.3, yaw_rate=0.3,
+                      sender=other)
 
 
-@moves('pitchyaw', 'turns to angles (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)', MESSAGES,
-       'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
-async def pitchyaw(tester: ManagerTester) -> None:
-    """Turn down and right, by command."""
-    await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN)
-    one.expect(accepted=True)
-    await tester.reach(target)
+async def _clear_roi(tester: ManagerTester, pose: Pose) -> Transaction:
+    """Clear it from the second player, which would turn the gimbal to its neutral position."""
+    await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
+    return await tester.session.command(
+        GimbalCommand.DO_SET_ROI_NONE, tester.device_id, sender=tester.other)
 
 
-@moves('pitchyaw-rate', 'turns at rates in deg/s (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)', MESSAGES,
-       'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
-async def pitchyaw_rate(tester: ManagerTester) -> str:
-    """Turn down slowly for a second, so that rad/s are noticed and do no harm."""
-    before = await tester.begin()
-    one = await tester.pitchyaw(NAN, NAN, -2.0, 0.0)
-    await tester.pause(1.0)
-    after = await tester.pose()
-    tester.point(None, rates=(NAN, 0.0, 0.0))
-    one.expect(accepted=True)
-    text = f'commanded -2 deg/s, turned {after.pitch - before.pitch:.1f} deg in 1 s'
-    if not -6.0 < after.pitch - before.pitch < -0.5:
-        raise Failed(text)
-    return text
-
-
-@moves('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
-       'GIMBAL_MANAGER_SET_PITCHYAW')
-async def set_pitchyaw(tester: ManagerTester) -> None:
-    """Turn down and right, by message."""
-    await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    tester.send(gimbal.GimbalManagerSetPitchyaw, math.radians(target.pitch),
-                math.radians(target.yaw), NAN, NAN)
-    await tester.reach(target)
-
-
-@moves('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
-       'Manual Gimbal Control using MAVLink')
-async def manual(tester: ManagerTester) -> str:
-    """Turn down at a fifth of the full rate for a second."""
-    before = await tester.begin()
-    tester.send(gimbal.GimbalManagerSetManualControl, NAN, NAN, -0.2, 0.0)
-    await tester.pause(1.0)
-    after = await tester.pose()
-    tester.send(gimbal.GimbalManagerSetManualControl, NAN, NAN, 0.0, 0.0)
-    text = f'turned {after.pitch - before.pitch:.1f} deg in 1 s'
-    if after.pitch - before.pitch > -0.5:
-        raise Failed(text)
-    return text
-
-
-@moves('one-axis', 'changes one angle and keeps the other (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)',
-       MESSAGES, 'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
-async def one_axis(tester: ManagerTester) -> None:
-    """Set the pitch only."""
-    before = await tester.begin()
-    target = await tester.target(-2 * STEP, before.yaw)
-    one = await tester.pitchyaw(target.pitch, NAN, NAN, NAN)
-    one.expect(accepted=True)
-    await tester.reach(target)
-
-
-@moves('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)', MESSAGES,
-       'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW')
-async def angles_with_rates(tester: ManagerTester) -> None:
-    """Send an attitude and rates in one message."""
-    await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    tester.point(target, rates=(3 * RATE, 3 * RATE, 3 * RATE))
-    await tester.reach(target)
+async def _point_other_device(tester: ManagerTester, pose: Pose) -> Transaction:
+    """Send a message and a command for a device that does not exist."""
+    device_id = next(n for n in (6, 175) if n != tester.device_id)
+    await tester.point(pose, device_id=device_id)
+    return await tester.pitchyaw(pose.pitch, pose.yaw, NAN, NAN, device_id=device_id)
 
 
 @moves('earth-frame', 'takes yaw relative to north (GM-2)', MESSAGES, 'GIMBAL_MANAGER_FLAGS')
@@ -466,7 +372,7 @@ async def earth_frame(tester: ManagerTester) -> str:
                       'the vehicle heads north, where both frames are the same')
     target = await tester.target(-STEP, STEP)
     (yaw,) = earth_yaw([Pose(0.0, target.pitch, target.yaw, heading=start.heading)])
-    tester.point(Pose(0.0, target.pitch, yaw), flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
+    await tester.point(Pose(0.0, target.pitch, yaw), flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
     pose = await tester.settle(target)
     if not pose.near(target):
         raise Failed(f'commanded {yaw:.1f} deg from north at a heading of '
@@ -480,26 +386,13 @@ async def flags_shown(tester: ManagerTester) -> None:
     """Command NEUTRAL, and read the status."""
     await tester.requires(Capabilities.HAS_NEUTRAL)
     await tester.begin()
-    tester.point(None, flags=MountFlags.NEUTRAL | LEVEL)
+    await tester.point(None, flags=MountFlags.NEUTRAL | LEVEL)
     await tester.pause(0.5)
     streamed = await tester.session.receive_more(MANAGER_STATUS, 1.0)
     if not streamed:
         raise Skipped('no GIMBAL_MANAGER_STATUS was received')
     if not (flags := streamed[-1][1].flags) & MountFlags.NEUTRAL:
         raise Failed(f'flags 0x{flags:x}')
-
-
-@moves('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)', GIMBAL,
-       'Addressing of Gimbal MAVLink Devices')
-async def other_device(tester: ManagerTester) -> None:
-    """Send them for a device that does not exist."""
-    before = await tester.begin()
-    device_id = next(n for n in (6, 175) if n != tester.device_id)
-    target = await tester.target(-2 * STEP, STEP)
-    tester.point(target, device_id=device_id)
-    one = await tester.pitchyaw(target.pitch, target.yaw, NAN, NAN, device_id=device_id)
-    await tester.stays(before, f'setpoints for gimbal device {device_id}')
-    one.expect(accepted=False)
 
 
 @moves('other-target', 'ignores setpoints and commands for other components', ROUTING,
@@ -515,16 +408,6 @@ async def other_target(tester: ManagerTester) -> None:
     await tester.stays(before, f'setpoints for {other}')
     if one.acks:
         raise one.failure(f'answered a command for {other}: {one.answer}')
-
-
-@moves('all-devices', 'takes gimbal device 0 for all of its gimbals (GM-28)', GIMBAL,
-       'Addressing of Gimbal MAVLink Devices')
-async def all_devices(tester: ManagerTester) -> None:
-    """Send a setpoint for device 0."""
-    await tester.begin()
-    target = await tester.target(-2 * STEP, STEP)
-    tester.point(target, device_id=0)
-    await tester.reach(target)
 
 
 @moves('roi', 'points at a place, and ends that (GM-8)', GIMBAL, 'Gimbal Manager Messages')
@@ -564,9 +447,43 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     take, release, unchanged, release_others, secondary, configure_values, one_player,
-    set_attitude, *attitude.MOTION, angles_with_rates, set_pitchyaw, pitchyaw, pitchyaw_rate,
-    one_axis, manual, earth_frame, flags_shown, roi,
-    no_control_command, no_control_messages, no_control_roi, other_device, all_devices,
+    reaches('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
+            'Controlling Gimbal Angle and/or Angular Rate using MAVLink',
+            lambda tester, pose: tester.point(pose)),
+    *attitude.MOTION,
+    reaches('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)',
+            MESSAGES, PITCHYAW_COMMAND,
+            lambda tester, pose: tester.point(pose, rates=(3 * RATE, 3 * RATE, 3 * RATE))),
+    reaches('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
+            'GIMBAL_MANAGER_SET_PITCHYAW', lambda tester, pose: tester.send(
+                gimbal.GimbalManagerSetPitchyaw, math.radians(pose.pitch),
+                math.radians(pose.yaw))),
+    reaches('pitchyaw', f'turns to angles ({PITCHYAW_COMMAND})', MESSAGES, PITCHYAW_COMMAND,
+            lambda tester, pose: tester.pitchyaw(pose.pitch, pose.yaw, NAN, NAN)),
+    # So slowly that rad/s are noticed and do no harm.
+    turns('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
+          PITCHYAW_COMMAND, lambda tester, speed: tester.pitchyaw(NAN, NAN, speed, 0.0), -2.0),
+    reaches('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
+            PITCHYAW_COMMAND, lambda tester, pose: tester.pitchyaw(pose.pitch, NAN, NAN, NAN),
+            yaw=0.0),
+    # The full rate is open.
+    turns('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
+          'Manual Gimbal Control using MAVLink', lambda tester, speed: tester.send(
+              gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0), -2.0,
+          fastest=math.inf),
+    earth_frame, flags_shown, roi,
+    ignores('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
+            '(GM-19)', GIMBAL, STARTING, 'a command of the second player',
+            lambda tester, pose: tester.pitchyaw(
+                pose.pitch, pose.yaw, NAN, NAN, sender=tester.other)),
+    ignores('no-control-messages', 'ignores setpoint messages of a component without control '
+            '(GM-19)', GIMBAL, STARTING, 'setpoints of the second player', _send_messages),
+    ignores('no-control-roi', 'rejects a region of interest of a component without control '
+            '(GM-11)', GIMBAL, STARTING, 'a command of the second player', _clear_roi),
+    ignores('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)',
+            GIMBAL, ADDRESSING, 'setpoints for another gimbal device', _point_other_device),
+    reaches('all-devices', 'takes gimbal device 0 for all of its gimbals (GM-28)', GIMBAL,
+            ADDRESSING, lambda tester, pose: tester.point(pose, device_id=0)),
     other_target, *component.interval_requirements(MANAGER_STATUS, optional=True),
     component.heartbeat_rate, *attitude.CONTENT, attitude.continuous, attitude.uptime,
     *component.ACKNOWLEDGEMENTS, component.checksums,

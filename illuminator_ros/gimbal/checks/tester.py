@@ -207,7 +207,7 @@ class GimbalTester(ABC):
         """Do what must precede setpoints, such as taking control."""
 
     @abstractmethod
-    def point(
+    async def point(
         self, pose: Pose | None, *, flags: int = LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME,
         rates: tuple[float, float, float] = UNSET_VECTOR,
     ) -> None:
@@ -273,7 +273,7 @@ class GimbalTester(ABC):
         await self.prepare()
         start = await self.target(-STEP, 0.0)
         if not start.near(await self.pose()):
-            self.point(start)
+            await self.point(start)
         return await self.until(start.near)
 
     async def stays(self, before: Pose, cause: str, seconds: float = WATCH_TIME) -> None:
@@ -324,7 +324,7 @@ class GimbalTester(ABC):
 
     async def _turn_back(self, before: Pose) -> None:
         frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
-        self.point(before, flags=before.flags & ~frames | MountFlags.YAW_IN_VEHICLE_FRAME)
+        await self.point(before, flags=before.flags & ~frames | MountFlags.YAW_IN_VEHICLE_FRAME)
         await self.until(lambda pose: pose.near(before, 1.0))
         # Until it stands still.
         await self.pause(0.5)
