@@ -69,7 +69,7 @@ from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.component import Payload
-from ..mavlink.messages import Address, MavResult
+from ..mavlink.messages import Address, command_name, MavResult
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import (
@@ -409,25 +409,27 @@ class GimbalManager(Payload):
         if unreported is not None:
             self.events.emit(DemandRefused(source, reason, unreported))
 
+    def _answer(self, source: Address, refusal: str, now: float) -> MavResult:
+        """Return the result of a command; a refusal is reported, since no result has a reason."""
+        if refusal:
+            self._report_refusal(source, refusal, now)
+        return MavResult.DENIED if refusal else MavResult.ACCEPTED
+
     def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> MavResult:
         *angles_and_rates, flags, _, _ = command.params
         try:
             pitch, yaw, pitch_rate, yaw_rate = map(math.radians, angles_and_rates)
-            flags = 0 if math.isnan(flags) else int(flags)
-            demand = Demand.from_pitch_yaw(flags, pitch, yaw, pitch_rate, yaw_rate)
-        except (ValueError, OverflowError):
-            return MavResult.DENIED
-        refusal = self._demand(source, demand, now)
-        if refusal and self.control.holder(Role.PRIMARY) == source:
-            self._report_refusal(source, refusal, now)
-        return MavResult.DENIED if refusal else MavResult.ACCEPTED
+            demand = Demand.from_pitch_yaw(
+                0 if math.isnan(flags) else int(flags), pitch, yaw, pitch_rate, yaw_rate)
+        except (ValueError, OverflowError) as error:
+            return self._answer(source, f'{command_name(command.command)}: {error}', now)
+        return self._answer(source, self._demand(source, demand, now), now)
 
     def _demand(self, player: Address, demand: Demand, now: float) -> str:
         """Follow a player's demand; return why it is refused, or ''."""
         if self.tracker.state is not ManagerState.ACTIVE:
             return f'the manager is not active: {self.tracker.state.value}'
-        holder = self.control.primary.holder
-        if holder == player:
+        if self.control.primary.holder == player:
             return self._set(demand, now)
         if self.control.secondary.holder == player:
             if demand.flags & (MountFlags.RETRACT | MountFlags.NEUTRAL) or not (
@@ -435,6 +437,13 @@ class GimbalManager(Payload):
                 return 'secondary control adds angles only'
             self._offsets = nudge(demand, self.settings.nudge_limit)
             self._send(now)
+            return ''
+        return self._lacks_control(player)
+
+    def _lacks_control(self, player: Address) -> str:
+        """Return why a player is refused what needs primary control, '' if it has it."""
+        holder = self.control.primary.holder
+        if holder == player:
             return ''
         return f'{holder} has control' if holder else 'it must take control first'
 
@@ -543,8 +552,8 @@ class GimbalManager(Payload):
     # A region of interest
 
     def _set_roi(self, source: Address, command: AnyCommand, now: float) -> MavResult:
-        if self.control.holder(Role.PRIMARY) != source:
-            return MavResult.DENIED
+        if refusal := self._lacks_control(source):
+            return self._answer(source, refusal, now)
         read = read_roi(command)
         if isinstance(read, MavResult):
             return read
@@ -561,11 +570,10 @@ class GimbalManager(Payload):
         return MavResult.ACCEPTED
 
     def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> MavResult:
-        if self.control.holder(Role.PRIMARY) != source:
-            return MavResult.DENIED
-        self._roi = None
-        self._send(now)
-        return MavResult.ACCEPTED
+        if not (refusal := self._lacks_control(source)):
+            self._roi = None
+            self._send(now)
+        return self._answer(source, refusal, now)
 
     def _roi_flags(self) -> MountFlags:
         return LEVEL | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
