@@ -78,7 +78,7 @@ END_TIMEOUT = 5.0
 POSITION_TIMEOUT, ATTITUDE_TIMEOUT = 1.0, 0.5
 # s that a message may take from the node to the camera, real time; and the share of images in
 # undisturbed flight whose fix is not older than one interval. Both depend on the computer's load.
-MAX_DELIVERY, LEAST_FRESH = 0.1, 0.25
+MAX_DELIVERY, LEAST_FRESH = 1.0, 0.25
 
 
 def publish(flight: Flight) -> None:

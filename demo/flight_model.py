@@ -189,8 +189,10 @@ class Flight:
 
 def least(error: Callable[[float], float], limit: float) -> tuple[float, float]:
     """Return the argument, within a limit on both sides, with the least error; and that error."""
-    best = min((limit * number / 40 for number in range(-40, 41)), key=error)
-    low, high = best - limit / 40, best + limit / 40
+    # So close that the error has one minimum between two neighbours.
+    count = max(40, math.ceil(limit / 0.05))
+    best = min((limit * number / count for number in range(-count, count + 1)), key=error)
+    low, high = best - limit / count, best + limit / count
     for _ in range(40):
         third = (high - low) / 3
         if error(low + third) < error(high - third):

@@ -22,7 +22,7 @@ from support.processes import Program
 
 def test_images_of_a_flight_agree_with_the_truth(domain: int) -> None:
     pytest.importorskip('serial', reason='pyserial is not installed')
-    flight = Program(sys.executable, 'demo/flight.py', '--seconds', '36', '--speed', '6',
+    flight = Program(sys.executable, 'demo/flight.py', '--seconds', '36', '--speed', '3',
                      env={'ROS_DOMAIN_ID': str(domain)})
     try:
         assert flight.wait() == 0, flight.log
