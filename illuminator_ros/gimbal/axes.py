@@ -17,10 +17,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
-from .messages import Capabilities, ErrorFlags
-from ..payload.mount_attitude import MountFlags
+from .messages import (
+    Capabilities,
+    ErrorFlags,
+    GimbalDeviceInformation,
+    GimbalManagerInformation,
+)
+from ..payload.mount_attitude import AXES, MountFlags
 
 HAS_AXIS = (Capabilities.HAS_ROLL_AXIS, Capabilities.HAS_PITCH_AXIS, Capabilities.HAS_YAW_AXIS)
 HAS_FOLLOW = (Capabilities.HAS_ROLL_FOLLOW, Capabilities.HAS_PITCH_FOLLOW,
@@ -53,3 +58,27 @@ class Range(NamedTuple):
     def clip(self, angle: float) -> float:
         """Return the nearest angle within the range."""
         return min(max(angle, self.low), self.high)
+
+
+# Of roll, pitch, and yaw relative to the vehicle.
+Ranges: TypeAlias = tuple[Range, Range, Range]
+
+
+def read_ranges(message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:
+    """Return the ranges in a message; an end that is not known is NaN or infinite."""
+    return (Range(message.roll_min, message.roll_max), Range(message.pitch_min, message.pitch_max),
+            Range(message.yaw_min, message.yaw_max))
+
+
+def range_fields(ranges: Ranges) -> dict[str, float]:
+    """Return the fields roll_min to yaw_max of such a message."""
+    return {f'{axis}_{end}': value if math.isfinite(value) else math.nan
+            for axis, range_ in zip(AXES, ranges, strict=True)
+            for end, value in zip(('min', 'max'), range_, strict=True)}
+
+
+def other_signs(axis: str, range_: Range) -> Range:
+    """Return a range of MAVLink with the signs of ROS, or the reverse: pitch and yaw differ."""
+    low, high = range_
+    # 0 is added to have no negative zero.
+    return range_ if axis == 'roll' else Range(-high + 0.0, -low + 0.0)

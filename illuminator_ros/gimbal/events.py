@@ -19,8 +19,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from .axes import Ranges
 from .commands import Control
-from .messages import Capabilities, ErrorFlags, GimbalDeviceInformation, GimbalManagerInformation
+from .messages import Capabilities, ErrorFlags, GimbalDeviceInformation
 from ..mavlink.messages import Address
 from ..payload.arbitration import HolderChanged
 from ..payload.identity import text
@@ -45,21 +46,6 @@ class GimbalKey(NamedTuple):
 
     def __str__(self) -> str:
         return f'{self.number} of {self.address}' if self.number else str(self.address)
-
-
-@dataclass(frozen=True)
-class Ranges:
-    """The smallest and largest roll, pitch and yaw, rad, positive as in MAVLink."""
-
-    roll: tuple[float, float]
-    pitch: tuple[float, float]
-    yaw: tuple[float, float]
-
-    @classmethod
-    def of(cls, message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:
-        """Return the ranges in a message."""
-        return cls((message.roll_min, message.roll_max), (message.pitch_min, message.pitch_max),
-                   (message.yaw_min, message.yaw_max))
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ import math
 from typing import Any, TypeVar
 
 from . import events
+from .axes import Ranges, read_ranges
 from .commands import Configure, Control, SetFlags, setpoint_flags
 from .messages import (
     Capabilities,
@@ -191,7 +192,7 @@ class Gimbal:
         self._may_take = settings.auto_take_control
         self._releasing = False
         self._identity: events.DeviceIdentity | None = None
-        self._device_ranges: events.Ranges | None = None
+        self._device_ranges: Ranges | None = None
         self._identity_query = Repetition()
         self._interval_query = Repetition(
             -math.inf if settings.attitude_interval else math.inf)
@@ -307,10 +308,10 @@ class Gimbal:
         manager = self._managers.get(address)
         if manager is None and len(self._managers) < MAX_MANAGERS:
             target = request.Target(
-                address, self._commands, lambda result, now: None, kind='gimbal manager',
+                address, self._commands, _ignore, kind='gimbal manager',
                 status_id=GimbalManagerStatus.id, status_name='GIMBAL_MANAGER_STATUS')
             flag_target = request.Target(
-                address, self._commands, lambda result, now: None, kind='gimbal device',
+                address, self._commands, _ignore, kind='gimbal device',
                 status_id=GimbalDeviceAttitudeStatus.id,
                 status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_sender=self.key.address)
             manager = self._managers[address] = _Manager(
@@ -346,7 +347,7 @@ class Gimbal:
     def take_device_information(self, message: GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION of the device."""
         self._identity = events.DeviceIdentity.of(message)
-        self._device_ranges = events.Ranges.of(message)
+        self._device_ranges = read_ranges(message)
         self._identity_query.finish()
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
@@ -685,19 +686,15 @@ class Gimbal:
             if self._control.primary is None:
                 self._take_control(now, self._taken_automatically)
         if manager.status_query.take(now):
-            self._commands.start(Command(
-                self._manager, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerStatus.id),)), now,
-                lambda result, now: None)
-        device = self.key.address
+            manager.target.request_status(now)
         if self._identity_query.take(now):
-            self._commands.start(Command(
-                device, MavCmd.REQUEST_MESSAGE, (float(GimbalDeviceInformation.id),)), now,
-                lambda result, now: None)
+            manager.target.request_message(
+                GimbalDeviceInformation.id, now, _ignore, to=self.key.address)
         if self._interval_query.take(now):
-            self._commands.start(Command(
-                device, MavCmd.SET_MESSAGE_INTERVAL, (
-                    float(GimbalDeviceAttitudeStatus.id),
-                    self._settings.attitude_interval * 1e6)), now, self._interval_answered)
+            manager.target.send(
+                MavCmd.SET_MESSAGE_INTERVAL, (float(GimbalDeviceAttitudeStatus.id),
+                                              self._settings.attitude_interval * 1e6),
+                now, self._interval_answered, to=self.key.address)
 
     def _taken_automatically(self, result: request.Result, now: float) -> None:
         if not result.success:
@@ -744,12 +741,16 @@ class Gimbal:
         return events.GimbalSnapshot(
             self.key, self.unreachable(now), (self._manager, *sorted(self._others)),
             self._capabilities(),
-            self._device_ranges or (events.Ranges.of(information) if information else None),
+            self._device_ranges or (read_ranges(information) if information else None),
             self._identity, self._attitude, self._attitude_at, self._problem, self._flags,
             self._errors, self._control, self.in_control,
             manager.status_at if manager else -math.inf, self.enforces_control,
             self._setpoints_sent,
             self._sources.shown_holder, self._sources.since)
+
+
+def _ignore(result: CommandResult, now: float) -> None:
+    pass
 
 
 def _request(

@@ -27,7 +27,7 @@ import math
 import random
 from typing import TypeAlias
 
-from .axes import AT_LIMIT, LEVEL, Range
+from .axes import AT_LIMIT, LEVEL, Range, range_fields, Ranges
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
 from .manager_setpoint import (
     AnySetpoint,
@@ -121,7 +121,7 @@ class ManagerSettings:
     control: ControlSettings = field(default_factory=ControlSettings)
     device_id: int = 0
     nudge_limit: float = math.radians(10)
-    ranges: tuple[Range, Range, Range] = (Range(), Range(), Range())
+    ranges: Ranges = (Range(), Range(), Range())
 
 
 @dataclass(frozen=True)
@@ -614,13 +614,7 @@ class GimbalManager(Payload):
         capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
         return GimbalManagerInformation(
             mav.time_boot_ms(now), int(capabilities), self.tracker.device_id,
-            *self._range_values())
-
-    def _range_values(self) -> tuple[float, float, float, float, float, float]:
-        (a, b), (c, d), (e, f) = (
-            [end if math.isfinite(end) else math.nan for end in range_]
-            for range_ in self.model.ranges)
-        return a, b, c, d, e, f
+            **range_fields(self.model.ranges))
 
     def _device_information(self, now: float) -> GimbalDeviceInformation | None:
         """Return the message of the device, which clients ask of its manager."""
@@ -629,8 +623,8 @@ class GimbalManager(Payload):
                 self._information, gimbal_device_id=self.tracker.device_id)
         return GimbalDeviceInformation(
             mav.time_boot_ms(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
-            int(self.model.capabilities & 0xFFFF), 0, *self._range_values(),
-            self.tracker.device_id)
+            int(self.model.capabilities & 0xFFFF), 0, **range_fields(self.model.ranges),
+            gimbal_device_id=self.tracker.device_id, cap_flags2=0)
 
     def _request_information(self, now: float) -> None:
         self._information_due = now + INFORMATION_INTERVAL

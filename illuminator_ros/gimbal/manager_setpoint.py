@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from .axes import HAS_AXIS, LEVEL, Range
+from .axes import HAS_AXIS, LEVEL, Range, Ranges, read_ranges
 from .messages import (
     ABSOLUTE_FRAMES,
     Capabilities,
@@ -83,7 +83,7 @@ class GimbalModel:
     """
 
     capabilities: Capabilities = Capabilities(0)
-    ranges: tuple[Range, Range, Range] = (Range(), Range(), Range())
+    ranges: Ranges = (Range(), Range(), Range())
 
     @classmethod
     def from_information(cls, message: GimbalDeviceInformation) -> GimbalModel:
@@ -94,20 +94,18 @@ class GimbalModel:
         """
         capabilities = Capabilities(message.cap_flags | message.cap_flags2)
 
-        def axis(low: float, high: float, flag: Capabilities) -> Range:
+        def known(read: Range, flag: Capabilities) -> Range:
             if capabilities and not capabilities & flag:
                 return Range(0.0, 0.0)
-            range_ = Range(low if math.isfinite(low) else -math.inf,
-                           high if math.isfinite(high) else math.inf)
+            range_ = Range(read.low if math.isfinite(read.low) else -math.inf,
+                           read.high if math.isfinite(read.high) else math.inf)
             return range_ if range_.low <= range_.high else Range()
 
-        return cls(capabilities, (
-            axis(message.roll_min, message.roll_max, HAS_AXIS[0]),
-            axis(message.pitch_min, message.pitch_max, HAS_AXIS[1]),
-            axis(message.yaw_min, message.yaw_max, HAS_AXIS[2])))
+        roll, pitch, yaw = map(known, read_ranges(message), HAS_AXIS)
+        return cls(capabilities, (roll, pitch, yaw))
 
     @classmethod
-    def from_ranges(cls, ranges: tuple[Range, Range, Range]) -> GimbalModel:
+    def from_ranges(cls, ranges: Ranges) -> GimbalModel:
         """Return a gimbal that is stabilised and points to any attitude within the ranges."""
         flags = (Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_LOCK,
                  Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_PITCH_LOCK,
@@ -219,7 +217,7 @@ class Demand(NamedTuple):
 
     @classmethod
     def from_manual_control(
-        cls, message: GimbalManagerSetManualControl, ranges: tuple[Range, Range, Range],
+        cls, message: GimbalManagerSetManualControl, ranges: Ranges,
     ) -> Demand:
         """
         Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of the rates.
@@ -243,7 +241,7 @@ class Demand(NamedTuple):
 AnySetpoint = GimbalManagerSetAttitude | GimbalManagerSetPitchyaw | GimbalManagerSetManualControl
 
 
-def read_demand(message: AnySetpoint, ranges: tuple[Range, Range, Range]) -> Demand:
+def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
     """
     Read a message of a player.
 
@@ -366,7 +364,7 @@ class Clipped(NamedTuple):
 
 
 def clip(
-    attitude: Quaternion, ranges: tuple[Range, Range, Range], offset: float | None,
+    attitude: Quaternion, ranges: Ranges, offset: float | None,
     made_of: Vector = UNSET_VECTOR,
 ) -> tuple[Quaternion, list[Clipped]]:
     """

@@ -30,10 +30,10 @@ import math
 from typing import Any
 
 from . import messages as gimbal
-from .axes import Range
+from .axes import Range, range_fields
 from .manager_setpoint import Demand
 from .messages import Capabilities, ErrorFlags
-from .simulated_motion import GimbalMechanics, GimbalMotion, limit_fields
+from .simulated_motion import GimbalMechanics, GimbalMotion
 from .. import __version__
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload import simulated
@@ -216,7 +216,7 @@ class SimulatedMount:
 
     def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
         """Return the fields roll_min to yaw_max of an INFORMATION message."""
-        fields = limit_fields(self._properties.mechanics)
+        fields = range_fields(self._properties.mechanics.ranges)
         self._informed += 1
         return fields if behaviour.static_information else {
             **fields, 'pitch_max': fields['pitch_max'] + 0.01 * self._informed}

@@ -16,12 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
-from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, RESOLUTION
+from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, Ranges, RESOLUTION
 from .manager_setpoint import Demand
 from .messages import Capabilities, ErrorFlags
 from ..payload.mount_attitude import AXES, MountFlags, UNSET_VECTOR, YawFrame
@@ -66,7 +65,7 @@ class GimbalMechanics:
     capabilities: Capabilities = CAPABILITIES
 
     @property
-    def ranges(self) -> tuple[Range, Range, Range]:
+    def ranges(self) -> Ranges:
         """Return the ranges in the order of the axes."""
         return self.roll, self.pitch, self.yaw
 
@@ -270,10 +269,3 @@ class GimbalMotion:
         roll, pitch, yaw = self.angles
         return Quaternion.from_euler(
             roll, pitch, yaw + self.vehicle.yaw if frame is YawFrame.EARTH else yaw)
-
-
-def limit_fields(mechanics: GimbalMechanics) -> Mapping[str, float]:
-    """Return the fields roll_min to yaw_max of an INFORMATION message."""
-    return {f'{name}_{end}': value
-            for name, span in zip(AXES, mechanics.ranges, strict=True)
-            for end, value in zip(('min', 'max'), span, strict=True)}

@@ -23,20 +23,14 @@ import math
 from typing import Any, NamedTuple
 
 from .. import messages as gimbal
-from ..axes import LEVEL
+from ..axes import LEVEL, Range, read_ranges
 from ..messages import Capabilities
 from ...mavlink.messages import Address, Message
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.requirement import Conditions, Specification
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import (
-    AXES,
-    MountFlags,
-    UNSET_VECTOR,
-    yaw_frame,
-    YawFrame,
-)
+from ...payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
 from ...payload.rotation import Quaternion
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
@@ -57,7 +51,6 @@ STEP = 15.0
 RATE = 6.0
 NAN = math.nan
 Control = tuple[Address, Address]
-_LIMIT_NAMES = [f'{axis}_{end}' for axis in AXES for end in ('min', 'max')]
 
 
 @dataclass(frozen=True)
@@ -103,19 +96,16 @@ class Pose:
 class Limits(NamedTuple):
     """The ranges and capabilities of an INFORMATION message; NaN for unknown, degrees."""
 
-    roll_min: float
-    roll_max: float
-    pitch_min: float
-    pitch_max: float
-    yaw_min: float
-    yaw_max: float
+    roll: Range
+    pitch: Range
+    yaw: Range
     capabilities: int
 
     @classmethod
     def from_message(cls, message: Any) -> Limits:
         """Read GIMBAL_DEVICE_INFORMATION or GIMBAL_MANAGER_INFORMATION."""
-        return cls(capabilities=getattr(message, 'cap_flags2', 0) or message.cap_flags,
-                   **{name: math.degrees(getattr(message, name)) for name in _LIMIT_NAMES})
+        roll, pitch, yaw = (Range(*map(math.degrees, one)) for one in read_ranges(message))
+        return cls(roll, pitch, yaw, getattr(message, 'cap_flags2', 0) or message.cap_flags)
 
 
 def describe(message: Message) -> str:
@@ -263,9 +253,9 @@ class GimbalTester(ABC):
 
         return Pose(
             0.0,
-            clipped(pitch, limits.pitch_min, limits.pitch_max)
+            clipped(pitch, *limits.pitch)
             if limits.capabilities & Capabilities.HAS_PITCH_AXIS else now.pitch,
-            clipped(yaw, limits.yaw_min, limits.yaw_max)
+            clipped(yaw, *limits.yaw)
             if limits.capabilities & Capabilities.HAS_YAW_AXIS else now.yaw)
 
     async def begin(self) -> Pose:

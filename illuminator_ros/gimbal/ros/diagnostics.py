@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
+from ..axes import other_signs
 from ..commands import Control
 from ..events import GimbalKey, GimbalSnapshot
 from ..messages import ErrorFlags, flag_names
@@ -146,13 +147,11 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
     if gimbal.capabilities is not None:
         values['capabilities'] = ', '.join(flag_names(gimbal.capabilities))
     if gimbal.ranges is not None:
-        (roll_min, roll_max), pitch, yaw = (
-            gimbal.ranges.roll, gimbal.ranges.pitch, gimbal.ranges.yaw)
         # With the signs of ROS: pitch down and yaw left are positive.
-        limits = {'roll_min_rad': roll_min, 'roll_max_rad': roll_max,
-                  'pitch_min_rad': -pitch[1], 'pitch_max_rad': -pitch[0],
-                  'yaw_min_rad': -yaw[1], 'yaw_max_rad': -yaw[0]}
-        values |= {name: value for name, value in limits.items() if math.isfinite(value)}
+        ranges = [other_signs(*one) for one in zip(AXES, gimbal.ranges, strict=True)]
+        values |= {f'{axis}_{end}_rad': value for axis, range_ in zip(AXES, ranges, strict=True)
+                   for end, value in zip(('min', 'max'), range_, strict=True)
+                   if math.isfinite(value)}
     if gimbal.identity is not None:
         values |= vars(gimbal.identity)
     return values

@@ -28,7 +28,7 @@ from std_msgs.msg import Header
 from .conversions import Frames, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
 from .. import manager as gimbal_manager
-from ..axes import Range
+from ..axes import other_signs, Range
 from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_setpoint import GeoPoint
 from ..manager_state import ManagerState, StateChanged
@@ -100,7 +100,7 @@ def manager_settings(values: Values, ros: Address) -> gimbal_manager.ManagerSett
         low, high = values[f'{axis}_min'], values[f'{axis}_max']
         if low > high:
             raise ParameterError(f'{axis}_min: {low} rad is above {axis}_max: {high} rad')
-        ranges.append(Range(low, high) if axis == 'roll' else Range(-high + 0.0, -low + 0.0))
+        ranges.append(other_signs(axis, Range(low, high)))
     roll, pitch, yaw = ranges
     return gimbal_manager.ManagerSettings(
         ControlSettings(
