@@ -16,9 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
-import ctypes
 import functools
 import os
 from pathlib import Path
@@ -28,24 +27,27 @@ import subprocess
 import sys
 import tempfile
 import threading
+from typing import Any, IO
 
+from support.fork_server import end_with_parent, fork, ForkedProcess
 from support.waiting import PATIENCE
 
 ROOT = Path(__file__).parents[2]
-# Looked up here: after a fork as little as possible must happen.
-PRCTL = ctypes.CDLL(None).prctl
-PR_SET_PDEATHSIG = 1
 
 
 class Program:
-    """A process whose output, standard output and error together, can be waited for."""
+    """
+    A process whose output, standard output and error together, can be waited for.
+
+    :param forked: the command is the name of a module of ours and its arguments.
+    """
 
     def __init__(self, *command: str, env: Mapping[str, str] | None = None,
-                 cwd: Path | None = None) -> None:
-        self._process = subprocess.Popen(
-            command, env=environment(env), cwd=cwd or ROOT, bufsize=0,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            preexec_fn=prepare_child)
+                 cwd: Path | None = None, forked: bool = False) -> None:
+        self._output, writing = os.pipe()
+        with open(os.devnull) as nothing, open(writing, 'wb') as output:
+            self._process = _start(
+                command, environment(env), cwd or ROOT, (nothing, output, output), forked)
         self._lines: list[str] = []
         self._rest = b''
         self._ended = False
@@ -73,22 +75,20 @@ class Program:
         return ''.join(self.lines)
 
     def _read(self) -> None:
-        assert self._process.stdout is not None
         going = True
         while going:
             # Without the lock, which others want meanwhile.
-            select.select([self._process.stdout], [], [])
+            select.select([self._output], [], [])
             with self._grown:
                 going = self._take() or not self._ended
                 self._grown.notify_all()
+        os.close(self._output)
 
     def _take(self) -> bool:
         """Take what has been printed; return whether there was anything."""
-        output = self._process.stdout
-        assert output is not None
-        if self._ended or not select.select([output], [], [], 0.0)[0]:
+        if self._ended or not select.select([self._output], [], [], 0.0)[0]:
             return False
-        data = os.read(output.fileno(), 65536)
+        data = os.read(self._output, 65536)
         self._ended = not data
         *whole, self._rest = (self._rest + data).split(b'\n')
         if self._ended and self._rest:
@@ -133,6 +133,18 @@ class Program:
         return self._process.poll() is None
 
 
+def _start(
+    command: Sequence[str], variables: Mapping[str, str], directory: Path,
+    streams: Sequence[IO[Any]], forked: bool,
+) -> subprocess.Popen[bytes] | ForkedProcess:
+    """Start a program with its standard input, output and error."""
+    if forked:
+        return fork(command, variables, directory, [stream.fileno() for stream in streams])
+    stdin, stdout, stderr = streams
+    return subprocess.Popen(command, env=variables, cwd=directory, stdin=stdin, stdout=stdout,
+                            stderr=stderr, preexec_fn=prepare_child)
+
+
 def prepare_child() -> None:
     """
     Give a child default signal handling, and let it end with the thread that starts it.
@@ -141,7 +153,7 @@ def prepare_child() -> None:
     """
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGTSTP):
         signal.signal(number, signal.SIG_DFL)
-    PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
+    end_with_parent()
 
 
 @functools.cache
@@ -160,8 +172,15 @@ def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **(more or {})}
 
 
+def _can_be_forked(env: Mapping[str, str] | None) -> bool:
+    # Python reads its variables when it starts.
+    return not any(name.startswith('PYTHON') for name in env or {})
+
+
 def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
     """Start a module of ours."""
+    if _can_be_forked(env):
+        return Program(module, *arguments, env=env, forked=True)
     return Program(sys.executable, '-m', module, *arguments, env=env)
 
 
@@ -182,10 +201,22 @@ def run(
     :param typed: what it reads from standard input.
     :param redirection: of a shell, such as ``> /dev/full``.
     """
-    return subprocess.run(
-        ['sh', '-c', f'exec "$@" {redirection}', 'sh', sys.executable, '-m', module, *arguments],
-        env=environment(env), cwd=ROOT, text=True, input=typed, capture_output=True,
-        timeout=PATIENCE, preexec_fn=prepare_child)
+    forked = _can_be_forked(env) and not redirection
+    command = [module, *arguments] if forked else [
+        'sh', '-c', f'exec "$@" {redirection}', 'sh', sys.executable, '-m', module, *arguments]
+    with contextlib.ExitStack() as opened:
+        streams = [opened.enter_context(tempfile.TemporaryFile('w+')) for _ in range(3)]
+        streams[0].write(typed)
+        streams[0].seek(0)
+        process = _start(command, environment(env), ROOT, streams, forked)
+        try:
+            status = process.wait(PATIENCE)
+        finally:
+            process.kill()
+        for stream in streams:
+            stream.seek(0)
+        return subprocess.CompletedProcess(
+            command, status, streams[1].read(), streams[2].read())
 
 
 @contextlib.contextmanager

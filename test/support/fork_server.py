@@ -1,0 +1,174 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Programs of ours as forks of one process that has imported their modules.
+
+Such a program starts in 0.1 s in place of 0.6 s, and shares nothing with the others: it has its
+own arguments, environment, directory and standard streams, and ends as any interpreter does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import contextlib
+import ctypes
+import functools
+import gc
+from importlib import import_module
+import json
+import os
+from pathlib import Path
+import runpy
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+# Looked up here: after a fork as little as possible must happen.
+LIBC = ctypes.CDLL(None)
+PRCTL = LIBC.prctl
+PR_SET_PDEATHSIG = 1
+PR_SET_CHILD_SUBREAPER = 36
+_LOCK = threading.Lock()
+MAX_REQUEST = 1 << 17
+MODULES = (
+    'illuminator_ros.cli.bridge', 'illuminator_ros.cli.conformance.run',
+    'illuminator_ros.cli.monitor.run', 'illuminator_ros.cli.simulator.run',
+    'illuminator_ros.gimbal.ros.gimbals', 'illuminator_ros.gimbal.ros.manager_node',
+    'illuminator_ros.gimbal.simulated_device', 'illuminator_ros.illuminator.ros.lights',
+    'illuminator_ros.illuminator.simulated', 'illuminator_ros.rededge.ros.camera_node',
+    'illuminator_ros.rededge.simulated', 'illuminator_ros.ros.bridge', 'rosidl_generator_py',
+    'rosidl_parser.parser', 'service_msgs.msg', 'type_description_interfaces.msg')
+
+
+def end_with_parent() -> None:
+    """Let this process end with the thread that is its parent."""
+    PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class ForkedProcess:
+    """
+    A child of this process that another process has forked, with methods of ``Popen``.
+
+    :ivar pid: its process id.
+    """
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        self._descriptor = os.pidfd_open(pid)
+        self._status: int | None = None
+
+    def poll(self) -> int | None:
+        """Return the exit status, negative for a signal; None while the process runs."""
+        if self._status is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            if pid:
+                self._status = os.waitstatus_to_exitcode(status)
+                os.close(self._descriptor)
+        return self._status
+
+    def wait(self, timeout: float) -> int:
+        """Wait for the end and return the exit status."""
+        if (status := self.poll()) is None:
+            select.select([self._descriptor], [], [], timeout)
+            if (status := self.poll()) is None:
+                raise subprocess.TimeoutExpired(str(self.pid), timeout)
+        return status
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal to it if it has not ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        """End it."""
+        self.send_signal(signal.SIGKILL)
+
+
+@functools.cache
+def _requests(path: str) -> socket.socket:
+    """Start the process that forks, and return the socket on which it takes requests."""
+    # A fork whose parent has ended becomes a child of this process.
+    PRCTL(PR_SET_CHILD_SUBREAPER, 1)
+    requests, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with other:
+        subprocess.Popen(
+            [sys.executable, '-c', f'from {__name__} import serve; serve({other.fileno()})'],
+            env={**os.environ, 'PYTHONPATH': path},
+            cwd=Path(__file__).parents[2], stdin=subprocess.DEVNULL, start_new_session=True,
+            pass_fds=[other.fileno()])
+    return requests
+
+
+def fork(
+    command: Sequence[str], environment: Mapping[str, str], directory: Path,
+    streams: Sequence[int],
+) -> ForkedProcess:
+    """
+    Run a module.
+
+    :param command: its name and arguments.
+    :param environment: its environment; Python has read the variables PYTHON... before.
+    :param streams: descriptors of standard input, output and error.
+    """
+    request = json.dumps([command, {**environment}, str(directory)])
+    with _LOCK:
+        requests = _requests(environment['PYTHONPATH'])
+        socket.send_fds(requests, [request.encode()], streams)
+        return ForkedProcess(int(requests.recv(MAX_REQUEST)))
+
+
+def serve(descriptor: int) -> None:
+    """Take requests from a socket, and fork for each of them."""
+    for name in MODULES:
+        with contextlib.suppress(ModuleNotFoundError):
+            import_module(name)
+    gc.freeze()
+    requests = socket.socket(fileno=descriptor)
+    while True:
+        request, streams, _, _ = socket.recv_fds(requests, MAX_REQUEST, 3)
+        if not request:
+            return
+        if parent := os.fork():
+            os.waitpid(parent, 0)
+            for stream in streams:
+                os.close(stream)
+            continue
+        parent = os.getpid()
+        if os.fork():
+            os._exit(0)
+        while os.getppid() == parent:
+            time.sleep(0.001)
+        break
+    end_with_parent()
+    requests.send(str(os.getpid()).encode())
+    (module, *sys.argv[1:]), variables, directory = json.loads(request)
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+    os.closerange(3, max(*streams, requests.fileno()) + 1)
+    requests.detach()
+    # A stream remembers whether its descriptor can seek.
+    sys.stdin = os.fdopen(0, closefd=False)
+    sys.stdout = os.fdopen(1, 'w', closefd=False)
+    sys.stderr = os.fdopen(2, 'w', 1, errors='backslashreplace', closefd=False)
+    # Libraries would stop threads that only the server has.
+    LIBC.on_exit(LIBC._exit, None)
+    os.environ.clear()
+    os.environ.update(variables)
+    os.chdir(directory)
+    runpy.run_module(module, run_name='__main__', alter_sys=True)
