@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -95,7 +95,7 @@ def scenario(content: object, path: str, types: Types) -> Scenario:
     """Return the content of a file, checked; SettingError if a setting in it is wrong."""
     if not isinstance(content, Mapping):
         raise SettingError(f'{path}: it has no keys such as {types[0].plural}')
-    common = _read(content, ('url', *(one.plural for one in types)), path, types)
+    common = _read(_settings(content, ('url', *(one.plural for one in types)), path, types), types)
     listed = {one.noun: list(_listed(content.get(one.plural) or [], path, one))
               for one in types}
     return Scenario(str(content.get('url') or ''), common, listed)
@@ -108,43 +108,42 @@ def _listed(entries: object, path: str, kind: Type) -> Iterator[Listed]:
         place = f'{path}: {kind.noun} {number}'
         with _place(f'{place}: id'):
             where = address(str(one.get('id', '')))
-        settings = _read(one, ('id', 'name'), place, [kind])
+        settings = _read(_settings(one, ('id', 'name'), place, [kind]), [kind])
         yield Listed(where, str(one.get('name', '')), settings[kind.noun])
 
 
-def _read(
+def _settings(
     content: Mapping[str, object], others: tuple[str, ...], path: str, types: Types,
-) -> dict[str, dict[str, object]]:
-    """Return the settings for each type that has them; the key ``faults`` is a setting, too."""
-    result: dict[str, dict[str, object]] = {one.noun: {} for one in types}
+) -> Iterator[tuple[str, str, str]]:
+    """Return place, name and text of each setting; the key ``faults`` is a setting, too."""
+    known = dict.fromkeys(name for one in types for name in one.all_settings)
     for key, value in content.items():
         name = 'fault' if key == 'faults' else key
-        having = [one for one in types if name in one.all_settings and key != 'fault']
-        if not having and key not in others:
-            known = dict.fromkeys(name for one in types for name in one.all_settings)
+        if name in known and key != 'fault':
+            yield f'{path}: {key}', name, _as_text(value)
+        elif key not in others:
             raise SettingError(f'{path}: no setting {key!r}; there are '
                                + ', '.join([*others, *known]))
-        with _place(f'{path}: {key}'):
-            for noun, read in _readings(name, _as_text(value), having).items():
-                result[noun][name] = read
-    return result
 
 
-def _readings(name: str, text: str, types: Types) -> Values:
+def _read(settings: Iterable[tuple[str, str, str]], types: Types) -> Mapping[str, Values]:
     """
-    Return the value of a setting for each type that accepts it.
+    Return the values of settings for each type that accepts them, by its noun.
 
-    :raises ValueError: if none does: profiles and faults differ between types.
+    :param settings: place, name and text of each.
+    :raises SettingError: if no type accepts one: profiles and faults differ between types.
     """
-    result: dict[str, object] = {}
-    refusal: ValueError | None = None
-    for one in types:
-        try:
-            result[one.noun] = one.all_settings[name].read(text)
-        except ValueError as error:
-            refusal = refusal or error
-    if refusal is not None and not result:
-        raise refusal
+    result: dict[str, dict[str, object]] = {one.noun: {} for one in types}
+    for place, name, text in settings:
+        refusals = []
+        having = [one for one in types if name in one.all_settings]
+        for one in having:
+            try:
+                result[one.noun][name] = one.all_settings[name].read(text)
+            except ValueError as error:
+                refusals.append(error)
+        if len(refusals) == len(having):
+            raise SettingError(f'{place}: {refusals[0]}')
     return result
 
 
@@ -165,7 +164,10 @@ def components(
 
     :raises SettingError: if they contradict each other, or an option is wrong.
     """
-    given = _given(options, types)
+    given = _read((
+        (f'argument --{name.replace("_", "-")}', name, text) for name in dict.fromkeys(
+            name for one in types for name in one.all_settings)
+        if name != 'fault' and (text := getattr(options, name)) is not None), types)
     listed = {one.noun: _of_type(options, file, one, given[one.noun]) for one in types}
     everyone = [one for some in listed.values() for one in some]
     if len(everyone) > MAX_COMPONENTS:
@@ -187,19 +189,6 @@ def components(
             for fault in settings.get('fault', ()):
                 device.behave(device.faults.add(device.behaviour, fault), 0.0)
             result.append(Description(one.address, device, one.name, settings.get('seed', 0)))
-    return result
-
-
-def _given(options: argparse.Namespace, types: Types) -> Mapping[str, Values]:
-    """Return the settings that the command line has for all components of each type."""
-    result: dict[str, dict[str, object]] = {one.noun: {} for one in types}
-    for name in dict.fromkeys(name for one in types for name in one.all_settings):
-        if name == 'fault' or (text := getattr(options, name)) is None:
-            continue
-        with _place(f'argument --{name.replace("_", "-")}'):
-            having = [one for one in types if name in one.all_settings]
-            for noun, value in _readings(name, text, having).items():
-                result[noun][name] = value
     return result
 
 
@@ -248,10 +237,9 @@ def _faults(
             raise SettingError(f'--fault {text}: there is no {types[0].noun} {selected!r}')
         kinds = {kind.noun: kind for kind, _ in found}
         for name in names.split(','):
-            with _place('--fault'):
-                read = _readings('fault', name, list(kinds.values()))
+            read = _read([('--fault', 'fault', name)], list(kinds.values()))
             for kind, where in found:
-                result[where] += read.get(kind.noun, ())
+                result[where] += read[kind.noun].get('fault', ())
     return result
 
 
