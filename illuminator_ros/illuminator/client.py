@@ -50,6 +50,7 @@ class IlluminatorClient(Payload):
     :param wanted: returns whether a light at an address is of interest; others are ignored.
     :param needs_mounts: whether the messages for :attr:`mounts` are received.
     :ivar events: the events of all lights.
+    :ivar lights: the announced lights by address, in the order of their announcement.
     :ivar mounts: the directions of gimbals.
     :ivar mount_moved: takes the system id of each mount that sends its attitude.
     """
@@ -65,6 +66,7 @@ class IlluminatorClient(Payload):
         self.events: Listeners[AnyLightEvent] = Listeners()
         self._discovery = Discovery(
             self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
+        self.lights: Mapping[Address, Light] = self._discovery.devices
         self._messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic,
                           *(self.mounts.messages if needs_mounts else ()))
 
@@ -72,11 +74,6 @@ class IlluminatorClient(Payload):
     def messages(self) -> Sequence[type[Message]]:
         """See :attr:`Payload.messages`."""
         return self._messages
-
-    @property
-    def lights(self) -> Mapping[Address, Light]:
-        """Return the announced lights by address, in the order of their announcement."""
-        return self._discovery.devices
 
     @property
     def commanded_or_found(self) -> list[Light]:

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Container
+from dataclasses import dataclass, replace
 from enum import Enum
 import math
 
@@ -83,7 +83,7 @@ class Pending:
     :param due: when they are sent next, s.
     """
 
-    values: dict[str, object]
+    values: Changes
     origin: Origin
     due: float
     attempts: int = 0
@@ -206,16 +206,12 @@ class ConfigurationManager:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._want({**self._wanted, **values}, Origin.OVERRIDE, self._without_status(now))
+        self._want({**self._wanted, **values}, Origin.OVERRIDE,
+                   now if self.confirmed else now + STATUS_TIMEOUT)
 
     def _want(self, values: Changes, origin: Origin, due: float) -> None:
         """Have values sent; those that already wait keep their origin."""
-        self._pending = Pending(
-            dict(values), self._pending.origin if self._pending else origin, due)
-
-    def _without_status(self, now: float) -> float:
-        """Return when values are sent though no status has come, s."""
-        return now if self.confirmed else now + STATUS_TIMEOUT
+        self._pending = Pending(values, self._pending.origin if self._pending else origin, due)
 
     @property
     def _wanted(self) -> Changes:
@@ -231,11 +227,11 @@ class ConfigurationManager:
         self._setpoint = None
         self._queue.cancel(message, now)
 
-    def _drop_pending(self, names: Iterable[str]) -> None:
+    def _drop_pending(self, names: Container[str]) -> None:
         """Note that fields have another value by now, or must not be sent."""
         if self._pending:
-            for name in list(names):
-                self._pending.values.pop(name, None)
+            self._pending.values = {name: value for name, value in self._pending.values.items()
+                                    if name not in names}
             if not self._pending.values:
                 self._pending = None
 
@@ -262,7 +258,7 @@ class ConfigurationManager:
                 values = {**values, 'strobe_duty_cycle': DEFAULT_DUTY_CYCLE}
                 note = ('strobe_duty_cycle was 0 %, at which nothing strobes, and was set to '
                         f'{DEFAULT_DUTY_CYCLE:g} %')
-            goal = self._sendable(self.confirmed, values).with_changes(values)
+            goal = replace(self._sendable(self.confirmed, values), **values)
         # Here, since each command is made here: no way to the light passes around the limits.
         limited = self._safety.clipped(goal, self._limits)
         return Configure(limited, list(dict.fromkeys((*values, *goal.differences(limited)))),
@@ -284,7 +280,7 @@ class ConfigurationManager:
                     checked(name, getattr(confirmed, name), self._limits)
             except InvalidValue:
                 ruled_out[name] = getattr(reported, name)
-        return confirmed.with_changes(ruled_out)
+        return replace(confirmed, **ruled_out)
 
     def _submit(
         self, values: Changes, now: float, done: Done, *, is_stream: bool = False,
@@ -372,7 +368,7 @@ class ConfigurationManager:
             if self._pending:
                 self._pending.due = min(self._pending.due, now)
         elif self._pending and self._pending.origin is not Origin.OVERRIDE:
-            wanted = self.confirmed.with_changes(self._pending.values)
+            wanted = replace(self.confirmed, **self._pending.values)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
                 # It kept its configuration, or got it back from another sender.
                 self._pending = None
@@ -389,7 +385,7 @@ class ConfigurationManager:
         if status:
             reported = status.configuration(goal)
             far = goal.differences(reported)
-            goal = goal.with_changes({
+            goal = replace(goal, **{
                 name: getattr(reported, name)
                 for name in goal.differences(reported, step=False) if name not in far})
         self._unapplied, self.discrepancy = None, ''
@@ -425,7 +421,7 @@ class ConfigurationManager:
         if self._reassert and cause is events.Cause.LIGHT and self._undo_change(
                 status, confirmed, reported, now):
             return
-        self._adopt(confirmed.with_changes({name: getattr(reported, name) for name in names}),
+        self._adopt(replace(confirmed, **{name: getattr(reported, name) for name in names}),
                     cause, now)
 
     def _undo_change(
@@ -522,7 +518,7 @@ class ConfigurationManager:
             return
         if self.confirmed is None:
             pending.due += STATUS_TIMEOUT
-        for name, value in list(pending.values.items()):
+        for name, value in pending.values.items():
             try:
                 checked(name, value, self._limits)
             except InvalidValue as error:

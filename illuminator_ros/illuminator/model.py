@@ -150,10 +150,6 @@ class Configuration:
     strobe_period: float
     strobe_duty_cycle: float
 
-    def with_changes(self, changes: Changes) -> Configuration:
-        """Return this configuration with some of its fields, already checked, replaced."""
-        return replace(self, **changes)
-
     def params(self) -> tuple[float, float, float, float]:
         """
         Return param1 to param4 of the command.

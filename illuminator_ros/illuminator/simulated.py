@@ -225,9 +225,10 @@ class SimulatedIlluminator(SimulatedDevice):
         :raises InvalidValue: if the light cannot be set so.
         """
         self.warm(now)
-        configuration = self.configuration.with_changes({
-            name: model.checked(name, value, self.properties.limits)
-            for name, value in changes.items()})
+        limits = self.properties.limits
+        checked: model.Changes = {
+            name: model.checked(name, value, limits) for name, value in changes.items()}
+        configuration = replace(self.configuration, **checked)
 
         def change() -> None:
             if changes:

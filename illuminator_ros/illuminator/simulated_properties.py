@@ -97,14 +97,12 @@ class IlluminatorProperties:
     """
     The properties of a simulated light.
 
-    :param name: its name for people.
     :param modes: the modes that it can be configured to.
     :param mode_bitmask: as reported; None follows from the modes.
     :param shifted_bitmask: whether mode_bitmask then has 1 << mode for a mode, else the mode.
     :param status_interval: s between statuses by default; 0 sends none.
     :param time_scale: factor by which it heats and cools faster than real time.
     :param behaviour: how it behaves at first, and without faults.
-    :param seed: of its random numbers.
     """
 
     address: messages.Address = messages.Address(1, messages.MAV_COMP_ID_ILLUMINATOR)
@@ -117,9 +115,7 @@ class IlluminatorProperties:
     status_interval: float = 1.0
     thermal: ThermalProperties = ThermalProperties()
     time_scale: float = 1.0
-    name: str = ''
     behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
-    seed: int = 0
 
     @property
     def reported_bitmask(self) -> int:

@@ -346,6 +346,7 @@ def time_boot_ms(seconds: float) -> int:
     return int(seconds * 1000) & 0xFFFFFFFF
 
 
-def heartbeat(mav_type: int, *, state: int = MAV_STATE_ACTIVE) -> Heartbeat:
+def heartbeat(mav_type: int) -> Heartbeat:
     """Return the HEARTBEAT of a component that is not an autopilot (heartbeat protocol)."""
-    return Heartbeat(mav_type, MAV_AUTOPILOT_INVALID, 0, 0, state, MAVLINK_VERSION)
+    return Heartbeat(
+        mav_type, MAV_AUTOPILOT_INVALID, 0, 0, MAV_STATE_ACTIVE, MAVLINK_VERSION)

@@ -228,6 +228,7 @@ class Traffic:
 
     :param bytes_received: all, good or not.
     :param frames_dropped: those that found no room to go out.
+    :param received: bytes, and ``sent``, recently, as of the last snapshot.
     """
 
     bytes_received: int = 0
@@ -236,8 +237,8 @@ class Traffic:
     frames_dropped: int = 0
     sources: dict[Address, SequenceCounter] = field(default_factory=dict)
     _frames_of_others: int = 0
-    _in: WindowedCounter = WindowedCounter()
-    _out: WindowedCounter = WindowedCounter()
+    received: WindowedCounter = WindowedCounter()
+    sent: WindowedCounter = WindowedCounter()
 
     @property
     def frames_received(self) -> int:
@@ -245,20 +246,10 @@ class Traffic:
         return self._frames_of_others + sum(
             counter.received for counter in self.sources.values())
 
-    @property
-    def received_rate(self) -> float:
-        """Return the bytes received per second recently, as of the last sample."""
-        return self._in.rate
-
-    @property
-    def sent_rate(self) -> float:
-        """Return the bytes sent per second recently, as of the last sample."""
-        return self._out.rate
-
     def snapshot(self, now: float) -> Traffic:
         """Update the recent values and return a copy."""
-        self._in = self._in.sample(self.bytes_received, now)
-        self._out = self._out.sample(self.bytes_sent, now)
+        self.received = self.received.sample(self.bytes_received, now)
+        self.sent = self.sent.sample(self.bytes_sent, now)
         for counter in self.sources.values():
             counter.sample(now)
         return replace(self, sources={

@@ -344,10 +344,6 @@ class SimulatedComponent(Generic[D]):
         """Return whether it neither receives nor sends."""
         return now < self._silent_until
 
-    def interval(self, message_id: int) -> float:
-        """Return the interval of a streamed message, s, 0 for none."""
-        return self._streams[message_id].interval
-
     def apply(self, change: Change, now: float) -> None:
         """Make a change, by command or by hand, and send the streamed messages."""
         change()

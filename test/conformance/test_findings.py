@@ -106,7 +106,7 @@ def test_a_fault_fails_exactly_its_requirements(fault: str) -> None:
 @pytest.mark.parametrize('fault', RANDOM)
 @pytest.mark.parametrize('seed', range(3))
 def test_a_random_fault_fails_its_requirement(fault: str, seed: int) -> None:
-    run = Run(IlluminatorProperties(seed=seed), faults=(fault,)).finish()
+    run = Run(seed=seed, faults=(fault,)).finish()
     assert RANDOM[fault] in run.failed
 
 

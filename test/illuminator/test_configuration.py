@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from typing import Any
 
 from illuminator_ros.illuminator.configuration_manager import RESTORE_INTERVAL
@@ -182,7 +182,7 @@ def test_a_change_by_another_sender_is_followed_with_one_event_and_no_command(
         strobe.run(10.0)
     assert strobe.recorder.changes[1:] == ([(cause, change)] if cause else [])
     assert sent(strobe) == []
-    assert confirmed(strobe) == confirmed(strobe).with_changes(change)
+    assert confirmed(strobe) == replace(confirmed(strobe), **change)
 
 
 def test_the_next_command_builds_on_a_change_by_another_sender(

@@ -21,17 +21,18 @@ from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.faults import Behaviour
+from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
-from support.simulated_lights import simulated_lights
+from support.simulated_lights import describe
 
 
 class Console:
     """Two lights, ``bow`` and 1/244, and what a person types."""
 
     def __init__(self) -> None:
-        self.lights = simulated_lights([
-            IlluminatorProperties(address=Address(1, 243), name='bow'),
-            IlluminatorProperties(address=Address(1, 244))], 0.0)
+        self.lights = SimulatedComponents((
+            describe(IlluminatorProperties(address=Address(1, number)), name)
+            for number, name in ((243, 'bow'), (244, ''))), 0.0)
         self.bow, self.other = (one.device for one in self.lights.components)
         self.lights.poll(0.0)
         self.lights.outgoing.clear()

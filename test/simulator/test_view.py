@@ -35,8 +35,8 @@ from support.simulated_lights import describe
 Light = SimulatedComponent[SimulatedIlluminator]
 
 
-def simulated(**properties: Any) -> Light:
-    return SimulatedComponent(describe(IlluminatorProperties(**properties)), 0.0)
+def simulated(name: str = '', **properties: Any) -> Light:
+    return SimulatedComponent(describe(IlluminatorProperties(**properties), name), 0.0)
 
 
 @pytest.fixture

@@ -25,8 +25,9 @@ from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
+from illuminator_ros.payload.simulated import SimulatedComponents
 from support.checks_run import ChecksRun
-from support.simulated_lights import simulated_lights
+from support.simulated_lights import describe
 from support.virtual_link import START
 
 # s for which the lights have been on when a run begins.
@@ -39,16 +40,19 @@ class Run(ChecksRun):
 
     :param lights: the first is checked; default properties if there is none.
     :param faults: of the first light.
+    :param seed: of their random faults.
     :param options: of :class:`ChecksRun`; ``heat``, s at 100 %.
     """
 
     def __init__(
-        self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (), **options: Any,
+        self, *lights: IlluminatorProperties, faults: tuple[str, ...] = (), seed: int = 0,
+        **options: Any,
     ) -> None:
         first, *others = lights or [IlluminatorProperties()]
         for fault in faults:
             first = replace(first, behaviour=FAULTS.add(first.behaviour, fault))
-        self.lights = simulated_lights([first, *others], START - UPTIME)
+        self.lights = SimulatedComponents(
+            (describe(one, seed=seed) for one in (first, *others)), START - UPTIME)
         self.light = self.lights.components[0]
         super().__init__(CHECKS, self.lights, **options)
 

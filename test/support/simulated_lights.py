@@ -23,10 +23,11 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 
 
-def describe(properties: IlluminatorProperties) -> Description[SimulatedIlluminator]:
+def describe(
+    properties: IlluminatorProperties, name: str = '', seed: int = 0,
+) -> Description[SimulatedIlluminator]:
     """Return the simulated component that has these properties."""
-    return Description(properties.address, SimulatedIlluminator(properties), properties.name,
-                       properties.seed)
+    return Description(properties.address, SimulatedIlluminator(properties), name, seed)
 
 
 def simulated_lights(
