@@ -301,23 +301,16 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     assert rig.results[0].message.endswith('; 1/195 has control and must release it first')
 
 
-@pytest.mark.parametrize('ask', [
-    *(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi,
-    lambda gimbal, now, done: gimbal.set_roi(0, 0, 0, now, done)])
-def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(ask: Ask) -> None:
-    rig = Rig(FakeManager(primary=OTHER)).run(3.0)
+@pytest.mark.parametrize(('primary', 'reason'), [
+    (OTHER, 'primary 1/195, secondary none'),
+    (NONE, 'primary none, secondary none; take control first')])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
+def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(
+        ask: Ask, primary: mav.Address, reason: str) -> None:
+    rig = Rig(FakeManager(primary=primary)).run(3.0)
 
-    success, message = asked(rig, ask)
-
-    assert not success
-    assert message == 'no control of gimbal 1/154: primary 1/195, secondary none'
+    assert asked(rig, ask) == (False, f'no control of gimbal 1/154: {reason}')
     assert not {one.command for one in rig.managers[0].commands} & set(GimbalCommand)
-
-
-def test_request_while_no_component_has_control_tells_what_to_do() -> None:
-    assert asked(Rig(FakeManager()).run(3.0), Gimbal.clear_roi) == (
-        False,
-        'no control of gimbal 1/154: primary none, secondary none; take control first')
 
 
 @pytest.mark.parametrize('second', [2, 171])

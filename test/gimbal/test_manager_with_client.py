@@ -24,14 +24,13 @@ from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
-from illuminator_ros.gimbal.manager_control import ControlSettings, Role
+from illuminator_ros.gimbal.manager_control import Role
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import MavResult
-from illuminator_ros.payload.arbitration import Policy
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion
@@ -100,18 +99,12 @@ def test_a_setpoint_of_another_player_reaches_the_device_once() -> None:
     assert [euler(one) for one in rig.points(PILOT, 0.2)] == [(0.0, 0.2, 0.0)]
 
 
-@pytest.mark.parametrize(('policy', 'overrules', 'refused'), [
-    (Policy.HOLD, False, True), (Policy.HOLD, True, False), (Policy.TAKEOVER, False, False)])
-def test_ros_is_subject_to_the_policy(policy: Policy, overrules: bool, refused: bool) -> None:
-    rig = Rig(control=ControlSettings(
-        policy, overruling=frozenset({OURS} if overrules else ())))
-    assert rig.take(PILOT) is MavResult.ACCEPTED
+def test_ros_is_subject_to_the_policy() -> None:
+    rig = Rig()
+    rig.take(PILOT)
 
-    message = rig.ask(rig.gimbal.take_control)
-
-    assert bool(message) == refused
-    assert ('DENIED' in message) == refused
-    assert rig.manager.control.holder(Role.PRIMARY) == (PILOT if refused else OURS)
+    assert 'DENIED' in rig.ask(rig.gimbal.take_control)
+    assert rig.manager.control.holder(Role.PRIMARY) == PILOT
 
 
 def test_ros_keeps_control_without_heartbeats_on_the_link_and_others_are_denied() -> None:

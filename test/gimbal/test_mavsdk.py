@@ -145,12 +145,8 @@ def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None
 
 
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize('control', [
-    ControlSettings(Policy.TAKEOVER, lease=LEASE),
-    ControlSettings(overruling=frozenset({SECOND}), lease=LEASE)])
-def test_a_second_mavsdk_wins_under_takeover_or_when_it_overrules(
-        control: ControlSettings) -> None:
-    manager, _, vehicle = managed_vehicle(control, 0.0)
+def test_a_second_mavsdk_wins_under_takeover() -> None:
+    manager, _, vehicle = managed_vehicle(ControlSettings(Policy.TAKEOVER, lease=LEASE), 0.0)
     with served(vehicle) as port, player(FIRST, port) as first, player(SECOND, port) as second:
         for gimbal in (first, second):
             assert result(gimbal.take_control, GIMBAL, plugin.ControlMode.PRIMARY) == 'SUCCESS'

@@ -241,9 +241,3 @@ def test_a_person_sees_who_has_control() -> None:
         'roll    0.0  pitch    0.0  yaw    0.0 deg  primary 1/195, secondary 255/190')
     bench.command(ROI, 0, 0, 0, 0, 47.4, 8.545594, 488.0)
     assert bench.device.snapshot(bench.now).text.endswith('region of interest')
-
-
-@pytest.mark.parametrize('text', ['47,8', '91,0,0', 'a,b,c'])
-def test_a_wrong_position_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r'LAT,LON,ALT|outside|not a number'):
-        SIMULATED.settings['position'].read(text)
