@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from . import messages as rededge
@@ -98,7 +98,7 @@ class CameraSnapshot:
         return self.connected and self.unanswered_pings >= UNANSWERED_PINGS
 
 
-@dataclass
+@dataclass(frozen=True)
 class _PingRequest:
     since: float
     done: Done
@@ -109,7 +109,7 @@ class _PingRequest:
         return self.since + self.tries * PING_TIMEOUT
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Capture:
     sent_at: float
     done: Done
@@ -251,11 +251,11 @@ class Camera:
                 del self._pings[sequence]
                 self._unanswered_pings += 1
         for request in [one for one in self._ping_requests if now >= one.due]:
+            self._ping_requests.remove(request)
             if request.tries < PING_TRIES:
-                request.tries += 1
+                self._ping_requests.append(replace(request, tries=request.tries + 1))
                 self._send_ping(now)
             else:
-                self._ping_requests.remove(request)
                 request.done(False, f'no reply to {PING_TRIES} PINGs')
         if now >= self._ping_due:
             self._send_ping(now)
@@ -303,9 +303,9 @@ class Camera:
             # It may be the late answer to an earlier request.
             self._late.popleft()
             if self._capture is not None:
-                self._capture.ambiguous = True
+                self._capture = replace(self._capture, ambiguous=True)
         elif self._capture is not None and self._capture.index is None:
-            self._capture.index = index
+            self._capture = replace(self._capture, index=index)
 
     def _end_capture(self, success: bool, text: str) -> None:
         capture, self._capture = self._capture, None

@@ -121,38 +121,31 @@ def turns(
 
 # INFORMATION
 
-def information_static(cls: type[Message]) -> Requirement[GimbalTester]:
-    """Return the requirement that an INFORMATION message has static content."""
+def information(cls: type[Message]) -> tuple[Requirement[GimbalTester], ...]:
+    """Return the requirements on an INFORMATION message."""
     @requirement('information-static', f'sends the same {cls.name} at all times', PROPOSAL,
                  'Messaging (GM-10)')
-    async def check(tester: GimbalTester) -> None:
+    async def static(tester: GimbalTester) -> None:
         first, second = [await tester.session.required(cls) for _ in range(2)]
         # As text, since NaN is not equal to NaN.
         if str(Limits.from_message(first)) != str(Limits.from_message(second)):
             raise Failed('two requests returned different limits or capabilities')
-    return check
 
-
-def limits(cls: type[Message]) -> Requirement[GimbalTester]:
-    """Return the requirement on the ranges of an INFORMATION message."""
     @requirement('limits', 'reports a minimum that is at most the maximum of each axis',
                  MESSAGES, cls.name)
-    async def check(tester: GimbalTester) -> str:
+    async def limits(tester: GimbalTester) -> str:
         *ranges, _ = await tester.limits()
         if wrong := [f'{low:g} to {high:g} deg' for low, high in ranges if low > high]:
             raise Failed(', '.join(wrong))
         return ', '.join(f'{low:g} to {high:g}' for low, high in ranges) + ' deg'
-    return check
 
-
-def pitch_axis(cls: type[Message]) -> Requirement[GimbalTester]:
-    """Return the requirement on the smallest capability of a gimbal."""
     @requirement('pitch-axis', 'can turn about its pitch axis', PROPOSAL, 'Gimbals (GM-1)')
-    async def check(tester: GimbalTester) -> None:
+    async def pitch_axis(tester: GimbalTester) -> None:
         capabilities = (await tester.limits()).capabilities
         if not capabilities & Capabilities.HAS_PITCH_AXIS:
             raise Failed(f'{cls.name} has the capabilities 0x{capabilities:x}')
-    return check
+
+    return static, limits, pitch_axis
 
 
 def command_int(cls: type[Message]) -> Requirement[GimbalTester]:

@@ -21,6 +21,8 @@ with GIMBAL_MANAGER_STATUS and commands the device.
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+import contextlib
 import math
 
 from . import attitude
@@ -195,21 +197,26 @@ async def _point_others(tester: DeviceTester, pose: Pose) -> None:
 
 # Yaw relative to north
 
-async def _with_heading(tester: DeviceTester, heading: float) -> None:
+@contextlib.asynccontextmanager
+async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
+    """Send a heading of the vehicle meanwhile, degrees."""
     await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
     if any(not math.isnan(one.delta_yaw) for _, one in tester.session.idle(AttitudeStatus)):
         raise Skipped('another component sends it a heading')
     await tester.begin()
     tester.heading = heading
-    await tester.pause(2 * ANNOUNCE_INTERVAL)
+    try:
+        await tester.pause(2 * ANNOUNCE_INTERVAL)
+        yield
+    finally:
+        tester.heading = None
 
 
 @moves('earth-frame', 'takes and reports yaw relative to north (GM-2)', MESSAGES,
        'GIMBAL_DEVICE_SET_ATTITUDE')
 async def earth_frame(tester: DeviceTester) -> str:
     """Send a heading of 40 degrees, and command a yaw of 55 degrees."""
-    try:
-        await _with_heading(tester, 40.0)
+    async with _heading(tester, 40.0):
         await tester.point(Pose(0.0, -STEP, 40.0 + STEP),
                            flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
         target = Pose(0.0, -STEP, STEP)
@@ -219,8 +226,6 @@ async def earth_frame(tester: DeviceTester) -> str:
             raise Failed(f'commanded {40.0 + STEP:g} deg from north at a heading of 40 deg: it '
                          f'reports {pose}, {yaw:.1f} deg from north')
         return f'{yaw:.1f} deg from north'
-    finally:
-        tester.heading = None
 
 
 @moves('yaw-lock', 'holds a locked yaw against north while the vehicle turns (GM-3)', MESSAGES,
@@ -228,8 +233,7 @@ async def earth_frame(tester: DeviceTester) -> str:
 async def yaw_lock(tester: DeviceTester) -> str:
     """Lock it straight ahead, then turn the vehicle."""
     await tester.requires(Capabilities.HAS_YAW_LOCK)
-    try:
-        await _with_heading(tester, 40.0)
+    async with _heading(tester, 40.0):
         await tester.point(Pose(0.0, -STEP, 0.0),
                            flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
         await tester.pause(0.5)
@@ -239,8 +243,6 @@ async def yaw_lock(tester: DeviceTester) -> str:
         if not pose.near(target):
             raise Failed(f'the vehicle turned by {STEP:g} deg, and it reports {pose}')
         return str(pose)
-    finally:
-        tester.heading = None
 
 
 INFORMATION = gimbal.GimbalDeviceInformation
@@ -252,8 +254,7 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     component.sent_on_request('status-request', AttitudeStatus, MESSAGES, attitude.STATUS),
     attitude.failures_at_rest, north_needs_heading,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Device'),
-    attitude.information_static(INFORMATION), attitude.limits(INFORMATION),
-    attitude.pitch_axis(INFORMATION), device_id,
+    *attitude.information(INFORMATION), device_id,
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     reaches('setpoint', 'turns to an attitude that its manager commands', GIMBAL,

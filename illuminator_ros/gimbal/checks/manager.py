@@ -114,11 +114,7 @@ class ManagerTester(GimbalTester):
 
     async def control(self) -> Control:
         """Return who has control; raise Skipped if the manager does not report it."""
-        streamed = await self.session.receive_more(MANAGER_STATUS, 1.0)
-        message = streamed[-1][1] if streamed else await self.session.request(MANAGER_STATUS)
-        if message is None:
-            raise Skipped('it does not report who has control')
-        return control_of(message)
+        return control_of(await self.newest(MANAGER_STATUS, 'who has control'))
 
     async def configure(
         self, *values: float, sender: Address | None = None, device_id: float | None = None,
@@ -388,11 +384,9 @@ async def flags_shown(tester: ManagerTester) -> None:
     await tester.begin()
     await tester.point(None, flags=MountFlags.NEUTRAL | LEVEL)
     await tester.pause(0.5)
-    streamed = await tester.session.receive_more(MANAGER_STATUS, 1.0)
-    if not streamed:
-        raise Skipped('no GIMBAL_MANAGER_STATUS was received')
-    if not (flags := streamed[-1][1].flags) & MountFlags.NEUTRAL:
-        raise Failed(f'flags 0x{flags:x}')
+    status = await tester.newest(MANAGER_STATUS, 'its flags')
+    if not status.flags & MountFlags.NEUTRAL:
+        raise Failed(f'flags 0x{status.flags:x}')
 
 
 @moves('other-target', 'ignores setpoints and commands for other components', ROUTING,
@@ -442,8 +436,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     component.sent_on_request('status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.name),
     attitude.failures_at_rest,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Manager'),
-    attitude.information_static(INFORMATION), attitude.limits(INFORMATION),
-    attitude.pitch_axis(INFORMATION), same_device, attitude_stream,
+    *attitude.information(INFORMATION), same_device, attitude_stream,
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     take, release, unchanged, release_others, secondary, configure_values, one_player,

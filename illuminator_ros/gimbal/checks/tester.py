@@ -20,7 +20,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from .. import messages as gimbal
 from ..axes import LEVEL, Range, read_ranges
@@ -51,6 +51,7 @@ STEP = 15.0
 RATE = 6.0
 NAN = math.nan
 Control = tuple[Address, Address]
+M = TypeVar('M', bound=Message)
 
 
 @dataclass(frozen=True)
@@ -160,16 +161,25 @@ class GimbalTester(ABC):
 
     # Reports
 
+    async def newest(self, cls: type[M], what: str) -> M:
+        """
+        Return the next message of a stream, or one that is requested.
+
+        :raises Skipped: if the gimbal does not send it.
+        """
+        streamed = await self.session.receive_more(cls, 1.0)
+        message = streamed[-1][1] if streamed else await self.session.request(cls)
+        if message is None:
+            raise Skipped(f'it does not report {what}')
+        return message
+
     async def pose(self) -> Pose:
         """
         Return the present attitude.
 
         :raises Skipped: if the gimbal does not report one.
         """
-        streamed = await self.session.receive_more(AttitudeStatus, 1.0)
-        message = streamed[-1][1] if streamed else await self.session.request(AttitudeStatus)
-        if message is None:
-            raise Skipped('it does not report its attitude')
+        message = await self.newest(AttitudeStatus, 'its attitude')
         try:
             return Pose.from_message(message)
         except ValueError as error:
