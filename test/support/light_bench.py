@@ -40,13 +40,15 @@ class LightBench:
     """
 
     def __init__(
-        self, *faults: str, properties: IlluminatorProperties | None = None, **fields: Any,
+        self, *faults: str, properties: IlluminatorProperties | None = None, seed: int = 0,
+        **fields: Any,
     ) -> None:
         behaviour = fields.pop('behaviour', IlluminatorBehaviour())
         for fault in faults:
             behaviour = FAULTS.add(behaviour, fault)
         self.component: SimulatedComponent[SimulatedIlluminator] = SimulatedComponent(
-            describe(properties or IlluminatorProperties(behaviour=behaviour, **fields)), 0.0)
+            describe(properties or IlluminatorProperties(behaviour=behaviour, **fields),
+                     seed=seed), 0.0)
         self.lamp = self.component.device
         self.now = 0.0
         self.sent: list[tuple[float, Any]] = []
