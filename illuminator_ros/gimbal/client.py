@@ -174,7 +174,7 @@ class GimbalClient(Payload):
         if now < component.heard_at + FORGET_AFTER:
             return False
         del self._components[address]
-        self._queries.remove(address)
+        self._queries.set(address, math.inf)
         return True
 
     def _reopen(self, manager: Address, now: float) -> None:

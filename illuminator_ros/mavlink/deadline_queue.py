@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 import heapq
 import itertools
 import math
@@ -31,9 +31,13 @@ class DeadlineQueue(Generic[K]):
 
     Postponing, which every heartbeat does, costs next to nothing: the entry in the heap stays
     and is looked at again when its old time comes.
+
+    :param deadline_of: returns the deadline of a key that was noted by :meth:`changed`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, deadline_of: Callable[[K], float] = lambda key: math.inf) -> None:
+        self._deadline_of = deadline_of
+        self._changed: set[K] = set()
         self._deadlines: dict[K, float] = {}
         self._heap: list[tuple[float, int, K]] = []
         # The earliest entry of each key in the heap.
@@ -42,14 +46,16 @@ class DeadlineQueue(Generic[K]):
 
     def set(self, key: K, deadline: float) -> None:  # noqa: A003
         """Set the deadline of a key, infinity for none."""
+        if deadline == math.inf:
+            self._deadlines.pop(key, None)
+            return
         self._deadlines[key] = deadline
         if deadline < self._entered.get(key, math.inf):
             self._enter(key, deadline)
 
-    def remove(self, key: K) -> None:
-        """Forget a key, if it is known."""
-        self._deadlines.pop(key, None)
-        self._entered.pop(key, None)
+    def changed(self, key: K) -> None:
+        """Note that the deadline of a key may have changed; it is asked for when it is needed."""
+        self._changed.add(key)
 
     def _enter(self, key: K, deadline: float) -> None:
         self._entered[key] = deadline
@@ -57,6 +63,9 @@ class DeadlineQueue(Generic[K]):
 
     def next_deadline(self) -> float:
         """Return the earliest deadline, infinity if there is none."""
+        while self._changed:
+            key = self._changed.pop()
+            self.set(key, self._deadline_of(key))
         while self._heap:
             entered, _, key = self._heap[0]
             deadline = self._deadlines.get(key, math.inf)

@@ -77,6 +77,7 @@ class Discovery(Generic[D]):
     :param wanted: returns whether a device at an address is of interest; others are ignored.
     :ivar devices: the announced devices, by address, in the order of their announcement.
     :ivar ignored: the first devices that are not wanted, by address.
+    :ivar changed: must be called with the address of a device whose deadline may have changed.
     :ivar limit_reached: whether more than :data:`MAX_DEVICES` have been heard.
     """
 
@@ -96,9 +97,8 @@ class Discovery(Generic[D]):
         self._wanted = wanted
         self._candidates: dict[Address, D] = {}
         self._found_at: dict[Address, float] = {}
-        self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
-        # Devices whose deadline may have changed.
-        self._changed: set[Address] = set()
+        self._deadlines: DeadlineQueue[Address] = DeadlineQueue(self._deadline_of)
+        self.changed = self._deadlines.changed
 
     def __iter__(self) -> Iterator[D]:
         """Return the devices and the candidates."""
@@ -152,18 +152,14 @@ class Discovery(Generic[D]):
             device = self.devices[address] = self._candidates.pop(address)
             self._found(device, now)
 
-    def changed(self, address: Address) -> None:
-        """Note that the deadline of a device may have changed."""
-        self._changed.add(address)
-
     def _forgotten_at(self, device: D) -> float:
         return math.inf if device.was_commanded else device.lost_at + FORGET_AFTER
 
     def _drop(self, address: Address, now: float) -> None:
         self._found_at.pop(address, None)
-        self._deadlines.remove(address)
         self._candidates.pop(address, None)
         device = self.devices.pop(address, None)
+        self.changed(address)
         self._commands.end_all(now, CommandStatus.CANCELLED, address)
         if device is not None:
             self.limit_reached = False
@@ -171,7 +167,6 @@ class Discovery(Generic[D]):
 
     def poll(self, now: float) -> None:
         """Poll the devices that have something to do, and forget silent ones."""
-        self._enter_deadlines()
         for address in self._deadlines.due(now):
             device = self.get(address)
             if device is None:
@@ -184,13 +179,9 @@ class Discovery(Generic[D]):
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
-        self._enter_deadlines()
         return self._deadlines.next_deadline()
 
-    def _enter_deadlines(self) -> None:
-        for address in self._changed:
-            device = self.get(address)
-            if device is not None:
-                self._deadlines.set(
-                    address, min(device.next_deadline(), self._forgotten_at(device)))
-        self._changed.clear()
+    def _deadline_of(self, address: Address) -> float:
+        device = self.get(address)
+        return math.inf if device is None else min(
+            device.next_deadline(), self._forgotten_at(device))

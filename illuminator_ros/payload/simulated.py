@@ -541,12 +541,12 @@ class SimulatedComponents(Endpoint, Generic[D]):
         super().__init__()
         self.new_peers: Listeners[Address] = Listeners()
         self._peers: set[Address] = set()
-        self._deadlines: DeadlineQueue[int] = DeadlineQueue()
-        # Indexes of the components whose deadline is entered when the next one is asked for.
-        self._changed: set[int] = set()
+        # By index of the component.
+        self._deadlines: DeadlineQueue[int] = DeadlineQueue(
+            lambda index: self.components[index].next_deadline())
         self.components = [
             SimulatedComponent(one, now, self.outgoing,
-                               functools.partial(self._changed.add, index))
+                               functools.partial(self._deadlines.changed, index))
             for index, one in enumerate(described)]
         self.sends = tuple(dict.fromkeys(
             cls for one in self.components for cls in one.device.sends))
@@ -569,16 +569,9 @@ class SimulatedComponents(Endpoint, Generic[D]):
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        self._enter_deadlines()
         for index in self._deadlines.due(now):
             self.components[index].poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
-        self._enter_deadlines()
         return self._deadlines.next_deadline()
-
-    def _enter_deadlines(self) -> None:
-        while self._changed:
-            index = self._changed.pop()
-            self._deadlines.set(index, self.components[index].next_deadline())

@@ -22,22 +22,21 @@ from illuminator_ros.mavlink.deadline_queue import DeadlineQueue
 
 TIMES = st.integers(0, 20)
 KEYS = st.integers(0, 4)
-STEPS = st.lists(st.tuples(st.just('set'), KEYS, TIMES | st.just(math.inf))
-                 | st.tuples(st.just('due'), KEYS, TIMES)
-                 | st.tuples(st.just('remove'), KEYS, TIMES), max_size=60)
+STEPS = st.lists(st.tuples(st.sampled_from(['set', 'changed']), KEYS, TIMES | st.just(math.inf))
+                 | st.tuples(st.just('due'), KEYS, TIMES), max_size=60)
 
 
 @given(STEPS)
 def test_queue_agrees_with_search_over_all_deadlines(steps: list[tuple[str, int, float]]) -> None:
-    queue: DeadlineQueue[int] = DeadlineQueue()
     deadlines: dict[int, float] = {}
+    queue = DeadlineQueue(deadlines.__getitem__)
     for kind, key, moment in steps:
         if kind == 'set':
             queue.set(key, moment)
             deadlines[key] = moment
-        elif kind == 'remove':
-            queue.remove(key)
-            deadlines.pop(key, None)
+        elif kind == 'changed':
+            deadlines[key] = moment
+            queue.changed(key)
         else:
             assert sorted(queue.due(moment)) == sorted(
                 key for key, deadline in deadlines.items() if deadline <= moment)
