@@ -394,16 +394,7 @@ class Gimbal:
     def take_control(self, now: float, done: request.Done) -> None:
         """Take primary control; a success only if GIMBAL_MANAGER_STATUS shows it."""
         self.was_commanded = True
-        self._take_control(now, done)
-
-    def _take_control(self, now: float, done: request.Done) -> None:
-        def ended(result: request.Result, now: float) -> None:
-            if result.success and not self.enforces_control:
-                result = replace(result, message=f'{result.message}; ArduPilot also obeys '
-                                 'components without control')
-            done(result, now)
-
-        self._configure(True, now, ended)
+        self._configure(True, now, done)
 
     def release_control(self, now: float, done: request.Done) -> None:
         """Release control; a success only if GIMBAL_MANAGER_STATUS shows it."""
@@ -423,6 +414,9 @@ class Gimbal:
             if result.success and self._control is None:
                 result = request.Result(False, f'{result.message}; a manager without '
                                         'GIMBAL_MANAGER_STATUS does not show who has control')
+            elif result.success and take and not self.enforces_control:
+                result = replace(result, message=f'{result.message}; ArduPilot also obeys '
+                                 'components without control')
             done(result, now)
 
         manager = self._active
@@ -431,7 +425,7 @@ class Gimbal:
         elif self._control is not None and (
                 self.in_control if take else not self.has_any_control):
             state = 'in control already' if take else 'not in control'
-            done(request.Result(True, f'{state}: {self._control}'), now)
+            ended(request.Result(True, f'{state}: {self._control}'), now)
         else:
             change = Configure(self._commands.address, self.key.device_id, take)
             manager.requests.submit(_request(
@@ -684,7 +678,7 @@ class Gimbal:
         if self._may_take and self._control is not None:
             self._may_take = False
             if self._control.primary is None:
-                self._take_control(now, self._taken_automatically)
+                self._configure(True, now, self._taken_automatically)
         if manager.status_query.take(now):
             manager.target.request_status(now)
         if self._identity_query.take(now):
