@@ -26,11 +26,16 @@ from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.gimbal.manager_setpoint import Demand
 from illuminator_ros.gimbal.messages import GimbalCommand
-from illuminator_ros.mavlink.messages import Address, CommandLong
+from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags
-from illuminator_ros.payload.simulated import Description, SimulatedComponents, SimulatedType
+from illuminator_ros.payload.simulated import (
+    CommandReply,
+    Description,
+    SimulatedComponents,
+    SimulatedType,
+)
 import pytest
 from support.checks_run import ChecksRun
 from support.virtual_link import START
@@ -184,6 +189,16 @@ def _forgets_at_minus_1(one: ChecksRun) -> None:
     one.device.execute = execute
 
 
+def _accepts_what_it_ignores(one: ChecksRun) -> None:
+    original = one.device.execute
+
+    def execute(source: Address, command: Any, now: float) -> Any:
+        reply = original(source, command, now)
+        denied = reply is not None and reply.result == MavResult.DENIED
+        return CommandReply(MavResult.ACCEPTED) if denied else reply
+    one.device.execute = execute
+
+
 def _silent_at(param: float) -> Callable[[ChecksRun], None]:
     def seed(one: ChecksRun) -> None:
         original = one.device.receive
@@ -209,6 +224,7 @@ DEVIATIONS = {
     ('gimbal_manager', 'pitch-axis'): _changed(gimbal.GimbalManagerInformation, cap_flags=256),
     ('gimbal_manager', 'unchanged'): _forgets_at_minus_1,
     ('gimbal_manager', 'all-devices'): _silent_at(0),
+    ('gimbal_manager', 'no-control-command'): _accepts_what_it_ignores,
 }
 
 
