@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.illuminator.events import Cause
+from illuminator_ros.illuminator.events import AddressShared, AnyLightEvent, Cause, StatusReceived
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.illuminator.status_tracker import AddressConflict
@@ -76,6 +76,29 @@ def test_parameters_move_once_at_most_and_nothing_is_sent_while_lights_differ(
     assert pair.snapshot.configuration == agreed
     pair.close()
     assert not pair.snapshot.shared_address
+
+
+def test_a_status_is_published_before_it_shows_that_an_address_is_shared_and_an_event_tells_it(
+) -> None:
+    pair, _ = two(enable=1, brightness=40.0)
+    events: list[tuple[type[AnyLightEvent], bool]] = []
+
+    def note(event: AnyLightEvent) -> None:
+        if isinstance(event, AddressShared):
+            events.append((AddressShared, event.shared))
+        elif isinstance(event, StatusReceived):
+            # The comparison with earlier statuses would delay the topics.
+            events.append((StatusReceived, pair.snapshot.shared_address))
+
+    pair.controller.events.subscribe(note)
+    pair.settle(6.0)
+    pair.configure(brightness=70.0)
+    pair.enable(True)
+    pair.run(6.0)
+    assert list(dict.fromkeys(events)) == [
+        (StatusReceived, False), (AddressShared, True), (StatusReceived, True),
+        (AddressShared, False)]
+    assert [kind for kind, _ in events].count(AddressShared) == 2
 
 
 def test_lights_with_different_clocks_do_not_look_restarted() -> None:

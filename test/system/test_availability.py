@@ -28,7 +28,7 @@ from std_srvs.srv import SetBool
 from support.light import MavResult, ON_OFF, ServedLight
 from support.processes import environment, prepare_child
 from support.recording import Call
-from support.ros import bridge_arguments, Parameters, Ros, running_bridge
+from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until
 from support.waiting import eventually, PATIENCE
 
@@ -78,8 +78,9 @@ def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
 def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
         bridge.wait_for('connected')
-        clients = [own_ros.node.create_client(SetBool, '/illuminator/enable')
-                   for _ in range(50)]
+        # Each client is sent the answers to all, and keeps ten of them by default.
+        clients = [own_ros.node.create_client(
+            SetBool, '/illuminator/enable', qos_profile=STREAM) for _ in range(50)]
         eventually(lambda: all(client.service_is_ready() for client in clients))
         own_ros.catch_up()
         light.fake.results[ON_OFF] = None
