@@ -27,7 +27,7 @@ demo: environment
 	@$(PYTHON_IN_VENV) demo/run.py
 
 test: check
-	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile $(TESTS)
+	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \

@@ -14,9 +14,17 @@
 
 """Settings of all tests."""
 
+from __future__ import annotations
+
 from hypothesis import HealthCheck, settings
+import pytest
 
 # How long an example takes is a matter of the machine, and of what else runs on it.
 settings.register_profile(
     'steady', deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('steady')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the folders of the longest tests: at the end, one would run alone."""
+    items.sort(key=lambda item: item.path.parent.name not in ('lint', 'system'))

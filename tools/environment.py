@@ -42,7 +42,7 @@ VERSIONS = ((3, 12), (3, 11), (3, 10), (3, 13))
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
 # rich, 14 MB with what it brings, draws the monitor; nothing else needs it.
 PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'rich>=13.3']
-TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.5', 'hypothesis>=6.100',
+TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.8', 'hypothesis>=6.100',
         'pyyaml>=6', 'wheel>=0.38', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
         'catkin_pkg>=0.5', 'scipy>=1.10']
 # ROS's linters, which a ROS installation has, and the plugins for flake8 that rosdep and setup-ros

@@ -19,12 +19,11 @@ import json
 from pathlib import Path
 import re
 import signal
-import sys
 from xml.etree import ElementTree
 
 import pytest
 from support.ports import free_port
-from support.processes import Program, run
+from support.processes import Program, python, run
 from support.terminals import Terminal
 from support.waiting import eventually
 
@@ -32,12 +31,6 @@ Start = Callable[..., Program]
 
 CONFORMANCE = 'support.quick_conformance'
 
-# Started like this, a program can import only what `pip install` brings.
-WITHOUT_ROS = (
-    'import sys, support.no_ros\n'
-    'sys.modules.update(dict.fromkeys(["yaml", "serial"]))\n'
-    'from {0} import main\n'
-    'sys.exit(main(sys.argv[1:]))\n')
 # Would keep the light at 100 % for an hour.
 LONG = ('--yes', '--only', 'brightness', '--only', 'thermal-flags', '--heat', '3600')
 
@@ -49,12 +42,11 @@ def url() -> str:
 
 @pytest.fixture
 def start() -> Iterator[Start]:
-    """Return a function that starts a program without ROS, until the test ends."""
+    """Return a function that starts a program, which is ended with the test."""
     started = []
 
-    def one(module: str, *arguments: str, **env: str) -> Program:
-        started.append(Program(
-            sys.executable, '-c', WITHOUT_ROS.format(module), *arguments, env=env))
+    def one(module: str, *arguments: str) -> Program:
+        started.append(python(module, *arguments))
         return started[-1]
 
     yield one
@@ -65,8 +57,8 @@ def start() -> Iterator[Start]:
 @pytest.fixture
 def simulate(start: Start, url: str) -> Start:
     """Return a function that starts a simulator on the URL."""
-    def one(*arguments: str, **env: str) -> Program:
-        program = start('illuminator_ros.simulator', f'udpin://{url}', *arguments, **env)
+    def one(*arguments: str) -> Program:
+        program = start('illuminator_ros.simulator', f'udpin://{url}', *arguments)
         program.wait_for('link open')
         return program
     return one

@@ -17,7 +17,6 @@
 from pathlib import Path
 import re
 import shlex
-import subprocess
 
 from illuminator_ros import __version__
 from illuminator_ros.cli.simulator.options import parser
@@ -155,15 +154,15 @@ def test_missing_package_is_one_line_with_its_remedy_and_status_1(
     command: str, package: str, remedy: str, tmp_path: Path,
 ) -> None:
     name, *arguments = command.split()
-    outcome = run_without(package, tmp_path, name, *arguments)
+    outcome = run(f'illuminator_ros.{name}', *arguments, env=lacking(package, tmp_path))
 
     assert (outcome.returncode, outcome.stderr) == (
         1, f'{name}: {package} is not installed: {remedy}\n')
 
 
-@pytest.mark.parametrize('unbuffered', ['', '1'])
-@pytest.mark.parametrize('option', ['--help', '--version'])
-@pytest.mark.parametrize('program', ['bridge', 'simulator', 'conformance', 'monitor'])
+@pytest.mark.parametrize(('program', 'option', 'unbuffered'), [
+    *((program, '--help', '') for program in ('bridge', 'simulator', 'conformance', 'monitor')),
+    ('bridge', '--version', ''), ('simulator', '--version', '1'), ('monitor', '--help', '1')])
 def test_help_that_cannot_be_written_is_one_line_with_status_1(
     program: str, option: str, unbuffered: str,
 ) -> None:
@@ -192,14 +191,22 @@ def test_an_abbreviated_option_is_refused_with_status_2(program: str, option: st
     assert option in outcome.stderr
 
 
-def test_simulator_needs_no_ros(tmp_path: Path) -> None:
-    assert run_without('rclpy', tmp_path, 'simulator', '--version').returncode == 0
+@pytest.mark.parametrize(('name', 'output'), [
+    ('simulator', 'link open'), ('conformance --wait 0.1', 'no light was heard within')])
+def test_tool_for_makers_of_lights_needs_only_what_pip_installs(
+    tmp_path: Path, name: str, output: str,
+) -> None:
+    name, *arguments = name.split()
+    program = python(f'illuminator_ros.{name}', f'udpin://127.0.0.1:{free_port()}', *arguments,
+                     env=lacking('rclpy std_msgs yaml serial', tmp_path))
+    try:
+        program.wait_for(output)
+    finally:
+        program.kill()
 
 
-def run_without(
-    package: str, directory: Path, name: str, *arguments: str,
-) -> subprocess.CompletedProcess[str]:
-    """Run a program on a machine that lacks a package."""
-    (directory / 'sitecustomize.py').write_text(f'import sys\nsys.modules[{package!r}] = None\n')
-    return run(f'illuminator_ros.{name}', *arguments,
-               env={'PYTHONPATH': f'{directory}:{ROOT}'})
+def lacking(packages: str, directory: Path) -> dict[str, str]:
+    """Return the environment of a program on a machine that lacks packages."""
+    (directory / 'sitecustomize.py').write_text(
+        f'import sys\nsys.modules.update(dict.fromkeys({packages.split()}))\n')
+    return {'PYTHONPATH': f'{directory}:{ROOT}'}

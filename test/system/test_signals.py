@@ -124,7 +124,7 @@ def simulator_starting(ros: Ros, port: int, node: str) -> Iterator[Program]:
 
 @pytest.mark.parametrize('number', SIGNALS, ids=lambda number: number.name)
 @pytest.mark.parametrize(('moment', 'count', 'longest'), [
-    (bridge_starting, 6, 0.5), (bridge_in_a_command, 4, 0.3), (simulator_starting, 4, 0.3),
+    (bridge_starting, 4, 0.5), (bridge_in_a_command, 3, 0.3), (simulator_starting, 3, 0.3),
 ], ids=lambda value: getattr(value, '__name__', None) or f'up to {value}')
 def test_program_ends_with_status_0_and_without_a_traceback(
     ros: Ros, moment: Moment, count: int, longest: float, number: signal.Signals,
@@ -160,7 +160,7 @@ def test_node_leaves_the_graph_at_once_and_further_signals_change_nothing(
         program.send(number)
 
     # A participant that only fell silent would be listed until its lease ends.
-    eventually(lambda: 'leaving' not in ros.node.get_node_names(), within=LEASE / 2)
+    eventually(lambda: 'leaving' not in ros.node.get_node_names(), within=0.9 * LEASE)
     assert (program.wait(), 'Traceback' in program.log) == (0, False)
 
 
