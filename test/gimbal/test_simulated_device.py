@@ -16,9 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 from illuminator_ros.gimbal import messages as gimbal
+from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags
 from illuminator_ros.gimbal.simulated_device import (
     GimbalBehaviour,
@@ -85,26 +87,58 @@ class Bench:
         return tuple(round(math.degrees(angle), 3) + 0.0 for angle in euler)
 
 
-def test_a_setpoint_is_approached_at_the_rate_of_the_axes_and_kept() -> None:
-    bench = Bench(axis_rate=10.0)
-    bench.point(0.0, -45.0, -30.0)
-    assert bench.angles(1.0) == (0.0, -10.0, -10.0)
-    assert bench.angles(3.0) == (0.0, -40.0, -30.0)
-    assert bench.angles(10.0) == (0.0, -45.0, -30.0)
-    assert bench.after(1.0).angular_velocity_y == 0.0
+# What is done, for how many seconds, and the angles then, degrees.
+Step = tuple[Callable[[Bench], object] | None, float, tuple[float, ...]]
+VEHICLE = YawFrame.VEHICLE.flag
 
 
-def test_a_rate_turns_until_it_is_zero_and_an_unset_setpoint_changes_nothing() -> None:
-    bench = Bench()
-    bench.point(rates=(NAN, -math.radians(10.0), math.radians(5.0)))
-    assert bench.after(1.0).angular_velocity_y == pytest.approx(-math.radians(10.0))
-    bench.point(rates=(NAN, 0.0, NAN))
-    held = bench.angles()
-    assert held == (0.0, -10.0, 5.0)
-    bench.point()
-    assert bench.angles(5.0) == held
-    bench.point(0.0, -30.0, 5.0, rates=(NAN, math.radians(2.0), NAN))
-    assert bench.angles(5.0) == (0.0, -20.0, 5.0)
+def to(*degrees: float, flags: int = FOLLOW | VEHICLE, rate: float = NAN) -> (
+        Callable[[Bench], object]):
+    """Return what points it, or turns its pitch, degrees."""
+    return lambda bench: bench.point(*degrees, flags=flags, rates=(NAN, math.radians(rate), NAN))
+
+
+def pitch_vehicle(bench: Bench) -> None:
+    q = Quaternion.from_euler(0.0, math.radians(20.0), 0.0)
+    bench.give(gimbal.AutopilotStateForGimbalDevice(
+        1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0))
+
+
+MOTIONS: dict[str, tuple[dict[str, object], list[Step]]] = {
+    'an attitude is approached at the rate of the axes, and kept': ({'axis_rate': 10.0}, [
+        (to(0, -45, -30), 1, (0, -10, -10)), (None, 3, (0, -40, -30)), (None, 10, (0, -45, -30))]),
+    'a rate turns until it is zero, an unset setpoint changes nothing': ({}, [
+        (to(rate=-10), 1, (0, -10, 0)), (to(rate=0), 1, (0, -10, 0)), (to(), 5, (0, -10, 0))]),
+    'a rate beside an angle is that of the approach': ({}, [
+        (to(0, -30, 5, rate=2), 5, (0, -10, 5))]),
+    'a rate leaves the end of a range at once': ({}, [
+        (to(rate=57), 10, (0, 45, 0)), (None, 10, (0, 45, 0)), (to(rate=-10), 1, (0, 35, 0))]),
+    'a yaw without a stop takes the shorter way': ({'yaw_range': Range(-math.pi, math.pi)}, [
+        (to(0, 0, 170), 10, (0, 0, 170)), (to(0, 0, -170), 0.1, (0, 0, 176))]),
+    'a locked pitch is held against the horizon': ({}, [
+        (to(0, -10, 0), 1, (0, -10, 0)), (pitch_vehicle, 1, (0, -10, 0))]),
+    'a pitch without a lock follows the vehicle': ({}, [
+        (to(0, -10, 0, flags=MountFlags.ROLL_LOCK | VEHICLE), 1, (0, -10, 0)),
+        (pitch_vehicle, 1, (0, 10, 0))]),
+    'NEUTRAL takes precedence over the attitude': ({}, [
+        (to(0, -20, 30), 2, (0, -20, 30)),
+        (to(0, -20, 30, flags=MountFlags.NEUTRAL | VEHICLE), 2, (0, 0, 0))]),
+    'RETRACT takes precedence over NEUTRAL': ({}, [
+        (to(flags=MountFlags.RETRACT | MountFlags.NEUTRAL | VEHICLE), 2, (0, 45, 0))]),
+}
+
+
+@pytest.mark.parametrize('case', MOTIONS)
+def test_it_moves_as_its_setpoint_says(case: str) -> None:
+    settings, steps = MOTIONS[case]
+    bench = Bench(announced=True, **settings)
+    for do, seconds, angles in steps:
+        if do is not None:
+            do(bench)
+        _, before, _ = bench.angles()
+        assert bench.angles(seconds) == angles
+        assert bench.after(0.0).angular_velocity_y == pytest.approx(
+            math.radians(angles[1] - before) / seconds)
 
 
 @pytest.mark.parametrize(('degrees', 'reached', 'flag'), [
@@ -119,24 +153,6 @@ def test_an_axis_stops_at_the_end_of_its_range_and_reports_it(
     assert bench.after(0.1).failure_flags == flag
     bench.point(0.0, 0.0, 0.0)
     assert bench.after(4.0).failure_flags == 0
-
-
-def test_a_rate_leaves_the_end_of_a_range_at_once() -> None:
-    bench = Bench()
-    bench.point(rates=(NAN, 1.0, NAN))
-    for _ in range(20):
-        bench.after(0.5)
-    bench.point(rates=(NAN, math.radians(-10.0), NAN))
-    assert bench.angles(1.0) == (0.0, 35.0, 0.0)
-
-
-def test_yaw_without_a_stop_takes_the_shorter_way() -> None:
-    bench = Bench(yaw_range=SIMULATED.settings['yaw_range'].read('-180,180'))
-    bench.point(0.0, 0.0, 170.0)
-    bench.after(10.0)
-    bench.point(0.0, 0.0, -170.0)
-    assert bench.angles(0.1) == (0.0, 0.0, 176.0)
-    assert bench.device.mount.motion.mechanics.capabilities & Capabilities.SUPPORTS_INFINITE_YAW
 
 
 # Its manager
@@ -236,30 +252,6 @@ def test_gm_2_the_frame_of_the_number_and_the_mode_of_the_axis_are_independent(
     assert bench.angles(1.0) == (0.0, -20.0, 30.0 if lock == LOCK else 40.0)
 
 
-@pytest.mark.parametrize(('flags', 'pitch'), [(FOLLOW, -10.0), (MountFlags.ROLL_LOCK, 10.0)])
-def test_pitch_is_held_against_the_horizon_or_follows_the_vehicle(
-        flags: MountFlags, pitch: float) -> None:
-    bench = Bench()
-    bench.point(0.0, -10.0, 0.0, flags=flags | YawFrame.VEHICLE.flag)
-    q = Quaternion.from_euler(0.0, math.radians(20.0), 0.0)
-    bench.give(gimbal.AutopilotStateForGimbalDevice(
-        1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0))
-    assert bench.angles(1.0) == (0.0, pitch, 0.0)
-
-
-@pytest.mark.parametrize(('flags', 'degrees'), [
-    (MountFlags.RETRACT | MountFlags.NEUTRAL, (0.0, 45.0, 0.0)),
-    (MountFlags.NEUTRAL, (0.0, 0.0, 0.0))])
-def test_retract_and_neutral_take_precedence_over_the_attitude(
-        flags: MountFlags, degrees: tuple[float, ...]) -> None:
-    bench = Bench()
-    bench.point(0.0, -20.0, 30.0)
-    bench.after(2.0)
-    bench.point(0.0, -20.0, 30.0, flags=flags | YawFrame.VEHICLE.flag)
-    assert bench.after(2.0).flags & 3 == flags
-    assert bench.angles() == degrees
-
-
 def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
     lacks = SIMULATED.settings['lacks'].read('has_yaw_axis, HAS_YAW_LOCK')
     bench = Bench(lacks=lacks)
@@ -289,6 +281,11 @@ def test_a_person_turns_it_and_reads_its_state() -> None:
 def test_a_wrong_setting_is_refused_with_the_reason(name: str, text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         SIMULATED.settings[name].read(text)
+
+
+def test_a_yaw_without_a_stop_is_offered() -> None:
+    mechanics = Bench(yaw_range=Range(-math.pi, math.pi)).device.properties.mechanics
+    assert mechanics.capabilities & Capabilities.SUPPORTS_INFINITE_YAW
 
 
 def test_without_settings_it_is_the_gimbal_of_the_properties() -> None:
