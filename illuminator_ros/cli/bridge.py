@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING
 
 from .entry_point import one_line, print_output, run_program
 from .payloads import PAYLOADS
+from .postponed_imports import postponed_imports
 from .termination import Termination
 from ..payload.payload_type import PayloadType
 
@@ -168,37 +169,38 @@ def _serve(
 ) -> int:
     import gc
 
-    import rclpy
-    from rclpy.signals import SignalHandlerOptions
+    with postponed_imports():
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
 
-    from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
+        from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
 
-    # From here on the ROS graph has to be left in order, so a signal only has effect later.
-    termination.calls(lambda: None)
-    if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or _log_directory_refusal():
-        return executable.refuse(refusal)
-    _limit_memory()
-    # On a terminal rcutils colours its lines; its stderr is a pipe.
-    if termination.is_terminal:
-        os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
-    try:
-        rclpy.init(
-            args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = PayloadNode(executable.payload)
-        # Other participants discover the node while all this is imported.
-        from ..ros.bridge import Bridge
-        from ..ros.parameters import ParameterError
-        executable.load()
-    except Exception as error:
-        # rclpy has an exception of its own for each thing that can be wrong with an argument.
-        return executable.refuse(_start_failure(error, 'wrong ROS arguments'))
-    try:
-        bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
-    except ParameterError as error:
-        return executable.refuse(f'parameter {error}')
-    except Exception as error:
-        # Such as two topics with one name.
-        return executable.refuse(_start_failure(error, 'cannot create the node'))
+        # From here on the ROS graph has to be left in order, so a signal only has effect later.
+        termination.calls(lambda: None)
+        if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or _log_directory_refusal():
+            return executable.refuse(refusal)
+        _limit_memory()
+        # On a terminal rcutils colours its lines; its stderr is a pipe.
+        if termination.is_terminal:
+            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
+        try:
+            rclpy.init(
+                args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+            node = PayloadNode(executable.payload)
+            # Other participants discover the node while all this is imported.
+            from ..ros.bridge import Bridge
+            from ..ros.parameters import ParameterError
+            executable.load()
+        except Exception as error:
+            # rclpy has an exception of its own for each thing that can be wrong with an argument.
+            return executable.refuse(_start_failure(error, 'wrong ROS arguments'))
+        try:
+            bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
+        except ParameterError as error:
+            return executable.refuse(f'parameter {error}')
+        except Exception as error:
+            # Such as two topics with one name.
+            return executable.refuse(_start_failure(error, 'cannot create the node'))
     # Existing objects stay: a collector that visits them would only delay answers.
     gc.freeze()
     termination.calls(bridge.end)

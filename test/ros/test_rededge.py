@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator
 import contextlib
 import itertools
 import math
+from pathlib import Path
 import random
 import threading
 from typing import Any
@@ -194,6 +195,11 @@ def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) ->
         pass_time_until(lambda: all(one.answered for one in silent), step=0.25)
         assert [(one.result().success, one.result().message) for one in silent] == [
             (False, 'no reply to 2 PINGs'), (False, 'no answer to DIGICAM_CONTROL within 5.00 s')]
+
+
+def test_first_image_does_not_wait_for_an_import(own_ros: Ros) -> None:
+    with running_camera() as camera, running_node(own_ros, camera) as node:
+        assert '/numpy/' in Path(f'/proc/{node.pid}/maps').read_text()
 
 
 def test_fixed_mount_is_set_at_run_time_and_gives_way_to_the_topic_re_23_re_27(

@@ -103,6 +103,8 @@ class CameraNode(ServedPayload):
                 RequestService('capture_panel', Trigger, self._capture(Shot.PANEL))),
             commands=subscriptions(host.node, host.link, client.feeder))
         self._interface.publish('connected', False)
+        # The first one imports numpy, which takes too long for the link's thread.
+        NavSatFix()
         self._parameters = DeviceParameters(host.node, MOUNT_PARAMETERS)
         given = self._parameters.overrides()
         angles = {spec.name: spec.check(given.get(spec.name, spec.default))
