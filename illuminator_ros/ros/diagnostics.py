@@ -178,16 +178,19 @@ def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
             'to this address or line')
 
 
-def link_findings(
-    link: LinkSnapshot, device: Address | None, *, what: str, absence: str, started: float,
-) -> list[Finding]:
+def link_report(
+    link: LinkSnapshot, device: Address | None, *, kind: str, absence: str, started: float,
+    count: int | None = None, limit_reached: bool = False,
+) -> Report:
     """
-    Return the findings on the link, as seen by the node of one device.
+    Return the status of the link, as seen by the node of one device.
 
     :param device: the device of the node, None if there is none yet.
-    :param what: the kind of device, such as ``light``.
+    :param kind: of device, such as ``light``.
     :param absence: why there is none, for people.
     :param started: when the node was started, s.
+    :param count: how many devices of this kind are known, None where there is one at most.
+    :param limit_reached: whether there are more, which are ignored.
     """
     findings: list[Finding] = []
     if not link.state.is_open:
@@ -198,25 +201,16 @@ def link_findings(
     if device is None:
         findings.append((
             ERROR if waited > DISCOVERY_GRACE else WARN,
-            f'no {what} connected for {format_seconds(waited)}'
+            f'no {kind} connected for {format_seconds(waited)}'
             + (f': {absence}' if link.state.is_open else '')))
     if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
-    loss = link.devices.get(device, {}).get('loss_percent') if device else None
+    own = link.devices.get(device, {}) if device else {}
+    loss = own.get('loss_percent')
     if isinstance(loss, float) and loss > LOSS_WARNING:
         findings.append((WARN, f'{loss:.0f} % of the frames lost'))
-    return findings
-
-
-def link_report(
-    link: LinkSnapshot, device: Address | None, findings: Sequence[Finding],
-    more: Mapping[str, Value],
-) -> Report:
-    """
-    Return the status of the link, as seen by the node of one device.
-
-    :param more: values of the payload.
-    """
-    own = link.devices.get(device, {}) if device else {}
+    if limit_reached:
+        findings.append((WARN, f'more than {count} {kind}s, some ignored'))
+    known = {} if count is None else {f'{kind}s': count}
     return Report('link', str(link.values['url']), findings, f'open: {link.state.name}',
-                  lambda: {**link.values, **more, **own})
+                  lambda: {**link.values, **known, **own})

@@ -65,12 +65,9 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     """
     manager = gimbal.managers[0] if gimbal else None
-    findings = diagnostics.link_findings(
-        link, manager, what='gimbal', absence=why_no_gimbal(link, heard, known),
-        started=started)
-    if limit_reached:
-        findings.append((diagnostics.WARN, f'more than {len(heard)} gimbals, some ignored'))
-    made = [diagnostics.link_report(link, manager, findings, {'gimbals': len(heard)})]
+    made = [diagnostics.link_report(
+        link, manager, kind='gimbal', absence=why_no_gimbal(link, heard, known), started=started,
+        count=len(heard), limit_reached=limit_reached)]
     if gimbal is not None:
         fine = 'in control' if gimbal.in_control else 'connected'
         hardware_id = (f'{gimbal.identity.uid:x}' if gimbal.identity and gimbal.identity.uid else

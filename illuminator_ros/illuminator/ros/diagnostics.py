@@ -119,14 +119,17 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     :param mount_absence: why the direction of its gimbal is not known, '' if it is.
     """
-    address = light.address if light else None
-    findings = diagnostics.link_findings(
-        link, address, what='light', absence=why_no_light(link, heard), started=started)
-    if heard.limit_reached:
-        findings.append((diagnostics.WARN, f'more than {heard.count} lights, some ignored'))
-    made = [diagnostics.link_report(link, address, findings, {'lights': heard.count})]
+    made = [diagnostics.link_report(
+        link, light.address if light else None, kind='light', absence=why_no_light(link, heard),
+        started=started, count=heard.count, limit_reached=heard.limit_reached)]
     if light is not None and hardware_id:
-        made.append(lamp_report(light, hardware_id, link.taken_at, mount_absence))
+        on = light.status.enabled if light.status else None
+        findings = lamp_findings(light, link.taken_at)
+        if mount_absence:
+            findings.append((diagnostics.WARN, mount_absence))
+        made.append(diagnostics.Report(
+            'lamp', hardware_id, findings, {True: 'on', False: 'off', None: 'connected'}[on],
+            lambda: _lamp_values(light, link.taken_at)))
     return made
 
 
@@ -152,19 +155,6 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]
     if light.discrepancy:
         findings.append((diagnostics.WARN, light.discrepancy))
     return findings
-
-
-def lamp_report(
-    light: LightSnapshot, hardware_id: str, now: float, mount_absence: str = '',
-) -> diagnostics.Report:
-    """Return the report on a light."""
-    on = light.status.enabled if light.status else None
-    fine = {True: 'on', False: 'off', None: 'connected'}[on]
-    findings = lamp_findings(light, now)
-    if mount_absence:
-        findings.append((diagnostics.WARN, mount_absence))
-    return diagnostics.Report('lamp', hardware_id, findings, fine,
-                              lambda: _lamp_values(light, now))
 
 
 def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Value]:

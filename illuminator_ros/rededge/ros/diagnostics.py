@@ -27,7 +27,6 @@ from ...mavlink.command_sender import format_seconds
 from ...ros.diagnostics import (
     ERROR,
     Finding,
-    link_findings,
     link_report,
     LinkSnapshot,
     Report,
@@ -52,8 +51,7 @@ def reports(
     address = client.camera.address
     absence = link.state.failure or (
         f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "a camera")}')
-    findings = link_findings(link, address, what='camera', absence=absence, started=started)
-    return [link_report(link, address, findings, {}),
+    return [link_report(link, address, kind='camera', absence=absence, started=started),
             _camera_report(client, link.taken_at, geoid_is_known)]
 
 
