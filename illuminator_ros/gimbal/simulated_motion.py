@@ -118,8 +118,7 @@ class _Axis:
         """Approach a goal, rad, for some time."""
         within = goal if endless else span.clip(goal)
         error = wrapped(within - self.angle) if endless else within - self.angle
-        # A target that turns is followed at its rate.
-        step = math.copysign(min(abs(error), max(self.speed, abs(self.rate)) * seconds), error)
+        step = math.copysign(min(abs(error), self.speed * seconds), error)
         self.velocity = step / seconds
         self.angle = wrapped(self.angle + step) if endless else self.angle + step
         self.stopped = within != goal and abs(within - self.angle) < RESOLUTION
@@ -231,11 +230,13 @@ class GimbalMotion:
         references, capabilities = self._references(now), self.mechanics.capabilities
         for name, axis, span, reference, has_axis in zip(
                 AXES, self._axes, self.mechanics.ranges, references, HAS_AXIS, strict=True):
-            axis.target += axis.rate * seconds
+            turned = axis.rate * seconds
+            axis.target += turned
             goal = axis.target + reference
             if name == 'yaw':
                 # An angle is within a turn of the stops, a rate goes on from where it is.
-                goal = axis.angle + wrapped(goal - axis.angle) if axis.rate else wrapped(goal)
+                ahead = axis.angle + turned
+                goal = ahead + wrapped(goal - ahead) if axis.rate else wrapped(goal)
             if name == self._frozen_axis or not capabilities & has_axis:
                 goal = axis.angle
             axis.advance(seconds, goal, span if self._limited else NO_STOPS,

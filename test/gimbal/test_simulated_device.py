@@ -92,10 +92,11 @@ Step = tuple[Callable[[Bench], object] | None, float, tuple[float, ...]]
 VEHICLE = YawFrame.VEHICLE.flag
 
 
-def to(*degrees: float, flags: int = FOLLOW | VEHICLE, rate: float = NAN) -> (
-        Callable[[Bench], object]):
-    """Return what points it, or turns its pitch, degrees."""
-    return lambda bench: bench.point(*degrees, flags=flags, rates=(NAN, math.radians(rate), NAN))
+def to(*degrees: float, flags: int = FOLLOW | VEHICLE, rate: float = NAN,
+       yaw_rate: float = NAN) -> Callable[[Bench], object]:
+    """Return what points it, or turns pitch or yaw, degrees."""
+    rates = NAN, math.radians(rate), math.radians(yaw_rate)
+    return lambda bench: bench.point(*degrees, flags=flags, rates=rates)
 
 
 def pitch_vehicle(bench: Bench) -> None:
@@ -113,6 +114,11 @@ MOTIONS: dict[str, tuple[dict[str, object], list[Step]]] = {
         (to(0, -30, 5, rate=2), 5, (0, -10, 5))]),
     'a rate leaves the end of a range at once': ({}, [
         (to(rate=57), 10, (0, 45, 0)), (None, 10, (0, 45, 0)), (to(rate=-10), 1, (0, 35, 0))]),
+    'a yaw that is driven against its stop stays there': ({}, [
+        (to(yaw_rate=50), 3, (0, 0, 150)), (None, 4, (0, 0, 170)),
+        *[(None, 1, (0, 0, 170))] * 7]),
+    'an unset setpoint ends a motion': ({}, [
+        (to(0, -45, 0), 0.5, (0, -30, 0)), (to(), 1, (0, -30, 0))]),
     'a yaw without a stop takes the shorter way': ({'yaw_range': Range(-math.pi, math.pi)}, [
         (to(0, 0, 170), 10, (0, 0, 170)), (to(0, 0, -170), 0.1, (0, 0, 176))]),
     'a locked pitch is held against the horizon': ({}, [
@@ -123,6 +129,9 @@ MOTIONS: dict[str, tuple[dict[str, object], list[Step]]] = {
     'NEUTRAL takes precedence over the attitude': ({}, [
         (to(0, -20, 30), 2, (0, -20, 30)),
         (to(0, -20, 30, flags=MountFlags.NEUTRAL | VEHICLE), 2, (0, 0, 0))]),
+    'NEUTRAL is relative to the vehicle, whatever the yaw frame': ({}, [
+        (to(0, -20, 30), 2, (0, -20, 30)), (lambda bench: bench.heading(40.0), 0.1, (0, -20, 30)),
+        (to(flags=MountFlags.NEUTRAL | YawFrame.EARTH.flag), 1, (0, 0, 0))]),
     'RETRACT takes precedence over NEUTRAL': ({}, [
         (to(flags=MountFlags.RETRACT | MountFlags.NEUTRAL | VEHICLE), 2, (0, 45, 0))]),
 }

@@ -145,6 +145,10 @@ def test_gm_9_secondary_control_adds_limited_angles() -> None:
     assert bench.angles() == (0.0, -35.0, 30.0)
     bench.point(0.0, -40.0, 0.0)
     assert bench.angles() == (0.0, -40.0, 0.0)
+    # The next player in primary control has set no angles yet.
+    bench.take(OTHER, PLAYER)
+    bench.point(0.0, -5.0, 5.0)
+    assert bench.angles() == (0.0, -5.0, 5.0)
 
 
 # Setpoints
