@@ -24,7 +24,7 @@ from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from support.ports import free_port
-from support.processes import ended, python, ROOT, run
+from support.processes import python, ROOT, run
 
 PROGRAMS = ('bridge', 'simulator', 'monitor')
 ROS_REMEDY = 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"'
@@ -133,13 +133,6 @@ def test_wrong_argument_is_one_line_with_status_2(
     assert line.startswith(f'{name}: ')
     assert text.replace('KEYS', str(tmp_path)) in line
     assert (outcome.returncode, outcome.stdout) == (2, '')
-
-
-def test_bridge_takes_the_url_as_its_argument(domain: int) -> None:
-    port = free_port()
-    with ended(python('illuminator_ros.bridge', f'udpin://127.0.0.1:{port}',
-                      env={'ROS_DOMAIN_ID': str(domain)})) as bridge:
-        bridge.wait_for(f'link open: udp 127.0.0.1:{port}')
 
 
 @pytest.mark.parametrize(('command', 'package', 'remedy'), [
