@@ -87,7 +87,7 @@ class Bench:
         return tuple(round(math.degrees(angle), 3) + 0.0 for angle in euler)
 
 
-# What is done, for how many seconds, and the angles then, degrees.
+# An action, the seconds after it, and the angles then, degrees.
 Step = tuple[Callable[[Bench], object] | None, float, tuple[float, ...]]
 VEHICLE = YawFrame.VEHICLE.flag
 
@@ -110,7 +110,7 @@ MOTIONS: dict[str, tuple[dict[str, object], list[Step]]] = {
         (to(0, -45, -30), 1, (0, -10, -10)), (None, 3, (0, -40, -30)), (None, 10, (0, -45, -30))]),
     'a rate turns until it is zero, an unset setpoint changes nothing': ({}, [
         (to(rate=-10), 1, (0, -10, 0)), (to(rate=0), 1, (0, -10, 0)), (to(), 5, (0, -10, 0))]),
-    'a rate beside an angle is that of the approach': ({}, [
+    'a rate beside an angle limits the approach': ({}, [
         (to(0, -30, 5, rate=2), 5, (0, -10, 5))]),
     'a rate leaves the end of a range at once': ({}, [
         (to(rate=57), 10, (0, 45, 0)), (None, 10, (0, 45, 0)), (to(rate=-10), 1, (0, 35, 0))]),

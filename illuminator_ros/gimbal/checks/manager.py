@@ -459,7 +459,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     reaches('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
             PITCHYAW_COMMAND, lambda tester, pose: tester.pitchyaw(pose.pitch, NAN, NAN, NAN),
             yaw=0.0),
-    # The full rate is open.
+    # A fifth of the full rate.
     turns('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
           'Manual Gimbal Control using MAVLink', lambda tester, speed: tester.send(
               gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0), -2.0,

@@ -163,7 +163,7 @@ class GimbalTester(ABC):
 
     async def newest(self, cls: type[M], what: str) -> M:
         """
-        Return the next message of a stream, or one that is requested.
+        Return the next message of a stream, or else request it.
 
         :raises Skipped: if the gimbal does not send it.
         """
