@@ -45,6 +45,8 @@ PRCTL = LIBC.prctl
 PR_SET_PDEATHSIG = 1
 PR_SET_CHILD_SUBREAPER = 36
 _LOCK = threading.Lock()
+# Here and not when they are needed: tests count the descriptors that are left open.
+_REQUESTS, _SERVER_END = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 MAX_REQUEST = 1 << 17
 MODULES = (
     'illuminator_ros.cli.bridge', 'illuminator_ros.cli.conformance.run',
@@ -101,18 +103,16 @@ class ForkedProcess:
 
 
 @functools.cache
-def _requests(path: str) -> socket.socket:
-    """Start the process that forks, and return the socket on which it takes requests."""
+def _start(path: str) -> None:
+    """Start the process that forks."""
     # A fork whose parent has ended becomes a child of this process.
     PRCTL(PR_SET_CHILD_SUBREAPER, 1)
-    requests, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    with other:
-        subprocess.Popen(
-            [sys.executable, '-c', f'from {__name__} import serve; serve({other.fileno()})'],
-            env={**os.environ, 'PYTHONPATH': path},
-            cwd=Path(__file__).parents[2], stdin=subprocess.DEVNULL, start_new_session=True,
-            pass_fds=[other.fileno()])
-    return requests
+    number = _SERVER_END.fileno()
+    subprocess.Popen(
+        [sys.executable, '-c', f'from {__name__} import serve; serve({number})'],
+        env={**os.environ, 'PYTHONPATH': path}, cwd=Path(__file__).parents[2],
+        stdin=subprocess.DEVNULL, start_new_session=True, pass_fds=[number])
+    _SERVER_END.close()
 
 
 def fork(
@@ -128,9 +128,9 @@ def fork(
     """
     request = json.dumps([command, {**environment}, str(directory)])
     with _LOCK:
-        requests = _requests(environment['PYTHONPATH'])
-        socket.send_fds(requests, [request.encode()], streams)
-        return ForkedProcess(int(requests.recv(MAX_REQUEST)))
+        _start(environment['PYTHONPATH'])
+        socket.send_fds(_REQUESTS, [request.encode()], streams)
+        return ForkedProcess(int(_REQUESTS.recv(MAX_REQUEST)))
 
 
 def serve(descriptor: int) -> None:
@@ -161,7 +161,8 @@ def serve(descriptor: int) -> None:
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
     os.closerange(3, max(*streams, requests.fileno()) + 1)
-    requests.detach()
+    for one in (requests, _REQUESTS, _SERVER_END):
+        one.detach()
     # A stream remembers whether its descriptor can seek.
     sys.stdin = os.fdopen(0, closefd=False)
     sys.stdout = os.fdopen(1, 'w', closefd=False)
