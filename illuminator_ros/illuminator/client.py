@@ -67,13 +67,8 @@ class IlluminatorClient(Payload):
         self._discovery = Discovery(
             self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
         self.lights: Mapping[Address, Light] = self._discovery.devices
-        self._messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic,
-                          *(self.mounts.messages if needs_mounts else ()))
-
-    @property
-    def messages(self) -> Sequence[type[Message]]:
-        """See :attr:`Payload.messages`."""
-        return self._messages
+        self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic,
+                         *(self.mounts.messages if needs_mounts else ()))
 
     @property
     def commanded_or_found(self) -> list[Light]:

@@ -20,7 +20,6 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 import math
-from typing import Protocol
 
 from .command_receiver import AnyCommand, CommandReceiver
 from .command_sender import CommandSender, CommandStatus
@@ -42,11 +41,9 @@ HEARTBEAT_INTERVAL = 1.0
 CONFLICT_MEMORY = 10.0
 
 
-class Endpoint(ABC):
+class MessageHandler(ABC):
     """
     One side of a protocol, without I/O; times are s on the link's clock.
-
-    A :class:`~.link.Link` calls it from its thread only and sends what it leaves in ``outgoing``.
 
     :ivar messages: the classes of the messages that it receives; the link decodes no others.
     :ivar sends: the classes of messages that it sends; those that it also receives, and those of
@@ -54,20 +51,13 @@ class Endpoint(ABC):
     :ivar streams: groups of classes of messages that newer ones replace, the most urgent first. A
         group is sent as one when the line has room, and dropped where it has none for
         :data:`~.conflating_queue.MAX_AGE`; all other messages are sent at once.
-    :ivar inspect: looks at the frame of a message, of this class, before that is received.
-    :ivar outgoing: messages to send, each with the address that sends it.
     """
 
     messages: Sequence[type[Message]]
     sends: Sequence[type[Message]] = ()
     streams: Sequence[StreamGroup] = ()
-    inspect: Callable[[Frame, type[Message]], None] | None = None
 
-    def __init__(self) -> None:
-        self.outgoing: deque[tuple[Address, Message]] = deque()
-
-    @abstractmethod
-    def link_opened(self, now: float) -> None:
+    def link_opened(self, now: float) -> None:  # noqa: B027 - optional
         """
         Note that messages can be sent, or that a new peer may receive them.
 
@@ -81,45 +71,41 @@ class Endpoint(ABC):
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Receive a message of one of the classes of ``messages``."""
 
-    @abstractmethod
-    def poll(self, now: float) -> None:
+    def poll(self, now: float) -> None:  # noqa: B027 - optional
         """Do everything that is due."""
 
-    @abstractmethod
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
+        return math.inf
 
 
-class Payload(Protocol):
+class Endpoint(MessageHandler):
+    """
+    The handler of all messages of a link.
+
+    A :class:`~.link.Link` calls it from its thread only and sends what it leaves in ``outgoing``.
+
+    :ivar inspect: looks at the frame of a message, of this class, before that is received.
+    :ivar outgoing: messages to send, each with the address that sends it.
+    """
+
+    inspect: Callable[[Frame, type[Message]], None] | None = None
+
+    def __init__(self) -> None:
+        self.outgoing: deque[tuple[Address, Message]] = deque()
+
+
+class Payload(MessageHandler):
     """
     A part of a component: the client of a light, a winch, a camera ...
 
-    :ivar messages: the classes of the messages that it receives, HEARTBEAT included if needed.
-        Commands are executed if COMMAND_LONG and COMMAND_INT are among them.
-    :ivar sends: the classes of messages that it sends, and ``streams``: see :class:`Endpoint`.
+    HEARTBEAT is among its ``messages`` if it needs that; commands are executed if COMMAND_LONG
+    and COMMAND_INT are. It receives no messages from the component's own address. When the link
+    is closed all its commands have ended.
     """
 
-    sends: Sequence[type[Message]] = ()
-    streams: Sequence[StreamGroup] = ()
-
-    @property
-    def messages(self) -> Sequence[type[Message]]:
-        """See above."""
-
-    def link_opened(self, now: float) -> None:
-        """See :meth:`Endpoint.link_opened`."""
-        return
-
-    def link_closed(self, now: float, reason: str) -> None:
-        """See :meth:`Endpoint.link_closed`; all commands have ended by then."""
-        return
-
-    def receive(self, source: Address, message: Message, now: float) -> None:
-        """Receive a message from another address, of one of the classes of ``messages``."""
-
-    def receive_conflicting(self, message: Message, now: float) -> None:
+    def receive_conflicting(self, message: Message, now: float) -> None:  # noqa: B027 - optional
         """Receive a message, of one of these classes, of another sender with our address."""
-        return
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """
@@ -128,14 +114,6 @@ class Payload(Protocol):
         :return: None if the payload does not support it; another payload may.
         """
         return None
-
-    def poll(self, now: float) -> None:
-        """Do everything that is due."""
-        return
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
-        return math.inf
 
 
 class HeartbeatTimer:
