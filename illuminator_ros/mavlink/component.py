@@ -118,18 +118,18 @@ class Payload(MessageHandler):
 
 class HeartbeatTimer:
     """
-    The heartbeat of one component (heartbeat protocol).
+    The heartbeat of one component on an open link (heartbeat protocol).
 
     It must be sent before anything else: routers forward nothing to a component that they have
     not heard.
 
-    :ivar due: when the next one is sent, s.
+    :ivar due: when the next one is sent, s; infinity before the first and after :meth:`stop`.
     """
 
     def __init__(self, address: Address, mav_type: int) -> None:
         self.address = address
         self.mav_type = mav_type
-        self.due = 0.0
+        self.due = math.inf
 
     def poll(self, now: float, outgoing: deque[tuple[Address, Message]]) -> None:
         """Send a heartbeat if one is due."""
@@ -140,6 +140,10 @@ class HeartbeatTimer:
         """Send a heartbeat now; the next is due an interval later."""
         outgoing.append((self.address, heartbeat(self.mav_type)))
         self.due = now + HEARTBEAT_INTERVAL
+
+    def stop(self) -> None:
+        """Send none until the next :meth:`send`: the link is closed."""
+        self.due = math.inf
 
 
 class Component(Endpoint):
@@ -168,7 +172,6 @@ class Component(Endpoint):
                            for cls in self.messages}
         self._received = CommandReceiver(self.address)
         self._heartbeat = HeartbeatTimer(self.address, mav_type)
-        self._link_open = False
         self._conflict_at = -math.inf
 
     def address_conflict(self, now: float) -> bool:
@@ -177,14 +180,13 @@ class Component(Endpoint):
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
-        self._link_open = True
         self._heartbeat.send(now, self.outgoing)
         for payload in self._payloads:
             payload.link_opened(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Endpoint.link_closed`."""
-        self._link_open = False
+        self._heartbeat.stop()
         self.commands.end_all(now, CommandStatus.LINK_LOST)
         for payload in self._payloads:
             payload.link_closed(now, reason)
@@ -221,8 +223,7 @@ class Component(Endpoint):
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        if self._link_open:
-            self._heartbeat.poll(now, self.outgoing)
+        self._heartbeat.poll(now, self.outgoing)
         if now >= self.commands.next_deadline():
             self.commands.poll(now)
         for payload in self._payloads:
@@ -230,6 +231,5 @@ class Component(Endpoint):
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
-        heartbeat = self._heartbeat.due if self._link_open else math.inf
-        return min(heartbeat, self.commands.next_deadline(),
+        return min(self._heartbeat.due, self.commands.next_deadline(),
                    *(payload.next_deadline() for payload in self._payloads))

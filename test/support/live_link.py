@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
 import os
 import threading
 import time
@@ -67,7 +66,7 @@ class Talker(Endpoint):
         self.greetings.append(now)
 
     def link_closed(self, now: float, reason: str) -> None:
-        self.heartbeat.due = math.inf
+        self.heartbeat.stop()
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         self.heard.append((source, message))

@@ -353,18 +353,16 @@ class Session(Endpoint):
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
         self._heartbeat = HeartbeatTimer(address, messages.MavType.GCS)
-        self._open = False
 
     # The endpoint
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
-        self._open = True
         self._heartbeat.send(now, self.outgoing)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Endpoint.link_closed`."""
-        self._open = False
+        self._heartbeat.stop()
 
     def inspect(self, frame: Frame, cls: type[Message]) -> None:
         """See :class:`Endpoint`."""
@@ -412,13 +410,12 @@ class Session(Endpoint):
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
         self._at(now)
-        if self._open:
-            self._heartbeat.poll(now, self.outgoing)
+        self._heartbeat.poll(now, self.outgoing)
         self.runner.advance(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
-        return min(self._heartbeat.due if self._open else math.inf, self.runner.next_deadline())
+        return min(self._heartbeat.due, self.runner.next_deadline())
 
     def interrupt(self, now: float) -> None:
         """End the run, unless it restores the device."""
