@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import math
 from typing import Any, TypeVar
 
@@ -415,8 +415,8 @@ class Gimbal:
                 result = request.Result(False, f'{result.message}; a manager without '
                                         'GIMBAL_MANAGER_STATUS does not show who has control')
             elif result.success and take and not self.enforces_control:
-                result = replace(result, message=f'{result.message}; ArduPilot also obeys '
-                                 'components without control')
+                result = result._replace(
+                    message=f'{result.message}; ArduPilot also obeys components without control')
             done(result, now)
 
         manager = self._active
@@ -444,8 +444,8 @@ class Gimbal:
                     f'{"this node" if self.in_control else "no component"} has control: the log '
                     'of the manager may have the reason')
                 answer = result.message.removeprefix('refused: ')
-                result = replace(
-                    result, message=f'manager {manager} refused "{goal}": {answer}; {advice}')
+                result = result._replace(
+                    message=f'manager {manager} refused "{goal}": {answer}; {advice}')
             done(result, now)
 
         return ended

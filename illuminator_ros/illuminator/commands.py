@@ -25,8 +25,8 @@ CONFIRMED = 'confirmed by ILLUMINATOR_STATUS'
 
 
 def _despite_heat(status: Status) -> str:
-    dimmed = ' and '.join(flag_names(status.error_flags & DIMMING_FLAGS))
-    return CONFIRMED + (f', but {dimmed}' if dimmed else '')
+    dimming = status.error_flags & DIMMING_FLAGS
+    return f'{CONFIRMED}, but {" and ".join(flag_names(dimming))}' if dimming else CONFIRMED
 
 
 def _with_flags(shown: str, status: Status) -> str:

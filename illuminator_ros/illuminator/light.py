@@ -389,10 +389,12 @@ class Light:
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
         self.note_request(now)
+        self._changed(self, now)
+        if not self._sources.are_ranked:
+            return ''
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.claim(source, now), now)
         self._sources.remember(source, enabled=enabled, brightness=brightness)
-        self._changed(self, now)
         return self._sources.refusal(source)
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
@@ -466,7 +468,6 @@ class Light:
             self._switching.submit(request, now)
         else:
             self._switching.overtake(request, now)
-        self._changed(self, now)
 
     def configure(
         self, changes: Changes, now: float, done: Done, *, source: str = DEFAULT,
@@ -483,7 +484,6 @@ class Light:
 
         if self._can_reach(now, done, self._claim(source, now)):
             self._configuration.configure(changes, now, finished)
-            self._changed(self, now)
 
     def set_brightness(
         self, brightness: float, now: float, *, source: str = DEFAULT,
@@ -500,7 +500,6 @@ class Light:
 
         if self._can_reach(now, failed, self._claim(source, now, brightness=brightness)):
             self._configuration.set_brightness(brightness, now)
-            self._changed(self, now)
 
     def set_desired(self, values: Changes, now: float) -> None:
         """

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import bisect
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -98,6 +98,10 @@ class Position:
         return _int32(self.x * scale), _int32(self.y * scale)
 
 
+# A kind of commands: see :attr:`Command.key`.
+Key = tuple[Address, int, float]
+
+
 class Command(NamedTuple):
     """
     A command to one component.
@@ -115,7 +119,7 @@ class Command(NamedTuple):
     position: Position | None = None
 
     @property
-    def key(self) -> tuple[Address, int, float]:
+    def key(self) -> Key:
         """Return the kind: commands of one kind wait for each other."""
         # As in MAVSDK: a request for one message must not wait for that of another.
         is_request = self.command == messages.MavCmd.REQUEST_MESSAGE and self.params
@@ -289,6 +293,9 @@ class RequestState(Enum):
     the next report of progress. WAITING was not sent: another of its kind was.
     """
 
+    # Enum's own takes a call in Python for each lookup in the table of transitions.
+    __hash__ = object.__hash__
+
     WAITING = 'waiting'
     SENT = 'sent'
     BACKOFF = 'backoff'
@@ -310,6 +317,7 @@ TRANSITIONS: dict[tuple[RequestState, int], RequestState] = {
 @dataclass(eq=False, slots=True)
 class _Request:
     command: Command
+    key: Key
     done: Done
     limit: float
     state: RequestState = RequestState.WAITING
@@ -373,7 +381,7 @@ class CommandSender:
     # In the order of sending: the sent request first, then the waiting ones.
     _requests: dict[Address, list[_Request]] = field(default_factory=dict)
     # In the order of their ends; those that ended more than ACK_LIFETIME ago do not matter.
-    _earlier: dict[tuple[Address, int, float], EarlierCommand] = field(default_factory=dict)
+    _earlier: dict[Key, EarlierCommand] = field(default_factory=dict)
     _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -402,13 +410,15 @@ class CommandSender:
         :param overtake: end all commands of its kind that wait or are not acknowledged with
             CANCELLED, and send this one at once, beside a command in progress.
         """
-        request = _Request(command, done, limit, as_int=command.position is not None)
         if now >= limit:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
             return
-        kind = list(self._of_kind(command.key))
+        key = command.key
+        request = _Request(command, key, done, limit, as_int=command.position is not None)
+        requests = self._requests.setdefault(command.target, [])
+        kind = [other for other in requests if other.key == key]
         if not kind or overtake:
-            self._requests.setdefault(command.target, []).append(request)
+            requests.append(request)
             self._begin(request, now)
             # Those that wait first, so that none is sent in the place of another.
             for other in reversed(kind):
@@ -417,7 +427,7 @@ class CommandSender:
         elif sum(other.state is RequestState.WAITING for other in kind) >= MAX_WAITING:
             done(CommandResult(CommandStatus.REFUSED_LOCALLY), now)
         else:
-            self._requests[command.target].append(request)
+            requests.append(request)
 
     def cancel(self, command: Command, now: float) -> None:
         """End a command that was started with CANCELLED, if it has not ended."""
@@ -427,7 +437,8 @@ class CommandSender:
 
     def round_trip(self, target: Address) -> RttEstimator:
         """Return the round-trip times of a target's acknowledgements."""
-        return self._round_trips.get(target) or RttEstimator()
+        estimator = self._round_trips.get(target)
+        return RttEstimator() if estimator is None else estimator
 
     def _estimator(self, target: Address) -> RttEstimator:
         """Return the estimator of a target; a new one replaces the one not used for longest."""
@@ -452,19 +463,20 @@ class CommandSender:
                 or ack.target_component not in (0, ours.component)):
             return
         self.unanswering.pop(source, None)
-        sent = [request for request in self._requests.get(source, ())
-                if request.command.command == ack.command
-                and request.state is not RequestState.WAITING]
-        if not sent:
+        is_expected = False
+        for request in self._requests.get(source, ()):
+            if (request.command.command == ack.command
+                    and request.state is not RequestState.WAITING):
+                is_expected = True
+                # A command in progress is not rejected: another one is, which is beside it.
+                if not request.answers_another_try(ack.result):
+                    self._answered(request, ack, now)
+                    return
+        if not is_expected:
             self.counters.unexpected_acks += 1
             if source in self._round_trips:
                 self._estimator(source).expect_ambiguous(now)
                 self._measure_resent(source, ack.command, now)
-            return
-        # A command in progress is not rejected: the rejection belongs to a command beside it.
-        request = next((one for one in sent if not one.answers_another_try(ack.result)), None)
-        if request is not None:
-            self._answered(request, ack, now)
 
     def _measure_resent(self, source: Address, command: int, now: float) -> None:
         """
@@ -549,10 +561,6 @@ class CommandSender:
         for request in reversed(requests):
             self._end(request, status, now)
 
-    def _of_kind(self, key: tuple[Address, int, float]) -> Iterator[_Request]:
-        return (request for request in self._requests.get(key[0], ())
-                if request.command.key == key)
-
     def _begin(self, request: _Request, now: float) -> None:
         request.state = RequestState.SENT
         request.first_sent = now
@@ -575,7 +583,7 @@ class CommandSender:
     def _end(
         self, request: _Request, status: CommandStatus, now: float, result_param2: int = 0,
     ) -> None:
-        command = request.command
+        command, key = request.command, request.key
         requests = self._requests.get(command.target, [])
         if request not in requests:
             return
@@ -587,14 +595,14 @@ class CommandSender:
             return
         result = CommandResult(
             status, request.result, request.tries, now - request.first_sent, request.progress,
-            result_param2, self._earlier.pop(command.key, None))
+            result_param2, self._earlier.pop(key, None))
         answered = status is CommandStatus.ANSWERED
         while self._earlier and now > (
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
             del self._earlier[oldest.command.key]
         is_measure = answered and request.tries > 1 and not request.rejected
         between = request.last_sent - request.first_sent
-        self._earlier[command.key] = EarlierCommand(
+        self._earlier[key] = EarlierCommand(
             command, request.result if answered else None, now, request.tries, result.elapsed,
             now + between / 2 if is_measure else math.inf)
         if status is CommandStatus.NO_ANSWER:
@@ -602,23 +610,24 @@ class CommandSender:
             self.unanswering[command.target] = None
             if len(self.unanswering) > MAX_TARGETS:
                 del self.unanswering[next(iter(self.unanswering))]
-        late = self._send_next(command.key, now)
+        late = self._send_next(key, now) if requests else []
         request.done(result, now)
         for other in late:
             other.done(CommandResult(CommandStatus.OUT_OF_TIME), now)
 
-    def _send_next(self, key: tuple[Address, int, float], now: float) -> list[_Request]:
+    def _send_next(self, key: Key, now: float) -> list[_Request]:
         """Send the next command of a kind; return those whose limit has passed."""
         late = []
-        for request in list(self._of_kind(key)):
+        requests = self._requests[key[0]]
+        for request in [one for one in requests if one.key == key]:
             if request.state is not RequestState.WAITING:
                 break
             if now < request.limit:
                 self._begin(request, now)
                 break
-            self._requests[key[0]].remove(request)
+            requests.remove(request)
             late.append(request)
-        if not self._requests.get(key[0], True):
+        if not requests:
             del self._requests[key[0]]
         return late
 

@@ -169,8 +169,8 @@ class Link:
         self._turn = threading.Lock()
         self._turn.acquire()
         self._waits_until = -math.inf
-        # The caller that has taken the turn.
-        self._taker: threading.Thread | None = None
+        # The thread of the caller that has taken the turn.
+        self._taker: int | None = None
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
@@ -202,7 +202,7 @@ class Link:
         self._wake()
         # The thread of this turn cannot wait for the end of the turn.
         if (self._thread.is_alive()
-                and threading.current_thread() not in (self._thread, self._taker)):
+                and threading.get_ident() not in (self._thread.ident, self._taker)):
             self._thread.join(timeout)
 
     def is_running(self) -> bool:
@@ -224,7 +224,7 @@ class Link:
         if self._calls or not self._turn.acquire(blocking=False):
             self.call(function)
             return
-        wakes, self._taker = True, threading.current_thread()
+        wakes, self._taker = True, threading.get_ident()
         try:
             self._safe_call(function, self.clock())
             self._flush()
@@ -457,24 +457,33 @@ class Link:
 
     def _flush(self) -> None:
         """Send the messages of the endpoint; without a channel they are dropped."""
+        outgoing = self.endpoint.outgoing
+        if self.endpoint.streams:
+            self._flush_streams()
+        elif outgoing:
+            messages = list(outgoing)
+            outgoing.clear()
+            self._send_messages(messages, self.clock())
+        if self._channel is None:
+            outgoing.clear()
+            self._streams.clear()
+
+    def _flush_streams(self) -> None:
         outgoing, streams = self.endpoint.outgoing, self._streams
         dropped = streams.dropped
         if outgoing:
             now = self.clock()
-            urgent = ([one for one in outgoing if not streams.hold(*one, now)]
-                      if self.endpoint.streams else list(outgoing))
+            urgent = [one for one in outgoing if not streams.hold(*one, now)]
             outgoing.clear()
             self._send_messages(urgent, now)
         while streams and self._stream_due() <= (now := self.clock()):
             self._send_messages(streams.take(now), now)
         self._traffic.frames_dropped += streams.dropped - dropped
-        if self._channel is None:
-            outgoing.clear()
-            streams.clear()
 
     def _stream_due(self) -> float:
         """Return when messages of streams can be sent, infinity if the channel will tell."""
-        if self._channel is None or self._channel.is_waiting or not self._streams:
+        if (not self.endpoint.streams or self._channel is None or self._channel.is_waiting
+                or not self._streams):
             return math.inf
         return self._line_free_at - (
             URGENT_WRITE_AHEAD if self._streams.is_urgent else WRITE_AHEAD)

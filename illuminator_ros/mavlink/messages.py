@@ -203,6 +203,9 @@ class MavResult(IntEnum):
     NOT_IN_CONTROL = 10
 
 
+_RESULT_NAMES = {int(result): f'MAV_RESULT_{result.name}' for result in MavResult}
+
+
 class MavType(IntEnum):
     """The values of MAV_TYPE that matter here."""
 
@@ -223,10 +226,7 @@ MAVLINK_VERSION = 3
 
 def result_name(result: int) -> str:
     """Return the name of a MAV_RESULT, for example ``MAV_RESULT_DENIED``; any int is accepted."""
-    try:
-        return f'MAV_RESULT_{MavResult(result).name}'
-    except ValueError:
-        return f'MAV_RESULT {result} (unknown)'
+    return _RESULT_NAMES.get(result) or f'MAV_RESULT {result} (unknown)'
 
 
 def command_name(command: int) -> str:

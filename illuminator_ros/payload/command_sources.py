@@ -49,27 +49,28 @@ class Sources(Arbiter[str]):
     Decides which source holds a device. No I/O.
 
     :param settings: None where all sources are alike, so that none holds the device.
+    :ivar are_ranked: whether one of them may hold the device.
     """
 
     def __init__(self, settings: SourceSettings | None) -> None:
-        self._are_ranked = settings is not None
+        self.are_ranked = settings is not None
         ranked = settings or SourceSettings((DEFAULT,))
         super().__init__(
             Policy.PRIORITY, ranked.names.index, lease=ranked.timeout, remembers=True)
 
     def claim(self, source: str, now: float) -> HolderChanged[str] | None:
         """See :meth:`Arbiter.claim`."""
-        return super().claim(source, now) if self._are_ranked else None
+        return super().claim(source, now) if self.are_ranked else None
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the device, '' if it may."""
-        may = source == self.holder or not self._are_ranked
+        may = source == self.holder or not self.are_ranked
         return '' if may else f'held by {self.holder or "no source"}'
 
     @property
     def shown_holder(self) -> str | None:
         """Return the holder for snapshots: '' for none, None where all sources are alike."""
-        return self.holder or '' if self._are_ranked else None
+        return self.holder or '' if self.are_ranked else None
 
 
 def describe(change: HolderChanged[str]) -> str:

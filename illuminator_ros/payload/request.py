@@ -26,7 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 import math
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..mavlink import command_sender
 from ..mavlink.messages import Address, MavCmd, MavResult
@@ -174,8 +174,7 @@ class Change(Protocol[S_contra]):
         """Describe the state that a status shows instead, for people."""
 
 
-@dataclass(frozen=True)
-class Result:
+class Result(NamedTuple):
     """
     The outcome of a request.
 
@@ -203,6 +202,9 @@ Done = Callable[[Result, float], None]
 class Phase(Enum):
     """The phase of a request."""
 
+    # Enum's own takes a call in Python, which a lookup in a table of transitions makes twice.
+    __hash__ = object.__hash__
+
     WAITING = 'waiting'
     SENT = 'sent'
     CONFIRMING = 'confirming'
@@ -211,6 +213,8 @@ class Phase(Enum):
 
 class Step(Enum):
     """An event that moves a request to another phase."""
+
+    __hash__ = object.__hash__
 
     SEND = 'send'
     ACKNOWLEDGED = 'acknowledged'
@@ -311,19 +315,21 @@ class Request(Generic[S]):
         self._step(step)
         # A status from between two repeats may show what an earlier command still undoes.
         self._sent_at = now
+        change = self._sent
         self._target.send(
-            self._sent.command, self._sent.params, now, self._answered, limit=self.limit,
+            change.command, change.params, now, self._answered, limit=self.limit,
             overtake=self.overtakes)
 
     def _answered(self, outcome: command_sender.CommandResult, now: float) -> None:
         if self.is_finished:
             return
         self._outcome = outcome
+        accepted = outcome.accepted
         if outcome.status is command_sender.CommandStatus.CANCELLED:
             self.fail(OVERTAKEN, now)
-        elif outcome.accepted and self._must_repeat(outcome, now):
+        elif accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
-        elif outcome.accepted or outcome.may_answer_earlier(now):
+        elif accepted or outcome.may_answer_earlier(now):
             self._step(Step.ACKNOWLEDGED)
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
@@ -363,9 +369,10 @@ class Request(Generic[S]):
             return
         delay = (self._target.shortest_round_trip(now) if report.has_clock
                  else self._target.status_delay)
-        shown = self._sent.shown_by(report.status)
+        change = self._sent
+        shown = change.shown_by(report.status)
         if (shown and not self._was_repeated and self._before is not None
-                and not self._sent.shown_by(self._before)):
+                and not change.shown_by(self._before)):
             self._target.note_status_delay(now - self._sent_at)
             self._before = None
         wait = max(delay + ASK_INTERVAL, 2 * report.span)
@@ -374,7 +381,7 @@ class Request(Generic[S]):
         if report.sent_by - delay < self._sent_at:
             self._is_outdated = True
         elif not shown:
-            self._contradiction = f'shows {self._sent.actual(report.status)}'
+            self._contradiction = f'shows {change.actual(report.status)}'
             if report.shared_address:
                 self._contradiction += (f', several {self._target.kind}s '
                                         f'answer as {self._target.address}')
@@ -387,13 +394,15 @@ class Request(Generic[S]):
             self._shown_by.add(report.sender)
             self._shown_since = min(self._shown_since, now)
             if report.senders <= self._shown_by and now >= self._shown_since + report.span:
-                self._succeed(self._sent.evidence(report.status), now, report.status)
+                self._succeed(change.evidence(report.status), now, report.status)
 
     def poll(self, now: float) -> None:
         """Request the status, or end."""
-        if self.is_confirming and now >= self._confirm_until:
+        if not self.is_confirming:
+            return
+        if now >= self._confirm_until:
             self._unconfirmed(now)
-        elif self.is_confirming and now >= self._ask_at:
+        elif now >= self._ask_at:
             self._ask_at = now + ASK_INTERVAL
             self._target.request_status(now)
 
@@ -444,8 +453,9 @@ class Request(Generic[S]):
     def _succeed(
         self, how: str, now: float, status: S | None = None, *, superseded: bool = False,
     ) -> None:
-        self._end(f'{self._sent.goal}, {how}: {self._answer.describe()}', now, status,
-                  success=True, superseded=superseded, note=self._sent.note)
+        change = self._sent
+        self._end(f'{change.goal}, {how}: {self._answer.describe()}', now, status,
+                  success=True, superseded=superseded, note=change.note)
 
     def _end(
         self, text: str, now: float, status: S | None = None, *, success: bool = False,
@@ -493,7 +503,7 @@ class RequestQueue(Generic[S]):
             return
         self._requests.append(request)
         if len(self._requests) == 1:
-            self.poll(now)
+            self._start_next(now)
 
     def overtake(self, request: Request[S], now: float) -> None:
         """Send a request before those that do not overtake, which are cancelled."""
@@ -524,9 +534,12 @@ class RequestQueue(Generic[S]):
             late.fail('not sent: earlier requests took too long', now)
         if self._requests:
             self._requests[0].poll(now)
+            self._start_next(now)
+
+    def _start_next(self, now: float) -> None:
         while self._requests:
             first = self._requests[0]
-            if first.is_finished:
+            if first.phase is Phase.FINISHED:
                 del self._requests[0]
             elif first.phase is Phase.WAITING:
                 first.start(self._status, now)

@@ -224,11 +224,13 @@ class NodeExecutor(SingleThreadedExecutor):
 
 
 def _send(service: Service, header: _rclpy.rmw_service_info_t, response: object) -> None:
-    # The node of a forgotten device may be gone.
-    with contextlib.suppress(InvalidHandle):
+    try:
         service.send_response(response, header)
-        # The client may wait for this processor.
-        os.sched_yield()
+    except InvalidHandle:
+        # The node of a forgotten device may be gone.
+        return
+    # The client may wait for this processor.
+    os.sched_yield()
 
 
 class _Entities:

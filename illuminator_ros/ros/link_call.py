@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
 import threading
 from typing import Generic, TypeVar
 
@@ -24,6 +25,7 @@ from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
 T = TypeVar('T')
+V = TypeVar('V')
 
 # Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
@@ -65,21 +67,21 @@ class LinkCalls:
             return
         answered = False
 
-        def end(reply: Callable[[], None]) -> None:
+        def end(reply: Callable[[V], None], value: V) -> None:
             nonlocal answered
             if not answered:
                 answered = True
                 with self._lock:
                     self._pending -= 1
-                reply()
+                reply(value)
 
         def run(now: float) -> None:
             try:
-                request(now, lambda value: end(lambda: answer(value)))
+                request(now, functools.partial(end, answer))
             except Exception as error:
                 reason = f'internal error: {error!r}'
                 self._log.error(reason, 'request')
-                end(lambda: refuse(reason))
+                end(refuse, reason)
 
         self._link.run_turn(run)
 
