@@ -142,7 +142,7 @@ class SimulatedIlluminator(SimulatedDevice):
         brightness = configuration.brightness * self.thermal.output
         if behaviour.brightness_is_switch and not self.enabled:
             brightness = 0.0
-        flags = int(self.thermal.flags) | behaviour.false_flags
+        flags = self.thermal.flags | behaviour.false_flags
         if behaviour.inverted_flags and self.enabled:
             flags ^= model.ErrorFlag.THERMAL_THROTTLING
         limits = self.properties.limits if behaviour.measures else model.Limits()

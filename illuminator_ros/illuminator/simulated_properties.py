@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import functools
 from typing import NamedTuple
 
 from .model import ErrorFlag, Limits, Mode
@@ -117,7 +118,7 @@ class IlluminatorProperties:
     time_scale: float = 1.0
     behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
 
-    @property
+    @functools.cached_property
     def reported_bitmask(self) -> int:
         """Return the mode_bitmask of ILLUMINATOR_STATUS."""
         if self.mode_bitmask is not None:

@@ -23,6 +23,10 @@ from .model import ErrorFlag
 
 # degC; the reading of an open thermistor, which receivers take for "not measured".
 BROKEN_READING = 0.0
+# Plain ints: each operation of an IntFlag takes 1 us.
+_THROTTLING = int(ErrorFlag.THERMAL_THROTTLING)
+_SHUTDOWN = int(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
+_FAILURE = int(ErrorFlag.THERMISTOR_FAILURE)
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,12 @@ class ThermalModel:
         self.properties = properties
         self.ambient = self.temperature = properties.ambient
         self.sensor_failed = False
-        self._flags = ErrorFlag(0)
+        self._flags = 0
 
     @property
-    def flags(self) -> ErrorFlag:
+    def flags(self) -> int:
         """Return the error flags of its report: without a sensor it reports no heat."""
-        return ErrorFlag.THERMISTOR_FAILURE if self.sensor_failed else self._flags
+        return _FAILURE if self.sensor_failed else self._flags
 
     @property
     def reading(self) -> float:
@@ -85,9 +89,10 @@ class ThermalModel:
     @property
     def output(self) -> float:
         """Return the share (0..1) of the commanded brightness that the light gives."""
-        if self.flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN:
+        flags = self.flags
+        if flags & _SHUTDOWN:
             return 0.0
-        return self.properties.throttle_to if self.flags & ErrorFlag.THERMAL_THROTTLING else 1.0
+        return self.properties.throttle_to if flags & _THROTTLING else 1.0
 
     def advance(self, seconds: float, power: float) -> None:
         """
@@ -108,15 +113,13 @@ class ThermalModel:
         decay = math.exp(-seconds / properties.time_constant)
         self.temperature = final + (self.temperature - final) * decay
         if self.sensor_failed:
-            self._flags = ErrorFlag(0)
+            self._flags = 0
         else:
-            self._switch(ErrorFlag.THERMAL_THROTTLING, properties.throttle_at,
-                         properties.throttle_until)
-            self._switch(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN, properties.shutdown_at,
-                         properties.shutdown_until)
+            self._switch(_THROTTLING, properties.throttle_at, properties.throttle_until)
+            self._switch(_SHUTDOWN, properties.shutdown_at, properties.shutdown_until)
         return self.flags == flags and abs(self.temperature - final) < 1e-9
 
-    def _switch(self, flag: ErrorFlag, on_at: float, off_below: float) -> None:
+    def _switch(self, flag: int, on_at: float, off_below: float) -> None:
         if self.temperature >= on_at:
             self._flags |= flag
         elif self.temperature < off_below:

@@ -273,6 +273,8 @@ class FaultInjector:
         self, message: messages.Message, behaviour: Behaviour,
     ) -> list[tuple[float, messages.Message]]:
         """Return the messages to send in place of one, each with its delay, s."""
+        if not (behaviour.drop or behaviour.corrupt or behaviour.duplicate or behaviour.delay):
+            return [(0.0, message)]
         if self._occurs(behaviour.drop):
             return []
         if self._occurs(behaviour.corrupt):

@@ -357,7 +357,8 @@ class SimulatedComponent(Generic[D]):
     def _is_addressed(self, message: Message) -> bool:
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
         behaviour = self.behaviour
-        system, component = (getattr(message, f'target_{part}') for part in Address._fields)
+        system = getattr(message, 'target_system', 0)
+        component = getattr(message, 'target_component', 0)
         if behaviour.adopts_system_id:
             system = self.address.system
         if (system, component) == self.address or not behaviour.filters_target:
@@ -410,8 +411,9 @@ class SimulatedComponent(Generic[D]):
     def _acknowledge(
         self, source: Address, command: int, result: int, now: float, progress: int = 0,
     ) -> None:
-        target = source if self.behaviour.acks_target else Address(0, 0)
-        if self.behaviour.acks_wrong_target:
+        behaviour = self.behaviour
+        target = source if behaviour.acks_target else Address(0, 0)
+        if behaviour.acks_wrong_target:
             target = Address(source.system, source.component ^ 1)
         self._send(messages.CommandAck(command, result, progress, 0, *target), now)
 
