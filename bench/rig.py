@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool
-from support.processes import Program, python, ROOT
+from support.processes import Program, ROOT, start_interpreter
 from support.spun import SpunNode
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ Message = TypeVar('Message')
 Request = TypeVar('Request')
 Response = TypeVar('Response')
 
-__all__ = ['Program', 'python', 'ROOT']
+__all__ = ['Program', 'ROOT', 'start_interpreter']
 
 PEERS = Path(__file__).with_name('peers')
 # s, the longest wait for anything that must happen.
@@ -123,13 +123,13 @@ def bridge(
     """Run the bridge; enter when it has opened its link."""
     given = {'connection_url': url, **parameters}
     overrides = [text for key, value in given.items() for text in ('-p', f'{key}:={value}')]
-    return ready(python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={name}',
-                        *overrides), 'link open')
+    return ready(start_interpreter(
+        'illuminator_ros.bridge', '--ros-args', '-r', f'__node:={name}', *overrides), 'link open')
 
 
 def simulator(url: str, *arguments: str) -> AbstractContextManager[Program]:
     """Run simulated lights."""
-    return running(python('illuminator_ros.simulator', url, '--plain', *arguments))
+    return running(start_interpreter('illuminator_ros.simulator', url, '--plain', *arguments))
 
 
 def peer(name: str, *arguments: str) -> AbstractContextManager[Program]:

@@ -36,7 +36,7 @@ from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.rededge import conversions
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
-from support.processes import python
+from support.processes import start_interpreter
 from support.strict_mavlink_1 import OVERHEAD, strict_frames
 
 from ..rig import Bench, Client, cpu, peer, ready
@@ -97,7 +97,7 @@ def fed(bench: Bench, rate: float) -> Iterator[Row]:
     """Yield the rows at a rate of attitudes, Hz."""
     with contextlib.ExitStack() as stack:
         ours, theirs = stack.enter_context(Line()), stack.enter_context(Line())
-        node = stack.enter_context(ready(python(
+        node = stack.enter_context(ready(start_interpreter(
             'illuminator_ros.rededge', f'serial://{ours.device}:57600', '--ros-args', '-r',
             '~/fix:=/fix', '-r', '~/imu:=/imu', '-p', f'attitude_rate:={rate}'), 'link open'))
         script = stack.enter_context(peer('straightforward_feeder', theirs.device))

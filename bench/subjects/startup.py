@@ -72,8 +72,9 @@ def start(bench: rig.Bench, name: str, node: str, port: int) -> tuple[float, flo
         client.subscribe(Float64, f'/{node}/uptime', came, STATE)
         began = time.monotonic()
         program = (
-            rig.python('illuminator_ros.bridge', '--ros-args', '-r', f'__node:={node}',
-                       '-p', f'connection_url:=udpin://127.0.0.1:{port}') if name == OURS
+            rig.start_interpreter(
+                'illuminator_ros.bridge', '--ros-args', '-r', f'__node:={node}', '-p',
+                f'connection_url:=udpin://127.0.0.1:{port}') if name == OURS
             else rig.Program(sys.executable, str(rig.PEERS / 'empty_server.py'), node))
         with rig.running(program):
             client.meet(f'/{node}/enable', success=False)

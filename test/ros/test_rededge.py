@@ -36,7 +36,7 @@ from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 from support.fake_camera import FakeCamera, running_camera
 from support.frames import heartbeat_frame
-from support.processes import ended, Program, python, run, slow_python
+from support.processes import ended, Program, python, run, slow_python, start_interpreter
 from support.ros import Parameters, Ros, STREAM
 from support.slow import pass_time_until
 from support.waiting import eventually
@@ -198,7 +198,7 @@ def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) ->
 
 
 def test_first_image_does_not_wait_for_an_import(own_ros: Ros) -> None:
-    with running_camera() as camera, running_node(own_ros, camera) as node:
+    with running_camera() as camera, running_node(own_ros, camera, start_interpreter) as node:
         assert '/numpy/' in Path(f'/proc/{node.pid}/maps').read_text()
 
 

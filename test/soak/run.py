@@ -48,8 +48,8 @@ from std_srvs.srv import Trigger  # noqa: E402
 from support.fault_proxy import FaultProxy, NO_FAULTS  # noqa: E402
 from support.faulty_wire import Faults  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import Program, python  # noqa: E402
-from support.ros import own_domain, Parameters, Ros, start_bridge  # noqa: E402
+from support.processes import Program, start_interpreter  # noqa: E402
+from support.ros import bridge_arguments, own_domain, Parameters, Ros  # noqa: E402
 
 # Growth of a process after its warm-up: memory in MB, threads, descriptors. The middleware opens
 # some descriptors for participants that come and go.
@@ -106,7 +106,10 @@ class Soak:
         self.problems: list[str] = []
         port = free_port()
         self.proxy = FaultProxy(port, self.random.randrange(1 << 30))
-        self.bridge = start_bridge(domain, port, payloads='[illuminator, gimbal_manager]')
+        self.bridge = start_interpreter(
+            'illuminator_ros.bridge',
+            *bridge_arguments(port, payloads='[illuminator, gimbal_manager]'),
+            env={'ROS_DOMAIN_ID': str(domain)})
         self.light = self._simulator('--component-id', '243')
         self.restarted = self._simulator('--component-id', '244')
         self.gimbal = self._simulator('--payload', 'gimbal')
@@ -115,8 +118,8 @@ class Soak:
         self._calls: list[tuple[float, str, Any]] = []
 
     def _simulator(self, *arguments: str) -> Program:
-        return python('illuminator_ros.simulator', f'udpout://127.0.0.1:{self.proxy.port}',
-                      *arguments)
+        return start_interpreter(
+            'illuminator_ros.simulator', f'udpout://127.0.0.1:{self.proxy.port}', *arguments)
 
     def close(self) -> None:
         """End it all."""

@@ -181,6 +181,13 @@ def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -
     """Start a module of ours."""
     if _can_be_forked(env):
         return Program(module, *arguments, env=env, forked=True)
+    return start_interpreter(module, *arguments, env=env)
+
+
+def start_interpreter(
+    module: str, *arguments: str, env: Mapping[str, str] | None = None,
+) -> Program:
+    """Start a module of ours as users do: nothing is imported yet."""
     return Program(sys.executable, '-m', module, *arguments, env=env)
 
 

@@ -24,7 +24,7 @@ from types import ModuleType
 from illuminator_ros.cli import postponed_imports as tested
 import pytest
 from support.light import ServedLight
-from support.processes import ended, python
+from support.processes import ended, start_interpreter
 from support.ros import bridge_arguments, Parameters, Ros
 
 # Their libraries, and one that the parser of the message generator brings.
@@ -71,8 +71,8 @@ def test_module_that_is_used_at_once_or_was_imported_before_is_the_real_one(valu
 def test_bridge_that_serves_a_light_loads_no_library_that_it_does_not_use(
     own_ros: Ros, port: int,
 ) -> None:
-    with (ended(python('illuminator_ros.bridge', *bridge_arguments(port),
-                       env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as bridge,
+    with (ended(start_interpreter('illuminator_ros.bridge', *bridge_arguments(port),
+                                  env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as bridge,
           ServedLight(port, enable=1)):
         parameters = Parameters(own_ros)
         parameters.wait(brightness=100.0)

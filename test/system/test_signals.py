@@ -31,7 +31,7 @@ from illuminator_ros.ros import bridge
 import pytest
 from support.light import ON_OFF, ServedLight
 from support.ports import free_port
-from support.processes import environment, Program
+from support.processes import environment, Program, start_interpreter
 from support.ros import bridge_arguments, Ros, start_bridge, start_slow_bridge
 from support.waiting import eventually
 
@@ -85,11 +85,6 @@ def blocked(program: Program) -> set[signal.Signals]:
     return {number for number in SIGNALS if int(mask, 16) & 1 << number - 1}
 
 
-def start_interpreter(module: str, *arguments: str, domain: int) -> Program:
-    """Start a module that is not imported yet."""
-    return Program(sys.executable, '-m', module, *arguments, env={'ROS_DOMAIN_ID': str(domain)})
-
-
 Moment = Callable[[Ros, int, str], contextlib.AbstractContextManager[Program]]
 
 
@@ -97,7 +92,7 @@ Moment = Callable[[Ros, int, str], contextlib.AbstractContextManager[Program]]
 def bridge_starting(ros: Ros, port: int, node: str) -> Iterator[Program]:
     program = start_interpreter(
         'illuminator_ros.bridge', *bridge_arguments(port, '-r', f'__node:={node}'),
-        domain=ros.domain)
+        env={'ROS_DOMAIN_ID': str(ros.domain)})
     eventually(lambda: blocked(program) == set(SIGNALS))
     yield program
 
@@ -116,8 +111,7 @@ def bridge_in_a_command(ros: Ros, port: int, node: str) -> Iterator[Program]:
 
 @contextlib.contextmanager
 def simulator_starting(ros: Ros, port: int, node: str) -> Iterator[Program]:
-    program = start_interpreter(
-        'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}', domain=ros.domain)
+    program = start_interpreter('illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')
     eventually(lambda: blocked(program) == set(SIGNALS))
     yield program
 
