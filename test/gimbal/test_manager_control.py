@@ -118,35 +118,24 @@ def test_params_that_name_no_player_change_nothing(
     assert [one.holder(role) for role in Role] == [None, None]
 
 
-def test_the_sender_takes_control_with_the_id_for_itself() -> None:
+TAKEN = RoleHolderChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)
+SECONDARY = (LOWER, (-1, -1, *LOWER))
+
+
+@pytest.mark.parametrize(('before', 'params', 'changes', 'holders'), [
+    # The id of the sender.
+    (SECONDARY, (-2, -2, -1, -1), [TAKEN], [PLAYER, LOWER]),
+    # Both roles or neither; a player that claims both gets the primary one beside another.
+    (SECONDARY, (*PLAYER, *THIRD), None, [None, LOWER]),
+    (SECONDARY, (*PLAYER, *PLAYER), [TAKEN], [PLAYER, LOWER]),
+    ((PLAYER, (*PLAYER, *PLAYER)), (-3, -3, -3, -3), [
+        RoleHolderChanged(role, PLAYER, None, Cause.RELEASE, PLAYER) for role in Role],
+     [None, None])])
+def test_both_roles_change_together(
+        before: tuple[Address, tuple[float, ...]], params: tuple[float, ...],
+        changes: list[RoleHolderChanged] | None, holders: list[Address | None]) -> None:
     one = control()
+    one.configure(*before, 0.0)
 
-    assert one.configure(PLAYER, (-2, -2, -1, -1), 0.0) == [
-        RoleHolderChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
-
-
-def test_both_roles_change_or_neither() -> None:
-    one = control()
-    one.configure(LOWER, (-1, -1, *LOWER), 0.0)
-
-    assert one.configure(PLAYER, (*PLAYER, *THIRD), 1.0) is None
-    assert [one.holder(role) for role in Role] == [None, LOWER]
-
-
-def test_a_player_that_claims_both_roles_gets_the_primary_one_beside_another_secondary() -> None:
-    one = control()
-    one.configure(LOWER, (-1, -1, *LOWER), 0.0)
-
-    assert one.configure(PLAYER, (*PLAYER, *PLAYER), 1.0) == [
-        RoleHolderChanged(Role.PRIMARY, None, PLAYER, Cause.CLAIM, PLAYER)]
-    assert [one.holder(role) for role in Role] == [PLAYER, LOWER]
-
-
-def test_a_player_that_has_both_roles_releases_both() -> None:
-    one = control()
-    one.configure(PLAYER, (*PLAYER, *PLAYER), 0.0)
-
-    changes = one.configure(PLAYER, (-3, -3, -3, -3), 1.0)
-
-    assert changes == [
-        RoleHolderChanged(role, PLAYER, None, Cause.RELEASE, PLAYER) for role in Role]
+    assert one.configure(PLAYER, params, 1.0) == changes
+    assert [one.holder(role) for role in Role] == holders

@@ -207,14 +207,6 @@ def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
     assert second.manager.tracker.other == first.component.address
 
 
-def test_a_gimbal_of_another_system_is_not_managed() -> None:
-    rig = reached(ManagerState.NO_DEVICE)
-
-    rig.give(Address(2, 154), attitude_status())
-
-    assert rig.manager.tracker.state is ManagerState.NO_DEVICE
-
-
 @pytest.mark.parametrize('message', [
     replace(attitude_status(), gimbal_device_id=1), information(gimbal_device_id=1)])
 def test_an_autopilot_that_reports_a_gimbal_on_its_outputs_is_not_taken_for_a_device(
@@ -226,17 +218,23 @@ def test_an_autopilot_that_reports_a_gimbal_on_its_outputs_is_not_taken_for_a_de
     assert rig.manager.tracker.device is None
 
 
+@pytest.mark.parametrize(('state', 'reason'), [
+    (ManagerState.NO_DEVICE, 'a gimbal device has not been heard; heard: 2/154'),
+    (ManagerState.LISTENING, 'the manager listens for other managers'),
+    (ManagerState.ACTIVE, ''), (ManagerState.INACTIVE, '1/191 manages gimbal 1/154 too')])
+def test_the_reason_why_a_gimbal_is_not_managed_names_what_is_heard(
+        state: ManagerState, reason: str) -> None:
+    rig = reached(state)
+    # A gimbal of another system is not managed.
+    rig.give(Address(2, 154), attitude_status())
+
+    assert rig.manager.tracker.state is state
+    assert rig.manager.tracker.inactive_reason == reason
+
+
 def test_manager_names_the_devices_that_are_heard_instead_of_its_own() -> None:
     rig = ManagerRig(device_id=171, active=False)
-    assert rig.manager.tracker.inactive_reason == 'gimbal device 171 has not been heard'
-
     rig.run(1.0)
 
     assert rig.manager.tracker.inactive_reason == (
         'gimbal device 171 has not been heard; heard: 1/154')
-
-
-def test_inactive_manager_names_the_other_as_the_reason() -> None:
-    assert reached(ManagerState.ACTIVE).manager.tracker.inactive_reason == ''
-    assert reached(ManagerState.INACTIVE).manager.tracker.inactive_reason == (
-        '1/191 manages gimbal 1/154 too')

@@ -82,34 +82,23 @@ def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
 
 
 @pytest.mark.parametrize('end', ENDS.values())
-def test_a_rate_ends_with_the_hold_of_its_source(end: Callable[[Rig], object]) -> None:
+@pytest.mark.parametrize(('start', 'sent'), [
+    (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), [pytest.approx(-0.2)]),
+    (lambda rig: rig.gimbal.set_roi(47.0, 8.0, 500.0, rig.now, rig.done), [])],
+    ids=['rate', 'place'])
+def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
+        start: Callable[[Rig], object], sent: list[float], end: Callable[[Rig], object]) -> None:
     rig = shared(setpoint_timeout=30.0)
     rig.gimbal.claim('safety', rig.now)
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    start(rig)
     rig.run(1.0)
     end(rig)
     rig.run(1.0)
 
+    # The gimbal stops where it points.
     assert holder(rig) == ''
     assert [one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)] == [
-        pytest.approx(-0.2), 0.0]
-
-
-@pytest.mark.parametrize('end', ENDS.values())
-def test_a_place_is_followed_no_more_after_the_hold_of_its_source(
-        end: Callable[[Rig], object]) -> None:
-    rig = shared()
-    rig.gimbal.claim('safety', rig.now)
-    rig.gimbal.set_roi(47.0, 8.0, 500.0, rig.now, rig.done)
-    rig.run(1.0)
-    assert not rig.messages(GimbalManagerSetAttitude)
-    end(rig)
-    rig.run(1.0)
-
-    # As at the end of a rate: the gimbal stops where it points.
-    assert holder(rig) == ''
-    [stop] = rig.messages(GimbalManagerSetAttitude)
-    assert (stop.angular_velocity_x, stop.angular_velocity_y, stop.angular_velocity_z) == (0, 0, 0)
+        *sent, 0.0]
 
 
 def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> None:

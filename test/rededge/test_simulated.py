@@ -263,6 +263,13 @@ def test_feedback_that_waits_is_bounded() -> None:
     assert [one.img_idx for _, one in camera.wait(15.0)] == list(range(3, MAX_IMAGES + 3))
 
 
+def console(device: SimulatedRedEdge, line: str) -> Callable[[], None]:
+    """Return the change that a line of the console makes."""
+    name, *words = line.split()
+    [command] = [one for one in device.commands if one.name == name]
+    return command.do(device, words, START)
+
+
 @pytest.mark.parametrize(('line', 'effect'), [
     ('capture', lambda device: device.images[-1].shot == 'survey'),
     ('capture panel', lambda device: device.images[-1].trigger == 'console'),
@@ -272,10 +279,8 @@ def test_feedback_that_waits_is_bounded() -> None:
 ])
 def test_command_of_the_console_has_its_effect(
         line: str, effect: Callable[[SimulatedRedEdge], bool]) -> None:
-    name, *words = line.split()
     device = Camera().device
-    [command] = [one for one in device.commands if one.name == name]
-    command.do(device, words, START)()
+    console(device, line)()
     assert effect(device)
 
 
@@ -284,11 +289,8 @@ def test_command_of_the_console_has_its_effect(
     ('own-gps 1,2', 'is not LAT,LON,ALT'), ('interval -1', 'outside'),
     ('interval 1e-12', '1e-12 is shorter than 0.05')])
 def test_wrong_argument_of_the_console_is_named(line: str, reason: str) -> None:
-    name, *words = line.split()
-    device = Camera().device
-    [command] = [one for one in device.commands if one.name == name]
     with pytest.raises(ValueError, match=reason):
-        command.do(device, words, START)
+        console(Camera().device, line)
 
 
 def test_line_of_the_view_has_the_sources_of_the_next_image() -> None:
