@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import functools
 import threading
 from typing import Generic, TypeVar
 
@@ -25,7 +24,6 @@ from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
 T = TypeVar('T')
-V = TypeVar('V')
 
 # Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
@@ -50,38 +48,37 @@ class LinkCalls:
         self._lock = threading.Lock()
 
     def ask(
-        self, request: Request[T], answer: Callable[[T], None], refuse: Callable[[str], None],
+        self, request: Request[T], answer: Callable[[T], None], refusal: Callable[[str], T],
     ) -> None:
         """
         Start a request without waiting for the link.
 
-        One of the two is called once, in any thread.
-
-        :param refuse: takes the reason why the request cannot be carried out.
+        :param answer: called once with the answer, in any thread.
+        :param refusal: returns the answer for a reason why the request cannot be carried out.
         """
         with self._lock:
             busy = self._pending >= self._limit
             self._pending += not busy
         if busy:
-            refuse(f'busy: {self._limit} requests wait for an answer already')
+            answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
             return
         answered = False
 
-        def end(reply: Callable[[V], None], value: V) -> None:
+        def end(value: T) -> None:
             nonlocal answered
             if not answered:
                 answered = True
                 with self._lock:
                     self._pending -= 1
-                reply(value)
+                answer(value)
 
         def run(now: float) -> None:
             try:
-                request(now, functools.partial(end, answer))
+                request(now, end)
             except Exception as error:
                 reason = f'internal error: {error!r}'
                 self._log.error(reason, 'request')
-                end(refuse, reason)
+                end(refusal(reason))
 
         self._link.run_turn(run)
 

@@ -157,7 +157,7 @@ def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:
             service.start(request, now, lambda success, message: answer(
                 response(success=success, message=message)))
 
-        calls.ask(start, respond, lambda reason: respond(response(success=False, message=reason)))
+        calls.ask(start, respond, lambda reason: response(success=False, message=reason))
 
     return take
 

@@ -141,7 +141,7 @@ class ParameterServices:
             respond(srv.SetParameters.Response(results=[_result(reason) for reason in reasons]))
 
         self._calls.ask(lambda now, done: self._set_each(messages, now, done), answer,
-                        lambda reason: answer([reason] * len(messages)))
+                        lambda reason: [reason] * len(messages))
 
     def _set_atomically(
         self, request: srv.SetParametersAtomically.Request,
@@ -155,7 +155,7 @@ class ParameterServices:
             answer(f'{len(messages)} parameters are more than {MAX_NAMES}')
             return
         self._calls.ask(
-            lambda now, done: self._set_all(messages, now, done), answer, answer)
+            lambda now, done: self._set_all(messages, now, done), answer, str)
 
     # In turns of the link
 

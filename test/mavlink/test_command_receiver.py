@@ -40,12 +40,6 @@ class Turner(Payload):
         self.results = list(results)
         self.executed: list[AnyCommand] = []
 
-    def poll(self, now: float) -> None:
-        return
-
-    def next_deadline(self) -> float:
-        return math.inf
-
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         raise AssertionError('commands are executed')
 
