@@ -21,11 +21,10 @@ The executables that make MAVLink devices ROS 2 nodes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from functools import partial
 import os
 import sys
-from typing import TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
 from .entry_point import one_line, print_output, run_program
 from .payloads import PAYLOADS
@@ -39,8 +38,7 @@ if TYPE_CHECKING:
 ILLUMINATOR = 'illuminator'
 
 
-@dataclass(frozen=True)
-class Executable:
+class Executable(NamedTuple):
     """
     One of the executables.
 
@@ -49,7 +47,7 @@ class Executable:
     """
 
     payload: str = ILLUMINATOR
-    payloads: Mapping[str, PayloadType] = field(default_factory=lambda: PAYLOADS)
+    payloads: Mapping[str, PayloadType] = PAYLOADS
 
     @property
     def name(self) -> str:
@@ -86,7 +84,7 @@ def usage(executable: Executable) -> str:
                 + (f' ({limits})' if limits else ''))
 
     fixed = '\n'.join(
-        row(spec, replace(spec, default=defaults.get(spec.name, spec.default)).shown_default)
+        row(spec, spec._replace(default=defaults.get(spec.name, spec.default)).shown_default)
         for spec in (*LINK_PARAMETERS, *kind.parameters))
     variable = ''.join(row(spec, '') + '\n' for spec in kind.device_parameters)
     variable = variable and f'parameters that may be set at any time:\n{variable}\n'

@@ -16,14 +16,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ..payload.arbitration import HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 
 
-@dataclass(frozen=True)
-class DesiredState:
+class DesiredState(NamedTuple):
     """
     The last values that a source has requested, None for values that it has not.
 
@@ -57,6 +56,6 @@ class LightSources(Sources):
         """Keep values that a source has requested, as long as it claims the light."""
         if self.is_claimed_by(source):
             old = self._desired.get(source, DesiredState())
-            self._desired[source] = replace(
-                old, enabled=old.enabled if enabled is None else enabled,
-                brightness=old.brightness if brightness is None else brightness)
+            self._desired[source] = DesiredState(
+                old.enabled if enabled is None else enabled,
+                old.brightness if brightness is None else brightness)

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from .model import Configuration, DIMMING_FLAGS, flag_names, Status, unexpected_differences
 from ..mavlink.messages import MavCmd
@@ -33,8 +33,7 @@ def _with_flags(shown: str, status: Status) -> str:
     return ', '.join(filter(None, (shown, *flag_names(status.error_flags))))
 
 
-@dataclass(frozen=True)
-class Switch:
+class Switch(NamedTuple):
     """Switches all lights of a component on or off: those of one cannot be selected."""
 
     on: bool
@@ -65,8 +64,7 @@ class Switch:
         return _with_flags(shown, status)
 
 
-@dataclass(frozen=True)
-class Configure:
+class Configure(NamedTuple):
     """
     Configures a light; the command carries all four fields.
 

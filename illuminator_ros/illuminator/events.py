@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from .model import Configuration, FIELDS, Status
 from ..mavlink.messages import Address
@@ -235,8 +236,7 @@ class LightSwitched(LightEvent):
 AnyLightEvent = LightEvent | StatusReceived
 
 
-@dataclass(frozen=True, slots=True)
-class LightSnapshot:
+class LightSnapshot(NamedTuple):
     """
     A light at one moment, for any thread. Times are s on the link's clock.
 

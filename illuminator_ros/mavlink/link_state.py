@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 from .frame import DecoderCounters
 from .signing import SigningCounters
@@ -86,8 +86,7 @@ TRANSITIONS: dict[tuple[LinkState, LinkInput], LinkState] = {
 }
 
 
-@dataclass(frozen=True)
-class LinkEvent:
+class LinkEvent(NamedTuple):
     """
     The link was opened or lost, or cannot be opened; as text it is a line for people.
 
@@ -111,8 +110,7 @@ class LinkEvent:
         return f'link {what}: {self.name}: {self.reason}; trying again{more}'
 
 
-@dataclass(frozen=True)
-class LinkSnapshot:
+class LinkSnapshot(NamedTuple):
     """
     A link at a moment, made by its thread and never changed; for any thread.
 
@@ -205,7 +203,7 @@ class LinkStatus:
             return None
         self._allowed -= 1
         unreported, self._unreported = self._unreported, 0
-        return replace(self._events.pop(0), unreported=unreported)
+        return self._events.pop(0)._replace(unreported=unreported)
 
     def next_deadline(self) -> float:
         """Return when a waiting event may be reported, infinity if there is none."""

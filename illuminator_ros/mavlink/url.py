@@ -21,7 +21,6 @@ An empty host to listen on means all interfaces, as in all three. IPv6 addresses
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 import ipaddress
 import re
 from typing import NamedTuple, NoReturn
@@ -55,8 +54,7 @@ class HostPort(NamedTuple):
 ANY = HostPort('', 0)
 
 
-@dataclass(frozen=True)
-class UdpUrl:
+class UdpUrl(NamedTuple):
     """
     A UDP socket.
 
@@ -70,16 +68,14 @@ class UdpUrl:
     broadcast: str = ''
 
 
-@dataclass(frozen=True)
-class TcpUrl:
+class TcpUrl(NamedTuple):
     """A TCP client, or a server where ``listen`` is set."""
 
     address: HostPort
     listen: bool = False
 
 
-@dataclass(frozen=True)
-class SerialUrl:
+class SerialUrl(NamedTuple):
     """A serial port: device path, rate (Bd, up to :data:`MAX_BAUD`) and RTS/CTS flow control."""
 
     device: str
@@ -87,8 +83,7 @@ class SerialUrl:
     hardware_flow_control: bool = False
 
 
-@dataclass(frozen=True)
-class PtyUrl:
+class PtyUrl(NamedTuple):
     """
     A pseudo-terminal to be made: a serial line within this machine, without hardware.
 
@@ -98,8 +93,7 @@ class PtyUrl:
     link: str = ''
 
 
-@dataclass(frozen=True)
-class MemoryUrl:
+class MemoryUrl(NamedTuple):
     """An in-process link for tests and examples: both sides open the same name."""
 
     name: str

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from .arbitration import Arbiter, Cause, HolderChanged, Policy
 
@@ -31,8 +31,7 @@ _REASONS = {
 }
 
 
-@dataclass(frozen=True)
-class SourceSettings:
+class SourceSettings(NamedTuple):
     """
     The sources of commands.
 

@@ -16,13 +16,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 
-@dataclass(frozen=True)
-class PayloadType:
+class PayloadType(NamedTuple):
     """
     One kind of payload: a light, a winch, a camera ...
 

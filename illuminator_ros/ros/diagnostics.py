@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
@@ -48,8 +49,7 @@ Finding = tuple[bytes, str]
 Value = str | int | float | bool | None
 
 
-@dataclass(frozen=True)
-class Report:
+class Report(NamedTuple):
     """
     The content of one DiagnosticStatus.
 

@@ -17,13 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
 import difflib
 import math
 from pathlib import Path
 import re
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from rcl_interfaces import msg
 from rclpy.node import Node
@@ -51,8 +50,7 @@ class ParameterError(ValueError):
     """A wrong parameter; the message names it and gives the reason."""
 
 
-@dataclass(frozen=True)
-class ParameterSpec:
+class ParameterSpec(NamedTuple):
     """
     One parameter.
 
@@ -161,8 +159,7 @@ LINK_PARAMETERS = (
 )
 
 
-@dataclass(frozen=True)
-class LinkParameters:
+class LinkParameters(NamedTuple):
     """The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges."""
 
     connection_url: str

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.node import Node
 
@@ -34,8 +34,7 @@ from ..mavlink.link import Link
 ShutdownReport = Callable[[Hashable, int, str], None]
 
 
-@dataclass(frozen=True)
-class Host:
+class Host(NamedTuple):
     """
     The services that the bridge offers to the ROS half of one payload.
 

@@ -44,7 +44,7 @@ REFERENCE, PROTOCOL, MONITOR = (
 LINK_PARAMETERS = (*SHARED_PARAMETERS, *LIGHT_PARAMETERS)
 CAMERA_PARAMETERS = (*camera.PARAMETERS, *camera.MOUNT_PARAMETERS)
 URL, CAMERA_URL = (
-    dataclasses.replace(SHARED_PARAMETERS[0], default=default)
+    SHARED_PARAMETERS[0]._replace(default=default)
     for default in (SHARED_PARAMETERS[0].default, camera.REDEDGE.link_defaults['connection_url']))
 PARAMETERS = (*LINK_PARAMETERS, *DEVICE_PARAMETERS)
 LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}

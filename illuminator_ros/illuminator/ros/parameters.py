@@ -17,10 +17,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 import functools
 import re
 import reprlib
+from typing import NamedTuple
 
 from rclpy.node import Node
 
@@ -83,8 +83,7 @@ DEVICE_PARAMETERS = (
 _GEOMETRY = ('frame_id', 'beam_range', 'beam_angle', 'mounted_on')
 
 
-@dataclass(frozen=True)
-class BeamGeometry:
+class BeamGeometry(NamedTuple):
     """
     Where a light is, and the cone of its beam along +x from there.
 
@@ -110,7 +109,7 @@ class BeamGeometry:
         :raises ParameterError: if a parameter is wrong.
         """
         return BeamGeometry.of(declare_read_only(
-            node, (spec for spec in LIGHT_PARAMETERS if spec.name in _GEOMETRY), vars(self)))
+            node, (spec for spec in LIGHT_PARAMETERS if spec.name in _GEOMETRY), self._asdict()))
 
 
 def settings(values: Values) -> Settings:
@@ -138,7 +137,7 @@ def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
     if limits.min_strobe_period:
         notes['strobe_period'] = (f'0 = no strobe, else at least {limits.min_strobe_period:g} s, '
                                   'which is min_strobe_period, and within what the light reports')
-    return tuple(replace(spec, constraints=notes.get(spec.name, spec.constraints))
+    return tuple(spec._replace(constraints=notes.get(spec.name, spec.constraints))
                  for spec in DEVICE_PARAMETERS)
 
 
