@@ -146,12 +146,14 @@ def test_all_bytes_go_both_ways_unchanged(stream: Stream) -> None:
 def test_read_that_fills_the_buffer_says_that_there_may_be_more(
         stream: Stream, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(base, 'READ_SIZE', 4)
-    stream.write(b'123456')
-    for piece, more in ((b'1234', True), (b'56', False)):
+    stream.write(b'12345678ab')
+    for piece, more in ((b'12345678', True), (b'ab', False)):
         assert (stream.ours.receive_bytes(len(piece)), stream.ours.channel.more) == (piece, more)
 
 
-def test_read_of_a_full_terminal_says_that_there_may_be_more() -> None:
+def test_read_of_a_full_terminal_says_that_there_may_be_more(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(base, 'MAX_READS', 1)
     far, near = os.openpty()
     tty.setraw(near)
     os.write(far, bytes(2 * base.READ_SIZE))

@@ -34,9 +34,11 @@ Peer = Hashable
 # Bytes that wait for a slow line. Whole frames beyond that are dropped, the oldest first: a
 # command that has waited longer than its time-out has been sent again.
 MAX_QUEUED = 16 * 1024
-# Bytes read from a stream before other work gets its turn. As many as a terminal of Linux holds: a
-# full one stops a fast sender, such as a USB device, and must be read again at once.
+# Bytes of one read from a stream. As many as a terminal of Linux holds: a full one stops a fast
+# sender, such as a USB device, and must be read again at once.
 READ_SIZE = 4095
+# Reads before other work gets its turn: a second one is a third of a turn.
+MAX_READS = 2
 
 
 class ChannelLost(OSError):
@@ -165,11 +167,21 @@ class Stream:
 
     def receive(self) -> bytes | None:
         """Return available bytes, None if there are none yet, b'' at the end."""
-        try:
-            data = os.read(self._descriptor, READ_SIZE)
-        except BlockingIOError:
-            return None
-        self.more = len(data) == READ_SIZE
+        data = b''
+        for _ in range(MAX_READS):
+            try:
+                part = os.read(self._descriptor, READ_SIZE)
+            except OSError as error:
+                # The next call meets the same error.
+                if data or isinstance(error, BlockingIOError):
+                    return data or None
+                raise
+            if not part:
+                break
+            data += part
+            self.more = len(part) == READ_SIZE
+            if not self.more:
+                break
         return data
 
     def send(self, frames: Sequence[bytes], selector: selectors.BaseSelector) -> int:
