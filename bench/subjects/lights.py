@@ -15,114 +15,95 @@
 """
 CPU time for a status with 1, 10 and 100 lights on one link.
 
-Without ROS: the thread of the link is measured, which for each light does all but publish.
+Without ROS and without sockets: the turns of the link, which for each light do all but publish. In
+simulated time, so that the numbers of lights are compared in turn within milliseconds: on a shared
+machine, the processor's speed and caches change the cost by half from one second to the next.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-import contextlib
-import queue
-import socket
+import itertools
 import time
 
 from illuminator_ros.illuminator.events import AnyLightEvent, StatusReceived
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import Address, heartbeat, MavType, Message
-from illuminator_ros.mavlink.url import parse_url
 from support.client import Client
 from support.frames import frame_of
+from support.simulated_link import SimulatedLink
 
-from ..rig import Bench, free_port, interleaved, PATIENCE
+from ..rig import Bench, interleaved
 from ..rows import one, Row, times
 
 COUNTS = (1, 10, 100)
 # Frames per second, half of them statuses; the same for any number of lights, so that nothing
 # but the number differs.
 RATE = 800
-ROUNDS = 7
-WARM_UP, MEASURED = 0.4, 0.6
+# Frames before the measurement, until no light is asked for its identity any more, and in each
+# part of it, which has all that is done once a second.
+WARM_UP, PART = 10 * RATE, RATE
+ROUNDS = 25
 FLAT = 1.2
+PEER = '127.0.0.1', 14550
 
 
-@contextlib.contextmanager
-def listening(port: int) -> Iterator[tuple[Link, list[AnyLightEvent]]]:
-    """Run a client of lights that listens on a port; yield its link and its events."""
-    events: list[AnyLightEvent] = []
-    # The lights do not answer, and the client soon gives up its first requests.
-    client = Client(Address(1, 194), Settings(), command_timeout=0.05, command_retries=0)
-    client.events.subscribe(events.append)
-    link = Link(parse_url(f'udpin://127.0.0.1:{port}'), client, label='')
-    link.start()
-    until = time.monotonic() + PATIENCE
-    while not link.state().is_open and time.monotonic() < until:
-        time.sleep(0.001)
-    try:
-        yield link, events
-    finally:
-        link.stop()
+class Lights:
+    """
+    A link with some lights.
+
+    :ivar costs: CPU time for a status and a heartbeat in each part of the measurement, us.
+    """
+
+    def __init__(self, number: int, warm_up: int) -> None:
+        # The lights do not answer, and the client soon gives up its first requests.
+        client = Client(Address(1, 194), Settings(), command_timeout=0.05, command_retries=0)
+        client.events.subscribe(self._count)
+        self._link = SimulatedLink(client, lambda data, peer: None)
+        self._frames = frames(number)
+        self._statuses = 0
+        self.costs: list[float] = []
+        self.measure(warm_up)
+        self.costs.clear()
+
+    def _count(self, event: AnyLightEvent) -> None:
+        self._statuses += isinstance(event, StatusReceived)
+
+    def measure(self, count: int) -> None:
+        """Receive some frames, and measure the CPU time."""
+        received = [(frame, PEER) for frame in itertools.islice(self._frames, count)]
+        before, began = self._statuses, time.thread_time()
+        for datagram in received:
+            self._link.receive(datagram)
+            self._link.run(1 / RATE)
+        self.costs.append(1e6 * (time.thread_time() - began) / (self._statuses - before))
 
 
-def frames(lights: int, seconds: float) -> list[bytes]:
-    """Return what lights send in some time: heartbeats and statuses, RATE a second in all."""
+def frames(lights: int) -> Iterator[bytes]:
+    """Yield what lights send: heartbeats and statuses, RATE a second in all."""
     sources = [Address(2 + number // 250, 1 + number % 250) for number in range(lights)]
     sequences: Counter[Address] = Counter()
-    result = []
 
-    def add(source: Address, message: Message) -> None:
-        result.append(frame_of(message, sequences[source] & 0xFF, source))
+    def next_frame(source: Address, message: Message) -> bytes:
         sequences[source] += 1
+        return frame_of(message, sequences[source] & 0xFF, source)
 
-    for number in range(int(RATE / 2 * seconds)):
+    for number in itertools.count():
         source = sources[number % lights]
-        add(source, heartbeat(MavType.ILLUMINATOR))
-        add(source, IlluminatorStatus(
+        yield next_frame(source, heartbeat(MavType.ILLUMINATOR))
+        yield next_frame(source, IlluminatorStatus(
             100_000 + int(number * 2000 / RATE), 1, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
-    return result
-
-
-def cpu_per_status(lights: int, warm_up: float, measured: float) -> float:
-    """Return the CPU time of the link's thread for a status and a heartbeat, s."""
-    port = free_port()
-    sending = frames(lights, warm_up + measured)
-    with (listening(port) as (link, events),
-          socket.socket(type=socket.SOCK_DGRAM) as sender):
-        sender.connect(('127.0.0.1', port))
-
-        def statuses() -> int:
-            return sum(isinstance(event, StatusReceived) for event in list(events))
-
-        def thread_time() -> float:
-            answers: queue.SimpleQueue[float] = queue.SimpleQueue()
-            link.call(lambda now: answers.put(time.thread_time()))
-            return answers.get(timeout=10.0)
-
-        began = time.monotonic()
-        before, count = 0.0, 0
-        for number, frame in enumerate(sending):
-            if number == int(warm_up * RATE):
-                before, count = thread_time(), statuses()
-            with contextlib.suppress(ConnectionError):
-                sender.send(frame)
-            if not number % 4:
-                time.sleep(max(began + number / RATE - time.monotonic(), 0))
-        until = time.monotonic() + 5.0
-        while statuses() < len(sending) // 2 and time.monotonic() < until:
-            time.sleep(0.01)
-        return (thread_time() - before) / (statuses() - count)
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Compare the numbers of lights in alternate order, then find them."""
-    costs: dict[str, list[float]] = {str(count): [] for count in COUNTS}
-    for name in interleaved(list(costs), bench.amount(ROUNDS, 1)):
-        costs[name].append(1e6 * cpu_per_status(
-            int(name), *bench.amount((WARM_UP, MEASURED), (0.2, 0.1))))
+    """Compare the numbers of lights in alternate order."""
+    found = {str(count): Lights(count, bench.amount(WARM_UP, RATE)) for count in COUNTS}
+    for name in interleaved(list(found), bench.amount(ROUNDS, 1)):
+        found[name].measure(bench.amount(PART, 20))
     # The least: whatever else the machine does only adds to it.
-    least = {name: min(values) for name, values in costs.items()}
+    least = {name: min(lights.costs) for name, lights in found.items()}
     base = one(least['1'])
     for name, cost in least.items():
         targets = [] if name == '1' else [times(one(cost), base, FLAT)]
