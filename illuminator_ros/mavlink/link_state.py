@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from .frame import DecoderCounters
 from .signing import SigningCounters
-from .statistics import Traffic
+from .statistics import TrafficSnapshot
 
 # Different reasons for not opening that are reported before the first opening.
 MAX_REASONS = 16
@@ -125,7 +125,7 @@ class LinkSnapshot(NamedTuple):
     reason: str
     openings: int
     peers: int
-    traffic: Traffic
+    traffic: TrafficSnapshot
     decoding: DecoderCounters
     signing: SigningCounters
 

@@ -17,8 +17,7 @@
 from __future__ import annotations
 
 from array import array
-from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from .messages import Address
@@ -61,15 +60,24 @@ class WindowedCounter(NamedTuple):
         return WindowedCounter(total, now, samples)
 
     @property
-    def growth(self) -> int:
-        """Return the growth within the window."""
-        return self.total - self.samples[0][1] if self.samples else 0
-
-    @property
     def rate(self) -> float:
         """Return the growth per second."""
         elapsed = self.time - self.samples[0][0] if self.samples else 0.0
-        return self.growth / elapsed if elapsed > 0 else 0.0
+        return (self.total - self.samples[0][1]) / elapsed if elapsed > 0 else 0.0
+
+
+class SourceCounts(NamedTuple):
+    """
+    Frames of one source; see :class:`SequenceCounter`.
+
+    :param recent_loss: share of frames lost recently, %.
+    """
+
+    received: int
+    lost: int
+    duplicate: int
+    reordered: int
+    recent_loss: float
 
 
 class _Place(NamedTuple):
@@ -112,8 +120,8 @@ class SequenceCounter:
     _next: int = -1
     # Bit i is set where number newest - i has come.
     _seen: int = 0
-    _recently_lost: WindowedCounter = WindowedCounter()
-    _recently_received: WindowedCounter = WindowedCounter()
+    # At most two samples of time (s), lost and received, the older first, RECENT apart.
+    _samples: tuple[tuple[float, int, int], ...] = ()
 
     def add(self, sequence: int, content: int | None = None) -> None:
         """
@@ -206,30 +214,43 @@ class SequenceCounter:
 
     def reset_loss(self) -> None:
         """Forget recent losses: the sequence numbers of the sender have restarted."""
-        self._recently_lost = self._recently_received = WindowedCounter()
+        self._samples = ()
 
-    def sample(self, now: float) -> None:
-        """Update the recent loss."""
-        self._recently_lost = self._recently_lost.sample(self.lost, now)
-        self._recently_received = self._recently_received.sample(
-            self.received - self.duplicate, now)
+    def snapshot(self, now: float) -> SourceCounts:
+        """Update the recent loss and return the counts."""
+        received = self.received - self.duplicate
+        if not self._samples or now - self._samples[-1][0] >= RECENT:
+            self._samples = (*self._samples[-1:], (now, self.lost, received))
+        _, lost_before, received_before = self._samples[0]
+        lost, received = self.lost - lost_before, received - received_before
+        return SourceCounts(
+            self.received, self.lost, self.duplicate, self.reordered,
+            100.0 * max(lost, 0) / (lost + received) if lost + received > 0 else 0.0)
 
-    @property
-    def recent_loss(self) -> float:
-        """Return the share of frames lost recently, %, as of the last sample."""
-        lost, received = self._recently_lost.growth, self._recently_received.growth
-        return 100.0 * max(lost, 0) / (lost + received) if lost + received > 0 else 0.0
+
+class TrafficSnapshot(NamedTuple):
+    """
+    The traffic of a link at one moment.
+
+    :param bytes_received: all, good or not.
+    :param frames_received: those that came with the right checksum.
+    :param frames_dropped: those that found no room to go out.
+    :param received: bytes, and ``sent``, recently.
+    """
+
+    bytes_received: int
+    bytes_sent: int
+    frames_received: int
+    frames_sent: int
+    frames_dropped: int
+    received: WindowedCounter
+    sent: WindowedCounter
+    sources: dict[Address, SourceCounts]
 
 
 @dataclass(slots=True)
 class Traffic:
-    """
-    The traffic of a link since it was made.
-
-    :param bytes_received: all, good or not.
-    :param frames_dropped: those that found no room to go out.
-    :param received: bytes, and ``sent``, recently, as of the last snapshot.
-    """
+    """The traffic of a link since it was made; see :class:`TrafficSnapshot`."""
 
     bytes_received: int = 0
     bytes_sent: int = 0
@@ -240,20 +261,15 @@ class Traffic:
     received: WindowedCounter = WindowedCounter()
     sent: WindowedCounter = WindowedCounter()
 
-    @property
-    def frames_received(self) -> int:
-        """Those that came with the right checksum."""
-        return self._frames_of_others + sum(
-            counter.received for counter in self.sources.values())
-
-    def snapshot(self, now: float) -> Traffic:
-        """Update the recent values and return a copy."""
+    def snapshot(self, now: float) -> TrafficSnapshot:
+        """Update the recent values and return all."""
         self.received = self.received.sample(self.bytes_received, now)
         self.sent = self.sent.sample(self.bytes_sent, now)
-        for counter in self.sources.values():
-            counter.sample(now)
-        return replace(self, sources={
-            source: copy(counter) for source, counter in self.sources.items()})
+        sources = {source: counter.snapshot(now) for source, counter in self.sources.items()}
+        return TrafficSnapshot(
+            self.bytes_received, self.bytes_sent,
+            self._frames_of_others + sum(counts.received for counts in sources.values()),
+            self.frames_sent, self.frames_dropped, self.received, self.sent, sources)
 
     def count(
         self, source: Address, sequences: bytes | bytearray, content: int | None = None,

@@ -111,8 +111,7 @@ def test_counts_agree_with_numbers_that_do_not_wrap(journey: tuple[list[int], Co
 
 def recent_loss(counter: statistics.SequenceCounter, now: float) -> float:
     """Sample the recent loss, %."""
-    counter.sample(now)
-    return counter.recent_loss
+    return counter.snapshot(now).recent_loss
 
 
 @given(runs=st.lists(st.tuples(
@@ -187,7 +186,7 @@ def test_traffic_counts_each_source_apart_and_over_interruptions() -> None:
     traffic.count(LIGHT, bytes((90, 92)))
     assert counts(traffic.sources[LIGHT]) == (4, 3, 0, 0)
     assert counts(traffic.sources[Address(1, 1)]) == (2, 5, 0, 0)
-    assert traffic.frames_received == 6
+    assert traffic.snapshot(0.0).frames_received == 6
 
 
 def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
@@ -195,6 +194,6 @@ def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
     for number in range(2 * statistics.MAX_SOURCES):
         traffic.count(Address(2 + number // 256, number % 256), b'\0')
     traffic.count(Address(2, 0), b'\1')
-    assert (len(traffic.sources), traffic.frames_received) == (
+    assert (len(traffic.sources), traffic.snapshot(0.0).frames_received) == (
         statistics.MAX_SOURCES, 2 * statistics.MAX_SOURCES + 1)
     assert traffic.sources[Address(2, 0)].received == 2
