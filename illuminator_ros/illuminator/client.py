@@ -87,7 +87,7 @@ class IlluminatorClient(Payload):
 
     def _make(self, address: Address) -> Light:
         def emit(event: AnyLightEvent) -> None:
-            if address in self.lights:
+            if address in self._discovery.devices:
                 self.events.emit(event)
 
         return Light(address, self.commands, self.settings, emit, self._changed)

@@ -119,7 +119,7 @@ class Discovery(Generic[D]):
         """
         device = self.devices.get(address)
         if device is not None:
-            self.changed(address)
+            self._deadlines.changed(address)
             return device
         device = self._candidates.get(address) or self._candidate(address, now, proved=proved)
         if device is not None:

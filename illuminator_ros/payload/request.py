@@ -489,7 +489,7 @@ class RequestQueue(Generic[S]):
     @property
     def is_confirming(self) -> bool:
         """Whether a request waits for a status."""
-        return bool(self._requests) and self._requests[0].is_confirming
+        return bool(self._requests) and self._requests[0].phase is Phase.CONFIRMING
 
     def __len__(self) -> int:
         """Return how many requests are on their way or wait."""
