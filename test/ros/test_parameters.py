@@ -17,6 +17,8 @@
 from collections.abc import Iterator
 from typing import Any
 
+from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
+from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, GetParameterTypes
@@ -24,20 +26,12 @@ from support.light import ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
 DEVICE = ('mode', 'brightness', 'strobe_period', 'strobe_duty_cycle')
-DOUBLE, STRING, INTEGER, BOOL, NOT_SET = (
+DOUBLE, STRING, NOT_SET = (
     ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_STRING,
-    ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL,
     ParameterType.PARAMETER_NOT_SET)
-LINK = {
-    'connection_url': STRING, 'system_id': INTEGER, 'component_id': INTEGER,
-    'mavlink_version': INTEGER,
-    'target_system': INTEGER, 'target_component': INTEGER, 'heartbeat_timeout': DOUBLE,
-    'command_timeout': DOUBLE, 'command_retries': INTEGER, 'status_interval': DOUBLE,
-    'frame_id': STRING, 'beam_range': DOUBLE, 'beam_angle': DOUBLE,
-    'diagnostics_period': DOUBLE, 'off_on_shutdown': BOOL,
-    'restore_configuration': BOOL, 'signing_mode': STRING, 'signing_key_file': STRING,
-    'names': ParameterType.PARAMETER_STRING_ARRAY,
-}
+TYPES = {float: DOUBLE, str: STRING, int: ParameterType.PARAMETER_INTEGER,
+         bool: ParameterType.PARAMETER_BOOL, list: ParameterType.PARAMETER_STRING_ARRAY}
+LINK = {spec.name: TYPES[type(spec.default)] for spec in (*LINK_PARAMETERS, *LIGHT_PARAMETERS)}
 
 
 @pytest.fixture(scope='module')

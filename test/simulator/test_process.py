@@ -22,9 +22,10 @@ import sys
 
 from illuminator_ros.mavlink.messages import Address
 import pytest
+from support.fork_server import prepare_child
 from support.live_link import Bridge
 from support.ports import free_port
-from support.processes import ended, environment, prepare_child, python, ROOT
+from support.processes import ended, environment, python, ROOT
 from support.waiting import eventually, PATIENCE
 
 SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']

@@ -58,9 +58,25 @@ MODULES = (
     'rosidl_parser.parser', 'service_msgs.msg', 'type_description_interfaces.msg')
 
 
+def handle_signals_by_default() -> None:
+    """
+    Give this process default signal handling.
+
+    Children inherit ignored signals: SIGHUP under nohup, SIGINT in the background of a script.
+    """
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGTSTP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def end_with_parent() -> None:
     """Let this process end with the thread that is its parent."""
     PRCTL(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def prepare_child() -> None:
+    """Give a child default signal handling, and let it end with the thread that starts it."""
+    handle_signals_by_default()
+    end_with_parent()
 
 
 class ForkedProcess:
@@ -111,7 +127,8 @@ def _start(path: str) -> None:
     subprocess.Popen(
         [sys.executable, '-c', f'from {__name__} import serve; serve({number})'],
         env={**os.environ, 'PYTHONPATH': path}, cwd=Path(__file__).parents[2],
-        stdin=subprocess.DEVNULL, start_new_session=True, pass_fds=[number])
+        stdin=subprocess.DEVNULL, pass_fds=[number], start_new_session=True,
+        preexec_fn=handle_signals_by_default)
     _SERVER_END.close()
 
 

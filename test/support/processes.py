@@ -29,7 +29,7 @@ import tempfile
 import threading
 from typing import Any, IO
 
-from support.fork_server import end_with_parent, fork, ForkedProcess
+from support.fork_server import fork, ForkedProcess, prepare_child
 from support.waiting import PATIENCE
 
 ROOT = Path(__file__).parents[2]
@@ -143,17 +143,6 @@ def _start(
     stdin, stdout, stderr = streams
     return subprocess.Popen(command, env=variables, cwd=directory, stdin=stdin, stdout=stdout,
                             stderr=stderr, preexec_fn=prepare_child)
-
-
-def prepare_child() -> None:
-    """
-    Give a child default signal handling, and let it end with the thread that starts it.
-
-    Children inherit ignored signals: SIGHUP under nohup, SIGINT in the background of a script.
-    """
-    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGTSTP):
-        signal.signal(number, signal.SIG_DFL)
-    end_with_parent()
 
 
 @functools.cache

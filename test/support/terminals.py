@@ -28,7 +28,8 @@ import sys
 import termios
 import threading
 
-from support.processes import environment, prepare_child, ROOT
+from support.fork_server import prepare_child
+from support.processes import environment, ROOT
 from support.waiting import PATIENCE
 
 _CONTROL = re.compile(r'\x1b\[[\d;?]*[A-Za-z]')

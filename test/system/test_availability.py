@@ -25,8 +25,9 @@ import sys
 from illuminator_ros.mavlink.link import Link
 import pytest
 from std_srvs.srv import SetBool
+from support.fork_server import prepare_child
 from support.light import MavResult, ON_OFF, ServedLight
-from support.processes import environment, prepare_child
+from support.processes import environment
 from support.recording import Call
 from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until
