@@ -159,11 +159,16 @@ def test_read_of_a_full_terminal_says_that_there_may_be_more(
     os.write(far, bytes(2 * base.READ_SIZE))
     eventually(lambda: struct.unpack(
         'i', fcntl.ioctl(near, termios.FIONREAD, bytes(4))) >= (base.READ_SIZE,))
-    stream = base.Stream(near)
-    stream.receive()
-    assert stream.more
+
+    class Line(base.StreamChannel):
+        def close(self) -> None:
+            os.close(near)
+
+    line = Line('line', near, 'it has ended')
+    assert next(line.receive(near))
+    assert line.more
     os.close(far)
-    os.close(near)
+    line.close()
 
 
 def test_line_without_reader_gets_whole_frames_and_the_newest(stream: Stream) -> None:

@@ -147,88 +147,52 @@ class FrameQueue:
             count -= min(count, len(frame))
 
 
-class Stream:
-    """
-    A connected socket or a serial port that does not block, with its queue of frames.
-
-    :ivar more: see :class:`Channel`.
-    """
-
-    def __init__(self, file: socket.socket | int) -> None:
-        self.file = file
-        self.more = False
-        self._descriptor = file if isinstance(file, int) else file.fileno()
-        self._queue = FrameQueue()
-
-    @property
-    def is_waiting(self) -> bool:
-        """Return whether frames wait until the stream is writable."""
-        return bool(self._queue)
-
-    def receive(self) -> bytes | None:
-        """Return available bytes, None if there are none yet, b'' at the end."""
-        data = b''
-        for _ in range(MAX_READS):
-            try:
-                part = os.read(self._descriptor, READ_SIZE)
-            except OSError as error:
-                # The next call meets the same error.
-                if data or isinstance(error, BlockingIOError):
-                    return data or None
-                raise
-            if not part:
-                break
-            data += part
-            self.more = len(part) == READ_SIZE
-            if not self.more:
-                break
-        return data
-
-    def send(self, frames: Sequence[bytes], selector: selectors.BaseSelector) -> int:
-        """Queue and write; return how many frames were dropped."""
-        dropped = sum(map(self._queue.put, frames))
-        with contextlib.suppress(BlockingIOError):
-            while self._queue:
-                # In one call: each takes longer than making the frames.
-                self._queue.written(os.write(self._descriptor, self._queue.unwritten()))
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
-        if selector.get_key(self.file).events != events:
-            selector.modify(self.file, events)
-        return dropped
-
-
 class StreamChannel(Channel):
     """
-    A stream to one peer.
+    A connected socket or a serial port that does not block, with its queue of frames.
 
     :param at_end: why the channel is lost when the stream ends.
     """
 
-    def __init__(self, name: str, stream: Stream, at_end: str) -> None:
+    def __init__(self, name: str, file: socket.socket | int, at_end: str) -> None:
         self.name = name
-        self._stream = stream
+        self._file = file
+        self._descriptor = file if isinstance(file, int) else file.fileno()
         self._at_end = at_end
+        self._queue = FrameQueue()
 
     @property
     def is_waiting(self) -> bool:
         """See :attr:`Channel.is_waiting`."""
-        return self._stream.is_waiting
+        return bool(self._queue)
 
     def register(self, selector: selectors.BaseSelector) -> None:
         """See :meth:`Channel.register`."""
         self._selector = selector
-        selector.register(self._stream.file, selectors.EVENT_READ)
+        selector.register(self._file, selectors.EVENT_READ)
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
-        try:
-            data = self._stream.receive()
-        except OSError as error:
-            raise ChannelLost(error.errno, error.strerror) from None
-        if data == b'':
-            raise ChannelLost(self._at_end)
+        data = b''
+        for _ in range(MAX_READS):
+            try:
+                part = os.read(self._descriptor, READ_SIZE)
+            except BlockingIOError:
+                break
+            except OSError as error:
+                # The next call meets the same error.
+                if data:
+                    break
+                raise ChannelLost(error.errno, error.strerror) from None
+            if not part:
+                if data:
+                    break
+                raise ChannelLost(self._at_end)
+            data += part
+            self.more = len(part) == READ_SIZE
+            if not self.more:
+                break
         if data:
-            self.more = self._stream.more
             yield None, data
 
     def peers(self, now: float) -> Sequence[Peer]:
@@ -237,10 +201,17 @@ class StreamChannel(Channel):
 
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
+        self.dropped += sum(map(self._queue.put, frames))
         try:
-            self.dropped += self._stream.send(frames, self._selector)
+            with contextlib.suppress(BlockingIOError):
+                while self._queue:
+                    # In one call: each takes longer than making the frames.
+                    self._queue.written(os.write(self._descriptor, self._queue.unwritten()))
         except OSError as error:
             raise ChannelLost(error.errno, error.strerror) from None
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
+        if self._selector.get_key(self._file).events != events:
+            self._selector.modify(self._file, events)
 
     def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""

@@ -28,7 +28,7 @@ import struct
 import termios
 import tty
 
-from .base import Channel, Peer, Stream, StreamChannel
+from .base import Channel, Peer, StreamChannel
 from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
 # 8N1: a start bit, 8 data bits, a stop bit.
@@ -120,7 +120,7 @@ class _LineChannel(StreamChannel):
         self, fd: int, name: str, close: Callable[[], None],
         before_sending: Callable[[], None] = lambda: None, *, rate: float = math.inf,
     ) -> None:
-        super().__init__(name, Stream(fd), 'the device has gone')
+        super().__init__(name, fd, 'the device has gone')
         self.rate = rate
         self._fd = fd
         self._close = close

@@ -17,13 +17,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 import errno
 import math
 import selectors
 import socket
 
-from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, Stream, StreamChannel
+from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, StreamChannel
 from ..url import HostPort
 
 # s for all addresses of a name together; the link must return within 1 s of the other side.
@@ -38,32 +37,35 @@ EXPIRY = 10.0
 NO_ROOM = {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}
 
 
-def _stream(connection: socket.socket) -> Stream:
-    """Return the stream of a connected socket."""
-    connection.setblocking(False)
-    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    # The kernel would queue megabytes: minutes of commands that have timed out.
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    # Detect a vanished peer in seconds, not in hours.
-    for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
-                          ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
-        if hasattr(socket, option):
-            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
-    return Stream(connection)
+class _Connection(StreamChannel):
+
+    def __init__(self, name: str, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # The kernel would queue megabytes: minutes of commands that have timed out.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        # Detect a vanished peer in seconds, not in hours.
+        for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
+                              ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
+            if hasattr(socket, option):
+                connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        super().__init__(name, connection, 'the other side closed the connection')
+        self._connection = connection
+
+    def drop(self) -> None:
+        self._selector.unregister(self._connection)
+        self.close()
+
+    def close(self) -> None:
+        self._connection.close()
 
 
-class TcpClient(StreamChannel):
+class TcpClient(_Connection):
     """A connection to a server."""
 
     def __init__(self, address: HostPort) -> None:
-        self._connection = _connect(address)
-        super().__init__(f'tcp to {address}', _stream(self._connection),
-                         'the other side closed the connection')
-
-    def close(self) -> None:
-        """See :meth:`Channel.close`."""
-        self._connection.close()
+        super().__init__(f'tcp to {address}', _connect(address))
 
 
 def _connect(address: HostPort) -> socket.socket:
@@ -87,15 +89,6 @@ def _connect(address: HostPort) -> socket.socket:
     raise reason
 
 
-@dataclass
-class _Client:
-    """:param heard_at: time of the last valid frame, s."""
-
-    connection: socket.socket
-    stream: Stream
-    heard_at: float = -math.inf
-
-
 class TcpServer(Channel):
     """
     A listening socket and its clients, each a peer. The link survives the loss of a client.
@@ -115,7 +108,9 @@ class TcpServer(Channel):
         except OSError as error:
             self._listener.close()
             raise OSError(error.errno, f'cannot listen on {address}: {error.strerror}') from None
-        self._clients: dict[Peer, _Client] = {}
+        self._clients: dict[Peer, _Connection] = {}
+        # When each last sent a valid frame, s.
+        self._heard: dict[Peer, float] = {}
         self._now = -math.inf
         self.name = f'tcp server {HostPort(*self._listener.getsockname()[:2])}'
 
@@ -130,14 +125,11 @@ class TcpServer(Channel):
             self._accept()
         elif client := self._clients.get(handle):
             try:
-                data = client.stream.receive()
-            except OSError:
-                data = b''
-            if data == b'':
-                self._drop(client)
-            elif data:
-                self.more = client.stream.more
-                yield handle, data
+                for _, data in client.receive(handle):
+                    self.more = client.more
+                    yield handle, data
+            except ChannelLost:
+                self._drop(handle)
 
     def _accept(self) -> None:
         try:
@@ -148,30 +140,29 @@ class TcpServer(Channel):
             # The client has gone, or the fault is the connection's and not the listener's.
             return
         if len(self._clients) >= MAX_CLIENTS:
-            silent = min(self._clients.values(), key=lambda client: client.heard_at)
-            if self._now - silent.heard_at <= EXPIRY:
+            silent = min(self._heard, key=self._heard.__getitem__)
+            if self._now - self._heard[silent] <= EXPIRY:
                 connection.close()
                 return
             self._drop(silent)
         try:
-            self._clients[connection] = _Client(connection, _stream(connection))
+            client = _Connection('', connection)
         except OSError:
             connection.close()
-        else:
-            self._selector.register(connection, selectors.EVENT_READ)
+            return
+        client.register(self._selector)
+        self._clients[connection], self._heard[connection] = client, -math.inf
 
-    def _drop(self, client: _Client) -> None:
-        del self._clients[client.connection]
-        self._selector.unregister(client.connection)
-        client.connection.close()
+    def _drop(self, peer: Peer) -> None:
+        self._clients.pop(peer).drop()
+        del self._heard[peer]
 
     def heard(self, peer: Peer, now: float) -> bool:
         """See :meth:`Channel.heard`."""
         self._now = now
-        client = self._clients.get(peer)
-        if client is None:
+        if peer not in self._clients:
             return False
-        before, client.heard_at = client.heard_at, now
+        before, self._heard[peer] = self._heard[peer], now
         return before == -math.inf
 
     def peers(self, now: float) -> Sequence[Peer]:
@@ -183,10 +174,12 @@ class TcpServer(Channel):
         """See :meth:`Channel.send`."""
         for peer in peers:
             if client := self._clients.get(peer):
+                before = client.dropped
                 try:
-                    self.dropped += client.stream.send(frames, self._selector)
-                except OSError:
-                    self._drop(client)
+                    client.send(frames, ())
+                except ChannelLost:
+                    self._drop(peer)
+                self.dropped += client.dropped - before
 
     def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""
@@ -195,6 +188,6 @@ class TcpServer(Channel):
     def close(self) -> None:
         """See :meth:`Channel.close`."""
         for client in self._clients.values():
-            client.connection.close()
+            client.close()
         self._clients.clear()
         self._listener.close()
