@@ -33,13 +33,8 @@ ABSENCE_DELAY = 5.0
 
 
 class DeviceNode(Protocol):
-    """
-    The node of a device, while there is one.
+    """The node of a device, while there is one."""
 
-    :ivar full_name: with its namespace.
-    """
-
-    full_name: str
     source: DiagnosticsSource
 
     def release(self) -> None:
@@ -108,7 +103,7 @@ class DeviceNodes(Generic[K, N]):
         served = self._make(node, log)
         for warning in ignored_parameters(node, self._host.node):
             log.warning(warning)
-        self._host.log.info(f'{self._kind} {key} is served by {served.full_name}', 'served')
+        self._host.log.info(f'{self._kind} {key} is served by {served.source.node}', 'served')
 
         def bind(now: float) -> None:
             # The device may have been forgotten meanwhile, and found again.
@@ -130,8 +125,8 @@ class DeviceNodes(Generic[K, N]):
             node.release()
             if node is not self.first:
                 self._host.diagnostics.remove(node.source)
-                self._host.log.info(f'{self._kind} {key} was silent for long: {node.full_name} is '
-                                    'removed', 'forgotten')
+                self._host.log.info(f'{self._kind} {key} was silent for long: '
+                                    f'{node.source.node} is removed', 'forgotten')
         if request := self._requests.pop(key, None):
             self._host.nodes.remove(request)
 

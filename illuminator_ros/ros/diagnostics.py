@@ -69,13 +69,14 @@ class Report(NamedTuple):
         """Return the worst level."""
         return max((level for level, _ in self.findings), default=OK)
 
-    def message(self, node_name: str, full_name: str) -> DiagnosticStatus:
-        """Return the message of a node."""
+    def message(self, node: str) -> DiagnosticStatus:
+        """Return the message of a node, given its name with its namespace."""
         worst_first = sorted(self.findings, key=lambda finding: finding[0], reverse=True)
         # The name leaves out the namespace.
-        values = {**self.values(), 'node': full_name}
+        values = {**self.values(), 'node': node}
         return DiagnosticStatus(
-            level=self.level, name=f'{node_name}: {self.name}', hardware_id=self.hardware_id,
+            level=self.level, name=f'{node.rpartition("/")[2]}: {self.name}',
+            hardware_id=self.hardware_id,
             message='; '.join(text for _, text in worst_first) or self.fine,
             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()
                     if value is not None])

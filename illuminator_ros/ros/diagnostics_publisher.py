@@ -41,11 +41,11 @@ class DiagnosticsSource:
     """
     The reports of one node.
 
+    :param node: its name with its namespace.
     :param look: takes a snapshot, in a turn of the link, given the time (s).
     """
 
-    node_name: str
-    full_name: str
+    node: str
     look: Callable[[float], MakeReports]
 
 
@@ -116,5 +116,5 @@ class DiagnosticsPublisher:
     def _publish(self, source: DiagnosticsSource, reports: Sequence[Report]) -> None:
         array = DiagnosticArray()
         array.header.stamp = self._clock.now().to_msg()
-        array.status = [report.message(source.node_name, source.full_name) for report in reports]
+        array.status = [report.message(source.node) for report in reports]
         self._publisher.publish(array)

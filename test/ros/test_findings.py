@@ -76,7 +76,7 @@ class Reported:
             link_snapshot(self.link, self.client, 'udpin://', self.link.now), light=light,
             heard=heard or LightsHeard(0, (), False),
             hardware_id=hardware_id(light) if light else '', started=self._started)
-        return {one.name: one.message('illuminator', '/illuminator') for one in made}
+        return {one.name: one.message('/illuminator') for one in made}
 
 
 def found(status: DiagnosticStatus) -> tuple[bytes, str]:

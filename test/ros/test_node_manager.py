@@ -98,9 +98,8 @@ class Served:
     """The node of a device, in name only."""
 
     def __init__(self, node: Node) -> None:
-        self.full_name = node.get_fully_qualified_name()
         self.source = DiagnosticsSource(
-            node.get_name(), self.full_name, lambda now: lambda link: ())
+            node.get_fully_qualified_name(), lambda now: lambda link: ())
 
     def release(self) -> None:
         """Serve no device."""

@@ -78,7 +78,6 @@ class GimbalNode:
         self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
         settings: GimbalSettings, why_none: Callable[[], str],
     ) -> None:
-        self.full_name = node.get_fully_qualified_name()
         self.key: events.GimbalKey | None = None
         self._host = host
         self._log = log
@@ -107,7 +106,7 @@ class GimbalNode:
             self._interface.publish('source', '')
         self._interface.publish('connected', False)
         self._publish_control(None, False)
-        self.source = DiagnosticsSource(node.get_name(), self.full_name, self._look)
+        self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._look)
 
     def bind(self, key: events.GimbalKey, now: float) -> None:
         """Serve a gimbal from now on, and publish what is known of it."""

@@ -129,9 +129,7 @@ class ManagerNode(ServedPayload):
             publications=() if manager.tracker.has_mavlink else (
                 Publication('device/setpoint', QuaternionStamped, STREAM_QOS),),
             commands=tuple(self._topics()))
-        self._source = DiagnosticsSource(
-            host.node.get_name(), host.node.get_fully_qualified_name(), self._look)
-        host.diagnostics.add(self._source)
+        host.diagnostics.add(DiagnosticsSource(host.node.get_fully_qualified_name(), self._look))
         manager.events.subscribe(self._take)
 
     def _topics(self) -> list[AnyCommand]:

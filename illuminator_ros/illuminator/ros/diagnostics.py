@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 import math
 
 from ..events import LightSnapshot
@@ -182,11 +182,7 @@ def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Valu
     if light.configuration:
         values['agreed'] = light.configuration.describe()
     if identity is not None:
-        values |= {
-            'vendor': identity.vendor, 'model': identity.model,
-            'software_version': identity.software_version,
-            'hardware_version': identity.hardware_version,
-            'serial_number': identity.serial_number}
+        values |= asdict(identity)
     return values
 
 

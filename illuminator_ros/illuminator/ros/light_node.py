@@ -68,7 +68,6 @@ class LightNode:
         commands: tuple[ros_node.AnyCommand, ...] = (),
     ) -> None:
         self.name = node.get_name()
-        self.full_name = node.get_fully_qualified_name()
         self.address: Address | None = None
         self._host = host
         self._log = log
@@ -101,7 +100,7 @@ class LightNode:
             check_diagnostics=host.check_diagnostics)
         self._beam = (BeamPublisher(node, geometry, self._direction)
                       if geometry.beam_range else None)
-        self.source = DiagnosticsSource(self.name, self.full_name, self._look)
+        self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._look)
 
     def bind(self, address: Address, now: float) -> None:
         """Serve a light from now on, and publish what is known of it."""

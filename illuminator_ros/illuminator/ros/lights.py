@@ -97,7 +97,7 @@ class Lights(ServedPayload):
                 and not self._second_reported):
             self._second_reported = True
             self._host.log.info(
-                f'a second light, {address}, was found; {nodes.first.full_name} serves '
+                f'a second light, {address}, was found; {nodes.first.source.node} serves '
                 f'{nodes.first.address}. Set target_system and target_component to choose')
 
     # Requests to all lights

@@ -113,8 +113,7 @@ class CameraNode(ServedPayload):
         client.feeder.set_fixed_mount(_angles(angles), host.link.clock())
         ParameterServices(
             host.node, host.link, host.log, self._parameters, configure=self._set_mount)
-        host.diagnostics.add(DiagnosticsSource(
-            host.node.get_name(), host.node.get_fully_qualified_name(), self._look))
+        host.diagnostics.add(DiagnosticsSource(host.node.get_fully_qualified_name(), self._look))
         client.events.subscribe(self._take)
 
     # Requests
