@@ -26,15 +26,14 @@ from pathlib import Path
 import socket
 import sys
 
-import rclpy
-from rclpy.executors import ExternalShutdownException
-from std_srvs.srv import SetBool
-
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID  # noqa: E402
 from illuminator_ros.mavlink import messages as mav  # noqa: E402
+import rclpy  # noqa: E402
+from rclpy.executors import ExternalShutdownException  # noqa: E402
+from std_srvs.srv import SetBool  # noqa: E402
 from support.frames import frame_of  # noqa: E402
 
 HEADER, CHECKSUM = 10, 2
