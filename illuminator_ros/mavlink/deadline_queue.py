@@ -44,6 +44,10 @@ class DeadlineQueue(Generic[K]):
         self._entered: dict[K, float] = {}
         self._order = itertools.count()
 
+    def __len__(self) -> int:
+        """Return how many keys have a deadline, as far as that is known."""
+        return len(self._deadlines)
+
     def set(self, key: K, deadline: float) -> None:  # noqa: A003
         """Set the deadline of a key, infinity for none."""
         if deadline == math.inf:

@@ -22,8 +22,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import functools
 from functools import cached_property
-import heapq
-import itertools
 import math
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
@@ -246,27 +244,6 @@ class Description(Generic[D]):
     seed: int = 0
 
 
-class _Schedule:
-    """Actions that are due later, in the order of their times."""
-
-    def __init__(self) -> None:
-        self._entries: list[tuple[float, int, Callable[[float], None]]] = []
-        self._order = itertools.count()
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def add(self, due: float, action: Callable[[float], None]) -> None:
-        heapq.heappush(self._entries, (due, next(self._order), action))
-
-    def poll(self, now: float) -> None:
-        while self._entries and self._entries[0][0] <= now:
-            heapq.heappop(self._entries)[2](now)
-
-    def next_deadline(self) -> float:
-        return self._entries[0][0] if self._entries else math.inf
-
-
 class _Stream:
 
     def __init__(self, default: float, now: float) -> None:
@@ -324,7 +301,8 @@ class SimulatedComponent(Generic[D]):
                          for message_id, interval in self.device.streams().items()}
         self._in_progress: set[int] = set()
         self._heartbeat_due = now if self.behaviour.heartbeat_interval else math.inf
-        self._schedule = _Schedule()
+        # Actions that are due later.
+        self._schedule: DeadlineQueue[Callable[[float], None]] = DeadlineQueue()
         self._reboot_due = now + (self.behaviour.reboot_interval or math.inf)
         self._changed()
 
@@ -390,7 +368,7 @@ class SimulatedComponent(Generic[D]):
         if not delay:
             action(now)
         elif len(self._schedule) < MAX_DELAYED:
-            self._schedule.add(now + delay, action)
+            self._schedule.set(action, now + delay)
 
     def _consider(self, source: Address, message: AnyCommand, now: float) -> None:
         """Answer a command at once, or report its progress first."""
@@ -429,8 +407,8 @@ class SimulatedComponent(Generic[D]):
         self._in_progress.add(message.command)
         self._acknowledge(source, message.command, MavResult.IN_PROGRESS, now,
                           int(100 * (now - begun) / duration))
-        self._schedule.add(min(now + PROGRESS_INTERVAL, begun + duration),
-                           functools.partial(self._progress, source, message, begun))
+        self._schedule.set(functools.partial(self._progress, source, message, begun),
+                           min(now + PROGRESS_INTERVAL, begun + duration))
 
     def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
         """Acknowledge a command and do what it asks for."""
@@ -512,7 +490,9 @@ class SimulatedComponent(Generic[D]):
             self.device.behave(replace(self.behaviour, silence=0.0), now)
         if now >= self._reboot_due:
             self.restart(now)
-        self._schedule.poll(now)
+        for action in self._schedule.due(now):
+            self._schedule.set(action, math.inf)
+            action(now)
         if now >= self._heartbeat_due:
             self._send_heartbeat(now)
         for message_id, stream in self._streams.items():
