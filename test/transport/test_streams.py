@@ -161,6 +161,7 @@ def test_read_of_a_full_terminal_says_that_there_may_be_more(
         'i', fcntl.ioctl(near, termios.FIONREAD, bytes(4))) >= (base.READ_SIZE,))
 
     class Line(base.StreamChannel):
+
         def close(self) -> None:
             os.close(near)
 
