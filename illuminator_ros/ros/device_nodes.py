@@ -68,7 +68,7 @@ class DeviceNodes(Generic[K, N]):
         self._make = make
         self._bind_node = bind
         self._nodes: dict[K, N] = {}
-        # Of the nodes of further devices, also before they are made.
+        # Requests for the nodes of further devices, also before those are made.
         self._requests: dict[K, NodeRequest] = {}
         self._absence_due = host.link.clock() + ABSENCE_DELAY
         host.diagnostics.add(first.source)
