@@ -22,10 +22,12 @@ import sys
 from types import ModuleType
 
 from illuminator_ros.cli import postponed_imports as tested
+from illuminator_ros.mavlink.link import Link
 import pytest
 from support.light import ServedLight
 from support.processes import ended, start_interpreter
 from support.ros import bridge_arguments, Parameters, Ros
+from support.waiting import eventually
 
 # Their libraries, and one that the parser of the message generator brings.
 UNUSED = ('/numpy/', '/_hashlib.', '/_lzma.')
@@ -73,10 +75,11 @@ def test_bridge_that_serves_a_light_loads_no_library_that_it_does_not_use(
 ) -> None:
     with (ended(start_interpreter('illuminator_ros.bridge', *bridge_arguments(port),
                                   env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as bridge,
-          ServedLight(port, enable=1)):
+          ServedLight(port, enable=1, link=Link)):
         parameters = Parameters(own_ros)
         parameters.wait(brightness=100.0)
-        assert parameters.set(brightness=50.0)[0].successful
+        # By the clock of the machine, which may stand still for longer than a confirmation takes.
+        eventually(lambda: parameters.set(brightness=50.0)[0].successful)
         loaded = Path(f'/proc/{bridge.pid}/maps').read_text()
 
     assert 'sensor_msgs' in loaded
