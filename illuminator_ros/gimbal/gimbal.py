@@ -26,13 +26,13 @@ from .axes import Ranges, read_ranges
 from .commands import Configure, Control, SetFlags, setpoint_flags
 from .messages import (
     Capabilities,
+    DEVICE_ID_PARAM,
     ErrorFlags,
     GimbalCommand,
     GimbalDeviceInformation,
     GimbalManagerInformation,
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
-    ROI_COMMANDS,
 )
 from ..mavlink.command_sender import (
     Command,
@@ -72,7 +72,7 @@ MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
 # Commands that move a gimbal.
-_MOVES = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, *ROI_COMMANDS)
+_MOVES = DEVICE_ID_PARAM.keys() - {GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE}
 
 
 @dataclass
@@ -488,7 +488,7 @@ class Gimbal:
             self._commands.end_all(
                 now, CommandStatus.CANCELLED, self._manager, lambda command: (
                     command.command in _MOVES and self.key.device_id == command.params[
-                        0 if command.command in ROI_COMMANDS else 6]))
+                        DEVICE_ID_PARAM[command.command]]))
         self._emit(events.GimbalHeld(self.key, change))
 
     # Requests

@@ -51,6 +51,7 @@ from .manager_state import ManagerState, StateChanged, StateTracker
 from .messages import (
     AutopilotStateForGimbalDevice,
     Capabilities,
+    DEVICE_ID_PARAM,
     GimbalCommand,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
@@ -62,7 +63,6 @@ from .messages import (
     MAV_TYPE_GIMBAL,
     NO_COMPONENT,
     NON_MAVLINK_IDS,
-    ROI_COMMANDS,
 )
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
@@ -294,8 +294,7 @@ class GimbalManager(Payload):
         handler = self._handlers.get(command.command)
         if handler is None:
             return None
-        device_id = params[0] if command.command in ROI_COMMANDS else params[6]
-        if device_id not in (0, self.tracker.device_id):
+        if params[DEVICE_ID_PARAM[command.command]] not in (0, self.tracker.device_id):
             return MavResult.DENIED
         if self.tracker.state is not ManagerState.ACTIVE:
             return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE

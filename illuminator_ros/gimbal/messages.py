@@ -50,8 +50,10 @@ class GimbalCommand(IntEnum):
     DO_GIMBAL_MANAGER_CONFIGURE = 1001
 
 
-# Those that have the gimbal device id as param1; the others have it as param7.
-ROI_COMMANDS = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
+# The index of the param that is the gimbal device id.
+DEVICE_ID_PARAM: dict[int, int] = {
+    GimbalCommand.DO_SET_ROI_LOCATION: 0, GimbalCommand.DO_SET_ROI_NONE: 0,
+    GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: 6, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE: 6}
 
 
 class Capabilities(IntFlag):

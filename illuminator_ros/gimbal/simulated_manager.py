@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 from . import messages as gimbal
 from .axes import LEVEL, Range
 from .manager_setpoint import Demand, direction, GeoPoint, read_demand, read_roi
-from .messages import Capabilities, GimbalCommand, NO_COMPONENT, ROI_COMMANDS
+from .messages import Capabilities, DEVICE_ID_PARAM, GimbalCommand, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
     GIMBAL_FAULTS,
@@ -304,9 +304,8 @@ class SimulatedManager(simulated.SimulatedDevice):
         """See :meth:`SimulatedDevice.execute`."""
         if command.command not in self.changes:
             return None
-        *first, flags, _, device_id = command.params
-        if not self._is_for_device(
-                command.param1 if command.command in ROI_COMMANDS else device_id):
+        *first, flags, _, _ = command.params
+        if not self._is_for_device(command.params[DEVICE_ID_PARAM[command.command]]):
             return simulated.CommandReply(MavResult.DENIED)
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
             return self._pitchyaw(source, first, flags, now)
