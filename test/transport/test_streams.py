@@ -149,6 +149,9 @@ def test_read_that_fills_the_buffer_says_that_there_may_be_more(
     stream.write(b'12345678ab')
     for piece, more in ((b'12345678', True), (b'ab', False)):
         assert (stream.ours.receive_bytes(len(piece)), stream.ours.channel.more) == (piece, more)
+    # The second read finds nothing.
+    stream.write(b'1234')
+    assert (stream.ours.receive_bytes(4), stream.ours.channel.more) == (b'1234', False)
 
 
 def test_read_of_a_full_terminal_says_that_there_may_be_more(

@@ -37,7 +37,7 @@ MAX_QUEUED = 16 * 1024
 # Bytes of one read from a stream. As many as a terminal of Linux holds: a full one stops a fast
 # sender, such as a USB device, and must be read again at once.
 READ_SIZE = 4095
-# Reads before other work gets its turn: a second one is a third of a turn.
+# Reads in one turn of the link: 20 ms bring more than one takes at 5,000 frames a second.
 MAX_READS = 2
 
 
@@ -174,24 +174,22 @@ class StreamChannel(Channel):
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
         data = b''
-        for _ in range(MAX_READS):
-            try:
+        try:
+            for _ in range(MAX_READS):
                 part = os.read(self._descriptor, READ_SIZE)
-            except BlockingIOError:
-                break
-            except OSError as error:
-                # The next call meets the same error.
-                if data:
+                data += part
+                self.more = len(part) == READ_SIZE
+                if not self.more:
                     break
+        except BlockingIOError:
+            self.more = False
+        except OSError as error:
+            # The next call meets the same error.
+            if not data:
                 raise ChannelLost(error.errno, error.strerror) from None
-            if not part:
-                if data:
-                    break
+        else:
+            if not data:
                 raise ChannelLost(self._at_end)
-            data += part
-            self.more = len(part) == READ_SIZE
-            if not self.more:
-                break
         if data:
             yield None, data
 
