@@ -196,8 +196,7 @@ class GimbalClient(Payload):
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
             self._commands.start(Command(
-                address, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)), now,
-                lambda result, now: None)
+                address, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)), now)
 
     # Time
 

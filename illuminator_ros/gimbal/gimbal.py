@@ -308,10 +308,10 @@ class Gimbal:
         manager = self._managers.get(address)
         if manager is None and len(self._managers) < MAX_MANAGERS:
             target = request.Target(
-                address, self._commands, _ignore, kind='gimbal manager',
+                address, self._commands, kind='gimbal manager',
                 status_id=GimbalManagerStatus.id, status_name='GIMBAL_MANAGER_STATUS')
             flag_target = request.Target(
-                address, self._commands, _ignore, kind='gimbal device',
+                address, self._commands, kind='gimbal device',
                 status_id=GimbalDeviceAttitudeStatus.id,
                 status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_sender=self.key.address)
             manager = self._managers[address] = _Manager(
@@ -683,7 +683,7 @@ class Gimbal:
             manager.target.request_status(now)
         if self._identity_query.take(now):
             manager.target.request_message(
-                GimbalDeviceInformation.id, now, _ignore, to=self.key.address)
+                GimbalDeviceInformation.id, now, to=self.key.address)
         if self._interval_query.take(now):
             manager.target.send(
                 MavCmd.SET_MESSAGE_INTERVAL, (float(GimbalDeviceAttitudeStatus.id),
@@ -741,10 +741,6 @@ class Gimbal:
             manager.status_at if manager else -math.inf, self.enforces_control,
             self._setpoints_sent,
             self._sources.shown_holder, self._sources.since)
-
-
-def _ignore(result: CommandResult, now: float) -> None:
-    pass
 
 
 def _request(

@@ -67,7 +67,7 @@ from .messages import (
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand
-from ..mavlink.command_sender import Command, CommandResult, CommandSender
+from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, command_name, MavResult
 from ..payload.listeners import Listeners
@@ -630,7 +630,7 @@ class GimbalManager(Payload):
         if self.tracker.device is not None:
             self._commands.start(Command(
                 self.tracker.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
-                now, _ignore)
+                now)
 
     def _state_changed(self, change: StateChanged, now: float) -> None:
         active = change.after is ManagerState.ACTIVE
@@ -669,7 +669,3 @@ class GimbalManager(Payload):
         if kind not in self._limits and len(self._limits) >= MAX_REPORTS:
             del self._limits[next(iter(self._limits))]
         return self._limits.setdefault(kind, RateLimit(REPORT_INTERVAL))
-
-
-def _ignore(result: CommandResult, now: float) -> None:
-    """Take no notice of a result: the message comes by itself or is requested again."""

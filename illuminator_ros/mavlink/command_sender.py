@@ -399,8 +399,8 @@ class CommandSender:
         self.outgoing.append((self.address, message))
 
     def start(
-        self, command: Command, now: float, done: Done, *, limit: float = math.inf,
-        overtake: bool = False,
+        self, command: Command, now: float, done: Done = lambda result, now: None, *,
+        limit: float = math.inf, overtake: bool = False,
     ) -> None:
         """
         Send a command, or queue it behind the one of its kind that was sent.

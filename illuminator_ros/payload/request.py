@@ -64,8 +64,9 @@ class Target:
     """
 
     def __init__(
-        self, address: Address, commands: command_sender.CommandSender, ended: CommandDone, *,
-        kind: str, status_id: int, status_name: str, status_sender: Address | None = None,
+        self, address: Address, commands: command_sender.CommandSender,
+        ended: CommandDone = lambda result, now: None, *, kind: str, status_id: int,
+        status_name: str, status_sender: Address | None = None,
     ) -> None:
         self.address = address
         self._status_sender = status_sender or address
@@ -92,7 +93,8 @@ class Target:
             overtake=overtake)
 
     def request_message(
-        self, message_id: int, now: float, done: CommandDone, *, to: Address | None = None,
+        self, message_id: int, now: float, done: CommandDone = lambda result, now: None, *,
+        to: Address | None = None,
     ) -> None:
         """Request one message of the device or of another component."""
         self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
