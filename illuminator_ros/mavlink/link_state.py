@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -86,7 +87,8 @@ TRANSITIONS: dict[tuple[LinkState, LinkInput], LinkState] = {
 }
 
 
-class LinkEvent(NamedTuple):
+@dataclass(frozen=True)
+class LinkEvent:
     """
     The link was opened or lost, or cannot be opened; as text it is a line for people.
 
@@ -203,7 +205,7 @@ class LinkStatus:
             return None
         self._allowed -= 1
         unreported, self._unreported = self._unreported, 0
-        return self._events.pop(0)._replace(unreported=unreported)
+        return replace(self._events.pop(0), unreported=unreported)
 
     def next_deadline(self) -> float:
         """Return when a waiting event may be reported, infinity if there is none."""
