@@ -235,7 +235,7 @@ class TrafficSnapshot(NamedTuple):
     :param bytes_received: all, good or not.
     :param frames_received: those that came with the right checksum.
     :param frames_dropped: those that found no room to go out.
-    :param received: bytes, and ``sent``, recently.
+    :param received_rate: bytes per second recently, and ``sent_rate``.
     """
 
     bytes_received: int
@@ -243,8 +243,8 @@ class TrafficSnapshot(NamedTuple):
     frames_received: int
     frames_sent: int
     frames_dropped: int
-    received: WindowedCounter
-    sent: WindowedCounter
+    received_rate: float
+    sent_rate: float
     sources: dict[Address, SourceCounts]
 
 
@@ -258,18 +258,18 @@ class Traffic:
     frames_dropped: int = 0
     sources: dict[Address, SequenceCounter] = field(default_factory=dict)
     _frames_of_others: int = 0
-    received: WindowedCounter = WindowedCounter()
-    sent: WindowedCounter = WindowedCounter()
+    _received: WindowedCounter = WindowedCounter()
+    _sent: WindowedCounter = WindowedCounter()
 
     def snapshot(self, now: float) -> TrafficSnapshot:
         """Update the recent values and return all."""
-        self.received = self.received.sample(self.bytes_received, now)
-        self.sent = self.sent.sample(self.bytes_sent, now)
+        self._received = self._received.sample(self.bytes_received, now)
+        self._sent = self._sent.sample(self.bytes_sent, now)
         sources = {source: counter.snapshot(now) for source, counter in self.sources.items()}
         return TrafficSnapshot(
             self.bytes_received, self.bytes_sent,
             self._frames_of_others + sum(counts.received for counts in sources.values()),
-            self.frames_sent, self.frames_dropped, self.received, self.sent, sources)
+            self.frames_sent, self.frames_dropped, self._received.rate, self._sent.rate, sources)
 
     def count(
         self, source: Address, sequences: bytes | bytearray, content: int | None = None,

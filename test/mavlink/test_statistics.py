@@ -175,7 +175,7 @@ def test_snapshot_of_traffic_has_rates_and_does_not_change() -> None:
     traffic.bytes_received, traffic.bytes_sent = 5000, 200
     snapshot = traffic.snapshot(2.0)
     traffic.count(LIGHT, b'\0')
-    assert (snapshot.received.rate, snapshot.sent.rate, snapshot.sources) == (2500.0, 100.0, {})
+    assert (snapshot.received_rate, snapshot.sent_rate, snapshot.sources) == (2500.0, 100.0, {})
 
 
 def test_traffic_counts_each_source_apart_and_over_interruptions() -> None:
