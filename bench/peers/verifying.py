@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The least that verifies: a script that waits for the acknowledgement and for a status.
+The least script that verifies: it waits for the acknowledgement and for a status.
 
-It takes the frames of one light without checking them, resends nothing, and serves no one else
+It takes the frames of one light without checking them, resends nothing, and answers no other call
 while it waits.
 """
 
@@ -37,7 +37,7 @@ from std_srvs.srv import SetBool  # noqa: E402
 from support.frames import frame_of  # noqa: E402
 
 HEADER, CHECKSUM = 10, 2
-# What a UDP socket holds.
+# Bytes of the longest datagram.
 MAX_DATAGRAM = 65536
 US = mav.Address(1, 191)
 FRAMES = {on: frame_of(mav.CommandLong(

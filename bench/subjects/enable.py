@@ -33,8 +33,8 @@ from ..rows import at_most, one, quantiles, Row, times
 
 OURS, EMPTY, SCRIPT = '/illuminator/enable', '/empty/enable', '/straightforward/enable'
 MINIMAL, LEAST = '/minimal/enable', '/verifying/enable'
-# The order of the calls: each comes after each other one equally often, since those that come
-# after a larger program have less of theirs in the processor's caches.
+# Of the order of the calls: each server is called after each other one equally often, since the
+# program that ran before decides what is in the processor's caches.
 SEED = 1
 WARM_UP = 50
 CLIENTS = 50

@@ -43,7 +43,7 @@ COUNTS = (1, 10, 100)
 # but the number differs.
 RATE = 800
 # Frames before the measurement, until no light is asked for its identity any more, and in each
-# part of it, which has all that is done once a second.
+# part of it: those of 1 s, so that each part has the work that is due once a second.
 WARM_UP, PART = 10 * RATE, RATE
 ROUNDS = 25
 FLAT = 1.2

@@ -15,7 +15,7 @@
 """
 Keeps modules that are not used out of the process of the bridge.
 
-They are imported with rclpy and by other modules, take 19 MB, and delay the start.
+rclpy and other modules import them; they take 19 MB and delay the start.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ import sys
 import threading
 from types import ModuleType
 
-# Each service imports numpy (12 MB), for a field of the events that introspection publishes. Only
-# signed frames need the others, which load OpenSSL (4 MB).
+# The type support of each service imports numpy (12 MB), for a field of the events that service
+# introspection publishes. Only signed frames need the others, which load OpenSSL (4 MB).
 POSTPONED = ('numpy', 'hashlib', 'hmac')
 # The type support of messages tries to import their generator, which brings a parser (4 MB).
 LEFT_OUT = ('rosidl_generator_py.generate_py_impl',)
@@ -37,7 +37,7 @@ _lock = threading.Lock()
 
 
 class _Placeholder(ModuleType):
-    """Imports the module in whose place it is when one of its attributes is used."""
+    """Stands for a module, and imports it when one of its attributes is used."""
 
     def __getattr__(self, name: str) -> object:
         with _lock:
@@ -52,7 +52,7 @@ def postponed_imports() -> Iterator[None]:
     """
     Import modules of :data:`POSTPONED` when they are used, and none of :data:`LEFT_OUT`.
 
-    This concerns the ``import`` statements that run meanwhile; later ones are as ever.
+    This concerns the ``import`` statements that run meanwhile, not later ones.
     """
     added: dict[str, ModuleType | None] = {
         **{name: _Placeholder(name) for name in POSTPONED}, **dict.fromkeys(LEFT_OUT)}

@@ -57,7 +57,7 @@ class NodeManager:
     """
     The nodes of further devices, made and removed one at a time by :meth:`work`.
 
-    One thread runs all of them: each node on a thread costs 5 us a callback.
+    One thread runs the callbacks of all of them; each node adds 5 us to a callback.
 
     :param first: the process's first node; the others share its namespace and context,
         and its publisher of parameter events.

@@ -98,9 +98,11 @@ def turns(
     fastest: float = 3.0,
 ) -> Requirement[T]:
     """
-    Return the requirement that a gimbal turns for a second when a speed is sent, deg/s.
+    Return the requirement that a gimbal turns down for a second when a speed is sent.
 
-    :param fastest: how much faster it may be; infinite where the specification leaves it open.
+    :param speed: deg/s, below 0.
+    :param fastest: how many times as fast it may be; infinite where the specification leaves it
+        open.
     """
     @moves(name, title, specification, section)
     async def check(tester: T) -> str:

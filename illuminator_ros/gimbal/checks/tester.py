@@ -163,8 +163,9 @@ class GimbalTester(ABC):
 
     async def newest(self, cls: type[M], what: str) -> M:
         """
-        Return the next message of a stream, or else request it.
+        Return the newest message of a stream, or else request it.
 
+        :param what: its content, for people.
         :raises Skipped: if the gimbal does not send it.
         """
         streamed = await self.session.receive_more(cls, 1.0)
