@@ -43,7 +43,7 @@ def measure(bench: rig.Bench) -> Iterator[Row]:
     service: dict[str, list[float]] = {OURS: [], EMPTY: []}
     status: list[float] = []
     with rig.simulator(f'udpout://127.0.0.1:{port}', '--status-interval', str(STATUS_PERIOD)):
-        for number, name in enumerate(rig.interleaved([OURS, EMPTY], bench.amount(8, 1))):
+        for number, name in enumerate(rig.interleaved([OURS, EMPTY], bench.amount(16, 1))):
             # Each start has a node name of its own: a name that was discovered before is faster.
             answering, publishing = start(bench, name, f'started_{number}', port)
             service[name].append(answering * 1e3)
