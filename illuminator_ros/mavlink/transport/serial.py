@@ -33,6 +33,12 @@ from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
 # 8N1: a start bit, 8 data bits, a stop bit.
 BITS_PER_BYTE = 10
+REASONS = {
+    errno.EAGAIN: 'it is in use by another program',
+    errno.ENOTTY: 'it is not a serial port',
+    errno.EACCES: 'no permission; join its group, as in "sudo usermod -a -G dialout $USER", and '
+                  'log in again',
+}
 # Bytes in a pseudo-terminal that no program has read; a serial line would have lost them.
 MAX_UNREAD = 2048
 
@@ -53,9 +59,9 @@ def open_serial(url: SerialUrl) -> Channel:
             url.device, url.baud, timeout=0, write_timeout=0, exclusive=True,
             rtscts=url.hardware_flow_control)
     except serial.SerialException as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        if error.errno == errno.EAGAIN:
-            reason = 'it is in use by another program'
+        # The reason why a device cannot be configured is only in the context of its error.
+        number = error.errno or (error.__context__ or error).args[0]
+        reason = REASONS.get(number) or os.strerror(number) if number in errno.errorcode else error
         raise OSError(error.errno, f'cannot open {url.device}: {reason}') from None
     except (ValueError, OSError) as error:
         raise OSError(f'cannot open {url.device} at {url.baud} baud: {error}') from None
