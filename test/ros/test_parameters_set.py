@@ -69,7 +69,7 @@ def test_four_parameters_in_one_call_are_one_command_and_one_event(
                             'strobe) or 0.05 to 10 s'),
     ('mode', 'unknown', "mode 'unknown' is none of internal_control, external_sync"),
     ('brightness', None, 'brightness cannot be deleted'),
-    ('frame_id', 'other', 'read-only'),
+    ('frame_id', 'other', 'frame_id is read-only: restart the node with -p frame_id:=VALUE'),
     ('banana', 1.0, 'banana'),
 ])
 def test_invalid_value_is_refused_with_its_reason_and_nothing_is_sent(
