@@ -26,7 +26,7 @@ import os
 import sys
 from typing import NamedTuple, TYPE_CHECKING
 
-from .entry_point import one_line, print_output, run_program
+from .entry_point import one_line, print_output, run_program, wrong_arguments
 from .payloads import PAYLOADS
 from .postponed_imports import postponed_imports
 from .termination import Termination
@@ -147,7 +147,7 @@ def _run(arguments: list[str], termination: Termination, executable: Executable)
         try:
             own = remove_ros_args([executable.name, *arguments])[1:]
         except Exception as error:
-            return executable.refuse(f'wrong ROS arguments: {error}')
+            return executable.refuse(f'{wrong_arguments(executable.name)}: {error}')
     if '-h' in own or '--help' in own:
         return executable.show(usage(executable))
     if '--version' in own:
@@ -191,7 +191,7 @@ def _serve(
             executable.load()
         except Exception as error:
             # rclpy has an exception of its own for each thing that can be wrong with an argument.
-            return executable.refuse(_start_failure(error, 'wrong ROS arguments'))
+            return executable.refuse(_start_failure(error, wrong_arguments(executable.name)))
         try:
             bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
         except ParameterError as error:

@@ -103,6 +103,11 @@ def discard_output() -> None:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
+def wrong_arguments(name: str) -> str:
+    """Return the beginning of an error of rcl, which does not say how an argument is written."""
+    return f'wrong ROS arguments, see {name} --help'
+
+
 def one_line(message: object) -> str:
     """Return a message of rcl in one line, without the places in its sources at its end."""
     return re.sub(r', at /[^ ,]+:\d+', '', ' '.join(str(message).split()))

@@ -53,7 +53,7 @@ def load_key(path: str) -> bytes:
     :raises KeyFileError: if it cannot be read, is open to others, or holds none of these.
     """
     if not path:
-        raise KeyFileError('no key file is given')
+        raise KeyFileError('no key file is given, and signing needs one')
     path = os.path.expanduser(path)
     try:
         content = _read(path)

@@ -133,9 +133,12 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
 
 
 @pytest.mark.parametrize(('redirection', 'error'), [
-    ('', 'monitor: no lights found\n'), ('>&-', 'monitor: standard output is closed\n')])
+    ('', 'monitor: no light found within 0.1 s: check that a bridge runs, with '
+         'ROS_DOMAIN_ID={domain} as here\n'),
+    ('>&-', 'monitor: standard output is closed\n')])
 def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error: str) -> None:
     outcome = run(MONITOR, '--once', '--wait', '0.1', env=domain(own_ros),
                   redirection=redirection)
 
-    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (1, '', error)
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
+        1, '', error.format(domain=own_ros.domain))

@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 import io
+import os
 import sys
 import threading
 import time
@@ -36,7 +37,7 @@ from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
 from .ros_graph import Graph
 from .view import plain, screen, ViewState
-from ..entry_point import one_line, print_output
+from ..entry_point import one_line, print_output, wrong_arguments
 from ..options import option, Parser
 from ..termination import Termination
 from ...payload.simulated_settings import number
@@ -118,7 +119,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
         return int(end.code or 0)
     except Exception as error:
         # rclpy has an exception for each kind of wrong argument.
-        print(f'monitor: wrong ROS arguments: {one_line(error)}', file=sys.stderr)
+        print(f'monitor: {wrong_arguments("monitor")}: {one_line(error)}', file=sys.stderr)
         return 2
     monitor = Monitor(node)
     console = Console(highlight=False)
@@ -197,7 +198,8 @@ def _print_once(monitor: Monitor, options: argparse.Namespace, termination: Term
         if len(lights) != len(before) or not lights or not all(map(is_complete, lights)):
             complete_since = time.monotonic()
     if not lights:
-        print('monitor: no lights found', file=sys.stderr)
+        print(f'monitor: no light found within {options.wait:g} s: check that a bridge runs, with '
+              f'ROS_DOMAIN_ID={os.environ.get("ROS_DOMAIN_ID", 0)} as here', file=sys.stderr)
         return 1
     table = io.StringIO()
     Console(file=table, width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True
