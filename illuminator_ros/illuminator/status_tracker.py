@@ -231,10 +231,12 @@ class _Senders:
 
     def proved(self, now: float) -> frozenset[int]:
         """Return the lights that have sent lately; the newest if there are not several."""
-        proved = [one.number for one in self._senders
-                  if one.returns >= ENOUGH_RETURNS and now - one.seen_at <= SENDER_TIME
-                  ] if len(self._senders) > 1 else ()
-        return frozenset(proved if len(proved) > 1 else (self.newest,))
+        if len(self._senders) > 1:
+            proved = [one.number for one in self._senders
+                      if one.returns >= ENOUGH_RETURNS and now - one.seen_at <= SENDER_TIME]
+            if len(proved) > 1:
+                return frozenset(proved)
+        return frozenset((self.newest,))
 
 
 def _is_same_start(start: float, other: float) -> bool:

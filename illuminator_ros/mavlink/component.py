@@ -99,9 +99,9 @@ class Payload(MessageHandler):
     """
     A part of a component: the client of a light, a winch, a camera ...
 
-    HEARTBEAT is among its ``messages`` if it needs that; commands are executed if COMMAND_LONG
-    and COMMAND_INT are. It receives no messages from the component's own address. When the link
-    is closed all its commands have ended.
+    It names HEARTBEAT among its ``messages`` if it needs heartbeats, and COMMAND_LONG and
+    COMMAND_INT if it executes commands. It receives no messages from the component's own address.
+    All its commands have ended when :meth:`link_closed` is called.
     """
 
     def receive_conflicting(self, message: Message, now: float) -> None:  # noqa: B027 - optional

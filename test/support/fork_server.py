@@ -161,12 +161,13 @@ def serve(descriptor: int) -> None:
         request, streams, _, _ = socket.recv_fds(requests, MAX_REQUEST, 3)
         if not request:
             return
-        if parent := os.fork():
-            os.waitpid(parent, 0)
+        if child := os.fork():
+            os.waitpid(child, 0)
             for stream in streams:
                 os.close(stream)
             continue
         parent = os.getpid()
+        # Its child becomes one of the process of the tests when it ends.
         if os.fork():
             os._exit(0)
         while os.getppid() == parent:
