@@ -160,17 +160,14 @@ def pass_time_until(condition: Callable[[], Any], step: float = 1.0) -> None:
 
 
 @contextlib.contextmanager
-def time_passes(step: float = 0.2) -> Iterator[None]:
-    """
-    Let time pass meanwhile, as fast as all links do the work that is due in it.
-
-    :param step: see :func:`pass_time_until`.
-    """
+def time_passes() -> Iterator[None]:
+    """Let time pass meanwhile, as fast as all links do the work that is due in it."""
     ended = threading.Event()
 
     def run() -> None:
         while not ended.wait(0.005):
-            CLOCK.step(step)
+            # Shorter than any limit that must hold, see pass_time_until.
+            CLOCK.step(0.2)
 
     thread = threading.Thread(target=run)
     thread.start()

@@ -277,9 +277,9 @@ class GimbalTester(ABC):
             await self.point(start)
         return await self.until(start.near)
 
-    async def stays(self, before: Pose, cause: str, seconds: float = WATCH_TIME) -> None:
-        """Raise Failed if the gimbal moves."""
-        end = self.session.now + seconds
+    async def stays(self, before: Pose, cause: str) -> None:
+        """Raise Failed if the gimbal moves within :data:`WATCH_TIME`."""
+        end = self.session.now + WATCH_TIME
         # Two in succession, because "continuous" covers a wrong status.
         away = 0
         while away < 2 and self.session.now < end:
