@@ -67,8 +67,6 @@ URGENT_WRITE_AHEAD = 0.02
 # router that has restarted forwards nothing to us until it has heard us.
 SILENCE = 1.5
 GREETING_INTERVAL = 0.25
-# s between snapshots while there is traffic.
-SNAPSHOT_INTERVAL = 0.25
 # s until a thread that could not be started is tried again.
 THREAD_RETRY_INTERVAL = 0.25
 # s; after a fault of ours the loop goes on no faster, and logs no more of them, than this.
@@ -149,8 +147,6 @@ class Link:
         self._foreign_before = 0
         self._foreign_at = -math.inf
         self._answer_expected_until = -math.inf
-        self._snapshot_due = 0.0
-        self._snapshot = self.snapshot(clock())
         self._calls: deque[Callable[[float], None]] = deque()
         self._wake_out, self._wake_in = socket.socketpair()
         self._wake_out.setblocking(False)
@@ -240,10 +236,6 @@ class Link:
         if wakes:
             self._wake()
 
-    def state(self) -> LinkSnapshot:
-        """Return the newest snapshot; it is at most 0.25 s old while there is traffic."""
-        return self._snapshot
-
     def _wake(self) -> None:
         # A full buffer has woken the thread already; a closed one has no thread to wake.
         with contextlib.suppress(OSError):
@@ -281,7 +273,6 @@ class Link:
         self._keep_timestamp(last=True)
         self._close()
         self._status.take(LinkInput.STOPPED, self.clock())
-        self._snapshot = self.snapshot(self.clock())
         self._release()
 
     def _release(self) -> None:
@@ -342,8 +333,7 @@ class Link:
         """Return when :meth:`_poll` is due."""
         return min(
             self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
-            self._status.next_deadline(), self._snapshot_due, self._stream_due(),
-            self._receiver.next_deadline(),
+            self._status.next_deadline(), self._stream_due(), self._receiver.next_deadline(),
             math.inf if self._channel is not None or self._connecting else self._connect_at)
 
     def _poll(self) -> None:
@@ -359,26 +349,13 @@ class Link:
         if now >= self._store_due:
             self._store_due = now + STORE_INTERVAL
             self._keep_timestamp(last=False)
-        self._report(now)
+        while event := self._status.event(now):
+            self._safe_call(self._on_event, event)
 
     def _keep_timestamp(self, *, last: bool) -> None:
         if self._store:
             self._safe_call(
                 self._store.keep, self._signing.timestamp, self._wall_clock(), last)
-
-    def _report(self, now: float) -> None:
-        """Make a snapshot if the last one is out of date, and report the newest event."""
-        if (self._status.state is not self._snapshot.state
-                or self._status.reason != self._snapshot.reason or now >= self._snapshot_due):
-            self._snapshot = self.snapshot(now)
-            self._snapshot_due = math.inf
-        while event := self._status.event(now):
-            self._safe_call(self._on_event, event)
-
-    def _traffic_seen(self, now: float) -> None:
-        if self._snapshot_due == math.inf:
-            self._snapshot_due = now + SNAPSHOT_INTERVAL
-            self._due = min(self._due, self._snapshot_due)
 
     def _serve(self, handle: object, events: int) -> None:
         assert self._channel is not None
@@ -406,7 +383,6 @@ class Link:
                     self._heard(channel, peer, frame.source, frame.sequences, now)
             self._flush()
         self._traffic.bytes_received += len(data)
-        self._traffic_seen(now)
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
@@ -528,7 +504,6 @@ class Link:
         except OSError as error:
             self._lost(error)
             return
-        self._traffic_seen(now)
         self._line_free_at = max(now, self._line_free_at) + size / channel.rate
         self._traffic.frames_dropped += channel.dropped - dropped
         self._traffic.frames_sent += len(frames) * len(peers)
@@ -545,7 +520,6 @@ class Link:
     def _connector_reports(self, outcome: Channel | str | None, now: float) -> None:
         if isinstance(outcome, str):
             self._status.failed(outcome)
-            self._snapshot_due = now
             return
         self._connecting = False
         if outcome is None:

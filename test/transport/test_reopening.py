@@ -136,7 +136,7 @@ def test_snapshot_of_a_lost_link_has_the_reason_of_the_last_try(
     server.go()
     link.wait_lost()
 
-    eventually(lambda: link.link.state().reason.endswith('Connection refused'))
+    eventually(lambda: link.state().reason.endswith('Connection refused'))
 
 
 def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sends(

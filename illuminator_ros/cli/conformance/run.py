@@ -46,7 +46,7 @@ from ..options import (
 from ..payloads import PAYLOADS
 from ..termination import SIGNALS
 from ...mavlink.link import Link, LinkThreadError
-from ...mavlink.link_state import LinkEvent
+from ...mavlink.link_state import LinkEvent, LinkSnapshot
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
@@ -199,7 +199,7 @@ class Conformance:
         self._write_line(*self._announcement)
         conditions = Conditions(
             bool(self._announcement) and self._consent(),
-            lambda: self._link.state().decoding.crc_errors, self._payload_options, time.time)
+            lambda: self._link_state().decoding.crc_errors, self._payload_options, time.time)
         suite = self._suite = CheckRunner(
             checks, self._session, conditions, self._requirements, self._show)
         self._finish(suite.run(missing))
@@ -240,6 +240,10 @@ class Conformance:
             with contextlib.suppress(queue.Empty):
                 self._write_line(self._texts.get(timeout=0.1))
 
+    def _link_state(self) -> LinkSnapshot:
+        # The checks run in turns of the link.
+        return self._link.snapshot(self._link.clock())
+
     def _link_event(self, event: LinkEvent) -> None:
         # A problem of this computer ends the run with its reason.
         if not event.is_open and (event.was_open or _is_peer_error(event.reason)):
@@ -253,7 +257,7 @@ class Conformance:
         """Find the device; note the others on the link, or why there is none."""
         session, checks, wait = self._session, self._checks, self._options.wait
         await session.find(wait, LISTEN_TIME)
-        state = self._link.state()
+        state = self._link_state()
         if session.found is None:
             self._missing = (
                 absence(session, checks, wait) if state.is_open
