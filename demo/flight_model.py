@@ -189,7 +189,7 @@ class Flight:
 
 def least(error: Callable[[float], float], limit: float) -> tuple[float, float]:
     """Return the argument, within a limit on both sides, with the least error; and that error."""
-    # So close that the error has one minimum between two neighbours.
+    # In steps so short that the error has one minimum between two neighbours.
     count = max(40, math.ceil(limit / 0.05))
     best = min((limit * number / count for number in range(-count, count + 1)), key=error)
     low, high = best - limit / count, best + limit / count

@@ -33,6 +33,7 @@ from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
 # 8N1: a start bit, 8 data bits, a stop bit.
 BITS_PER_BYTE = 10
+# Why a port cannot be opened, where the system's own text is wrong or has no remedy.
 REASONS = {
     errno.EAGAIN: 'it is in use by another program',
     errno.ENOTTY: 'it is not a serial port',
