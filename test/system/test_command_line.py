@@ -139,6 +139,7 @@ def test_wrong_argument_is_one_line_with_status_2(
     ('bridge', 'rclpy', ROS_REMEDY), ('monitor', 'rclpy', ROS_REMEDY),
     ('monitor', 'rich', "sudo apt install python3-rich, or pip install 'rich>=13.3'"),
     ('bridge', 'fastcrc', 'pip install fastcrc'),
+    ('bridge', 'yaml', 'sudo apt install python3-yaml, or pip install pyyaml'),
     ('bridge --ros-args -p beam_range:=5.0', 'visualization_msgs',
      'sudo apt install ros-jazzy-visualization-msgs'),
     ('simulator', 'fastcrc', 'pip install fastcrc'),
