@@ -76,6 +76,7 @@ class CameraSnapshot:
     The camera at one moment, for any thread; times are s on the link's clock.
 
     :param address: the one that it sent from last, None if it was never heard.
+    :param loss: that it is lost and why, '' if it is connected or was never heard.
     :param conflict: whether several components have the camera's component id.
     :param round_trip: of the last answered PING, s; None if none was.
     :param unanswered_pings: since the last reply.
@@ -85,7 +86,7 @@ class CameraSnapshot:
     address: Address | None
     connected: bool
     heard_at: float
-    lost_reason: str
+    loss: str
     conflict: bool
     round_trip: float | None
     unanswered_pings: int
@@ -145,7 +146,7 @@ class Camera:
         self._address: Address | None = None
         self._connected = False
         self._heard_at = -math.inf
-        self._lost_reason = ''
+        self._link_failure = ''
         self._heartbeats: deque[float] = deque(maxlen=CONFLICT_HEARTBEATS)
         self._sequence = sequence
         # When each unanswered PING was sent, by sequence number, s.
@@ -168,7 +169,7 @@ class Camera:
     def snapshot(self, now: float) -> CameraSnapshot:
         """Return the camera at this moment."""
         return CameraSnapshot(
-            self._address, self._connected, self._heard_at, self._lost_reason,
+            self._address, self._connected, self._heard_at, self._loss(now),
             self._is_conflict(now), self._round_trip, self._unanswered_pings, self._images,
             self._indices[-1] if self._indices else None)
 
@@ -182,6 +183,7 @@ class Camera:
         """See :meth:`Payload.link_opened`."""
         if not self._link_open:
             self._link_open = True
+            self._link_failure = ''
             self._ping_due = now
 
     def link_closed(self, reason: str) -> None:
@@ -189,11 +191,12 @@ class Camera:
         self._link_open = False
         self._ping_due = math.inf
         self._pings.clear()
-        self._lose(f'link lost: {reason}')
+        self._link_failure = f'link lost: {reason}'
+        self._lose(self._link_failure)
         requests, self._ping_requests = self._ping_requests, []
         for request in requests:
-            request.done(False, f'link lost: {reason}')
-        self._end_capture(False, f'link lost: {reason}; the image may have been taken')
+            request.done(False, self._link_failure)
+        self._end_capture(False, f'{self._link_failure}; the image may have been taken')
 
     # Liveness
 
@@ -209,11 +212,16 @@ class Camera:
     def _lose(self, reason: str) -> None:
         if self._connected:
             self._connected = False
-            self._lost_reason = reason
             self._heartbeats.clear()
             # After a restart the camera counts its images from the beginning.
             self._indices.clear()
             self._emit(CameraLost(self.target, reason))
+
+    def _loss(self, now: float) -> str:
+        if self._connected or self._address is None:
+            return ''
+        reason = self._link_failure or f'no heartbeat for {format_seconds(now - self._heard_at)}'
+        return f'camera {self._address} is lost: {reason}'
 
     # PING
 
@@ -265,7 +273,7 @@ class Camera:
     def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
         """Take an image; a success only after its CAMERA_FEEDBACK."""
         if not self._connected:
-            done(False, f'no camera connected: {self._lost_reason or "none heard yet"}')
+            done(False, self._loss(now) or 'no camera connected: none heard yet')
         elif self._capture is not None:
             done(False, 'another capture is under way')
         else:

@@ -130,6 +130,10 @@ def test_a_camera_is_lost_after_3_5_s_and_found_again_re_9() -> None:
     assert rig.events == [CameraConnected(NEW)]
     rig.run(0.2)
     assert rig.events[1:] == [CameraLost(NEW, 'no heartbeat for 3.50 s')]
+    rig.run(6.4)
+    rig.capture()
+    assert rig.results == [(False, f'camera {NEW} is lost: no heartbeat for 10.00 s')]
+    assert rig.state.loss == rig.results[0][1]
     rig.hear(BEAT)
     assert rig.events[2:] == [CameraConnected(NEW)]
 
@@ -209,7 +213,9 @@ def test_no_request_waits_without_a_link() -> None:
     assert rig.results == [
         (False, 'link lost: unplugged'),
         (False, 'link lost: unplugged; the image may have been taken'),
-        (False, 'the link is not open'), (False, 'no camera connected: link lost: unplugged')]
+        (False, 'the link is not open'), (False, f'camera {NEW} is lost: link lost: unplugged')]
+    rig.component.link_opened(rig.now)
+    assert rig.state.loss.startswith(f'camera {NEW} is lost: no heartbeat for ')
 
 
 @pytest.mark.parametrize('shot', rededge.Shot)

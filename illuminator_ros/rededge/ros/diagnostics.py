@@ -58,8 +58,7 @@ def reports(
 def camera_findings(camera: CameraSnapshot) -> list[Finding]:
     """Return the findings on the camera itself."""
     if not camera.connected:
-        return [(ERROR, f'lost: {camera.lost_reason}') if camera.lost_reason
-                else (WARN, 'not heard yet')]
+        return [(ERROR, camera.loss) if camera.loss else (WARN, 'not heard yet')]
     findings: list[Finding] = []
     if camera.conflict:
         findings.append((ERROR, f'several components have id {MAV_COMP_ID_CAMERA}: give each '
