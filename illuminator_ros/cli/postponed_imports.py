@@ -40,8 +40,7 @@ class _Placeholder(ModuleType):
     """Stands for a module, and imports it when one of its attributes is used."""
 
     def __getattr__(self, name: str) -> object:
-        with _lock:
-            _remove(self.__name__, self)
+        _remove(self.__name__, self)
         value: object = getattr(importlib.import_module(self.__name__), name)
         setattr(self, name, value)
         return value
@@ -68,5 +67,7 @@ def postponed_imports() -> Iterator[None]:
 
 
 def _remove(name: str, module: ModuleType | None) -> None:
-    if sys.modules.get(name) is module:
-        sys.modules.pop(name, None)
+    # Another thread must not put the imported module there between the two.
+    with _lock:
+        if sys.modules.get(name) is module:
+            sys.modules.pop(name, None)

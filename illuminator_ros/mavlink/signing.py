@@ -114,6 +114,9 @@ class Signing:
             raise ValueError(f'signing needs a key of bytes, not {type(self.key).__name__}')
         if len(self.key) != KEY_SIZE:
             raise ValueError(f'signing needs a key of {KEY_SIZE} bytes, not {len(self.key)}')
+        # The bridge imports both modules when they are used: now, and not for the first frame.
+        self._is_equal = hmac.compare_digest
+        signature(self.key, b'')
 
     @property
     def signs(self) -> bool:
@@ -136,7 +139,7 @@ class Signing:
             return self.mode is SigningMode.SIGN
         assert len(frame.signature) == SIGNATURE
         expected = signature(self.key, frame.signed_part + frame.signature[:7])
-        if not hmac.compare_digest(expected, frame.signature[7:]):
+        if not self._is_equal(expected, frame.signature[7:]):
             self.counters.bad += 1
             return False
         if not self._fresh(frame, unix_time):

@@ -25,12 +25,22 @@ from illuminator_ros.cli import postponed_imports as tested
 from illuminator_ros.mavlink.link import Link
 import pytest
 from support.light import ServedLight
-from support.processes import ended, start_interpreter
+from support.processes import ended, Program, start_interpreter
 from support.ros import bridge_arguments, Parameters, Ros
 from support.waiting import eventually
 
 # Their libraries, and one that the parser of the message generator brings.
 UNUSED = ('/numpy/', '/_hashlib.', '/_lzma.')
+SIGNING = """
+import sys
+from illuminator_ros.cli.postponed_imports import postponed_imports
+
+with postponed_imports():
+    from illuminator_ros.mavlink.signing import Signing, SigningMode
+for arguments in (), (SigningMode.SIGN, bytes(32)):
+    Signing(*arguments)
+    print(sorted({'hashlib', 'hmac'} & set(sys.modules)))
+"""
 
 
 @pytest.fixture
@@ -68,6 +78,13 @@ def test_module_that_is_used_at_once_or_was_imported_before_is_the_real_one(valu
         assert importlib.import_module('value') is real
 
     assert type(real) is ModuleType and real.one is used
+
+
+def test_modules_of_signing_are_imported_with_the_key_and_not_for_the_first_frame() -> None:
+    program = Program(sys.executable, '-c', SIGNING)
+
+    assert program.wait() == 0
+    assert program.lines == ['[]\n', "['hashlib', 'hmac']\n"]
 
 
 def test_bridge_that_serves_a_light_loads_no_library_that_it_does_not_use(
