@@ -161,9 +161,16 @@ def environment(more: Mapping[str, str] | None = None) -> dict[str, str]:
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **(more or {})}
 
 
+def _python_variables(variables: Mapping[str, str]) -> dict[str, str]:
+    return {name: value for name, value in variables.items() if name.startswith('PYTHON')}
+
+
+# Python reads them when it starts, so a fork has those of this process.
+PYTHON_VARIABLES = _python_variables(os.environ)
+
+
 def _can_be_forked(env: Mapping[str, str] | None) -> bool:
-    # Python reads its variables when it starts.
-    return not any(name.startswith('PYTHON') for name in env or {})
+    return _python_variables({**os.environ, **(env or {})}) == PYTHON_VARIABLES
 
 
 def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
