@@ -26,7 +26,13 @@ import os
 import sys
 from typing import NamedTuple, TYPE_CHECKING
 
-from .entry_point import one_line, print_output, run_program, wrong_arguments
+from .entry_point import (
+    log_directory_refusal,
+    one_line,
+    print_output,
+    run_program,
+    wrong_arguments,
+)
 from .payloads import PAYLOADS
 from .postponed_imports import postponed_imports
 from .termination import Termination
@@ -175,7 +181,7 @@ def _serve(
 
         # From here on the ROS graph has to be left in order, so a signal only has effect later.
         termination.calls(lambda: None)
-        if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or _log_directory_refusal():
+        if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():
             return executable.refuse(refusal)
         _limit_memory()
         # On a terminal rcutils colours its lines; its stderr is a pipe.
@@ -232,21 +238,6 @@ def _long_name_refusal(arguments: list[str], limit: int) -> str:
     length = sum(len(value) + 1 for value in given.values())
     return (f'node name and namespace have {length} characters together: the limit is {limit}'
             if length > limit else '')
-
-
-def _log_directory_refusal() -> str:
-    """Return which directory for log files cannot be written, '' if it can."""
-    home = os.environ.get('ROS_HOME') or '~/.ros'
-    directory = os.path.expanduser(os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log'))
-    try:
-        os.makedirs(directory, exist_ok=True)
-        if os.access(directory, os.W_OK | os.X_OK):
-            return ''
-        reason = 'no permission'
-    except OSError as error:
-        reason = error.strerror or str(error)
-    return (f'log files cannot be written to {directory}: {reason}; set ROS_LOG_DIR to a '
-            'directory that can be written')
 
 
 if __name__ == '__main__':

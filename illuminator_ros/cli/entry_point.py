@@ -110,6 +110,21 @@ def wrong_arguments(name: str) -> str:
     return f'wrong ROS arguments, see {name} --help'
 
 
+def log_directory_refusal() -> str:
+    """Return which directory for log files cannot be written, '' if it can."""
+    home = os.environ.get('ROS_HOME') or '~/.ros'
+    directory = os.path.expanduser(os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log'))
+    try:
+        os.makedirs(directory, exist_ok=True)
+        if os.access(directory, os.W_OK | os.X_OK):
+            return ''
+        reason = 'no permission'
+    except OSError as error:
+        reason = error.strerror or str(error)
+    return (f'log files cannot be written to {directory}: {reason}; set ROS_LOG_DIR to a '
+            'directory that can be written')
+
+
 def one_line(message: object) -> str:
     """Return a message of rcl in one line, without the places in its sources at its end."""
     return re.sub(r', at /[^ ,]+:\d+', '', ' '.join(str(message).split()))

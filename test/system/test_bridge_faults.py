@@ -110,11 +110,12 @@ def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it
         assert (bridge.count(came), bridge.count(went)) == (1, 1)
 
 
-def test_directory_for_log_files_that_cannot_be_written_is_named() -> None:
-    bridge = python(BRIDGE, env={'ROS_LOG_DIR': '/proc/none'})
+@pytest.mark.parametrize('module', [BRIDGE, 'illuminator_ros.monitor'])
+def test_directory_for_log_files_that_cannot_be_written_is_named(module: str) -> None:
+    program = python(module, env={'ROS_LOG_DIR': '/proc/none'})
 
-    assert bridge.wait() == 2
-    assert 'log files cannot be written to /proc/none: ' in bridge.log
+    assert program.wait() == 2
+    assert 'log files cannot be written to /proc/none: ' in program.log
 
 
 @pytest.mark.parametrize('descriptors', [8, 14, 20, 22])

@@ -37,7 +37,7 @@ from .key_bindings import KeyBindings, KeyDecoder
 from .model import Fleet, Light
 from .ros_graph import Graph
 from .view import plain, screen, ViewState
-from ..entry_point import one_line, print_output, wrong_arguments
+from ..entry_point import log_directory_refusal, one_line, print_output, wrong_arguments
 from ..options import option, Parser
 from ..termination import Termination
 from ...payload.simulated_settings import number
@@ -110,6 +110,9 @@ def run(args: list[str] | None, termination: Termination) -> int:
     try:
         own = remove_ros_args(['monitor', *arguments])[1:]
         options = parser().parse_args(own)
+        if refusal := log_directory_refusal():
+            print(f'monitor: {refusal}', file=sys.stderr)
+            return 2
         termination.calls(lambda: None)
         rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         # Several may run, and none needs to be on /rosout.
