@@ -73,10 +73,12 @@ class DeadlineQueue(Generic[K]):
         while self._heap:
             entered, _, key = self._heap[0]
             deadline = self._deadlines.get(key, math.inf)
-            if entered == deadline:
+            # An entry that an earlier one has replaced stays; it may have the deadline, too.
+            is_current = entered == self._entered.get(key)
+            if is_current and entered == deadline:
                 return deadline
             heapq.heappop(self._heap)
-            if entered == self._entered.get(key):
+            if is_current:
                 # Postponed since, so the entry is only now put where it belongs.
                 del self._entered[key]
                 if deadline < math.inf:

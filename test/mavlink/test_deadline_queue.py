@@ -16,7 +16,7 @@
 
 import math
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.deadline_queue import DeadlineQueue
 
@@ -27,6 +27,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(['set', 'changed']), KEYS, TIMES | st
 
 
 @given(STEPS)
+@example([('set', 0, 5), ('set', 0, 3), ('set', 0, 5), ('due', 0, 5)])
 def test_queue_agrees_with_search_over_all_deadlines(steps: list[tuple[str, int, float]]) -> None:
     deadlines: dict[int, float] = {}
     queue = DeadlineQueue(deadlines.__getitem__)
