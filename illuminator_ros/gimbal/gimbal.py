@@ -438,11 +438,12 @@ class Gimbal:
         def ended(result: request.Result, now: float) -> None:
             if result.refused:
                 primary = self._control.primary if self._control else None
-                advice = (
-                    f'{primary} has control and must release it first'
-                    if primary and not self.in_control else
-                    f'{"this node" if self.in_control else "no component"} has control: the log '
-                    'of the manager may have the reason')
+                if primary and not self.in_control:
+                    advice = f'{primary} has control and must release it first'
+                else:
+                    advice = self.unreachable(now) or (
+                        f'{"this node" if self.in_control else "no component"} has control: the '
+                        'log of the manager may have the reason')
                 answer = result.message.removeprefix('refused: ')
                 result = result._replace(
                     message=f'manager {manager} refused "{goal}": {answer}; {advice}')

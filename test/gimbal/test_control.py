@@ -285,6 +285,13 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     refusal = f'manager 1/1 refused "{goal}": MAV_RESULT_DENIED (1 try, 0 ms); '
     assert asked(rig, ask) == (
         False, f'{refusal}this node has control: the log of the manager may have the reason')
+    rig.managers[0].device_alive = False
+    rig.run(4.0)
+    success, message = asked(rig, ask)
+    assert (success, message.startswith(f'{refusal}nothing from device 1/154 for ')) == (
+        False, True), message
+    rig.managers[0].device_alive = True
+    rig.run(1.0)
     # Another player takes control while the command is on its way.
     ask(rig.gimbal, rig.now, rig.done)
     rig.managers[0].primary = OTHER
