@@ -35,6 +35,9 @@ from ..mavlink.messages import Address, MavCmd, MavResult
 CONFIRMATION_TIMEOUT = 1.0
 # s between requests for the status meanwhile, where one or its answer was lost.
 ASK_INTERVAL = 0.25
+# s from a status that is too old to tell to the next request, doubled each time: it may have been
+# sent in the same millisecond as the command.
+OUTDATED_INTERVAL = 0.002
 # Requests that may wait for one device.
 MAX_WAITING = 32
 # The result of a request that was not carried out since another one overtook it.
@@ -271,6 +274,7 @@ class Request(Generic[S]):
         # How a status contradicts, and whether one was too old to tell.
         self._contradiction = ''
         self._is_outdated = False
+        self._outdated_wait = OUTDATED_INTERVAL
         self._shown_by: set[int] = set()
         self._shown_since = math.inf
 
@@ -382,6 +386,8 @@ class Request(Generic[S]):
             self._confirm_until, min(self._acknowledged_at + wait, self.limit))
         if report.sent_by - delay < self._sent_at:
             self._is_outdated = True
+            self._ask_at = min(self._ask_at, now + self._outdated_wait)
+            self._outdated_wait *= 2
         elif not shown:
             self._contradiction = f'shows {change.actual(report.status)}'
             if report.shared_address:

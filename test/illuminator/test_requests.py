@@ -114,6 +114,17 @@ def test_a_light_that_sends_no_status_by_itself_is_asked_until_it_shows_the_chan
     assert answer.seconds == pytest.approx(seconds, abs=0.02)
 
 
+def test_switches_that_follow_each_other_within_a_millisecond_are_confirmed_in_few() -> None:
+    # A status of the same millisecond as the one before may be older than the command.
+    fake = FakeLight(stream=0.3)
+    change(fake, pushes=True)
+    pair = Pair(fake, there=Faults(latency=0.0001)).settle()
+    for on in (True, False) * 20:
+        answer = pair.ask_enable(on)
+        assert pair.wait_for(answer).success
+        assert answer.seconds < 0.01
+
+
 @pytest.mark.parametrize(('step_ms', 'rate', 'slowest'), [
     # A status of the same second may be older than the command: the next one confirms.
     (1000, 1.0, 0.26),
