@@ -66,14 +66,15 @@ def reaches(
     name: str, title: str, specification: Specification, section: str, send: Send[T],
     yaw: float = STEP,
 ) -> Requirement[T]:
-    """Return the requirement that a gimbal turns down, and to a yaw, when that is sent."""
+    """Return the requirement that a gimbal turns down and to a yaw, then back, when told to."""
     @moves(name, title, specification, section)
     async def check(tester: T) -> str:
         await tester.begin()
-        target = await tester.target(-2 * STEP, yaw)
-        if one := await send(tester, target):
-            one.expect(accepted=True)
-        await tester.reach(target)
+        for angles in ((-2 * STEP, yaw), (-STEP, 0.0)):
+            target = await tester.target(*angles)
+            if one := await send(tester, target):
+                one.expect(accepted=True)
+            await tester.reach(target)
         return str(await tester.pose())
     return check
 
@@ -94,13 +95,14 @@ def ignores(
 
 def turns(
     name: str, title: str, specification: Specification, section: str,
-    send: Callable[[T, float], Awaitable[Transaction | None]], speed: float = -RATE,
-    fastest: float = 3.0,
+    send: Callable[[T, float], Awaitable[Transaction | None]], speed: float, *,
+    seconds: float = 1.0, slowest: float = 0.25, fastest: float = 3.0,
 ) -> Requirement[T]:
     """
-    Return the requirement that a gimbal turns down for a second when a speed is sent.
+    Return the requirement that a gimbal turns down for some seconds when a speed is sent.
 
     :param speed: deg/s, below 0.
+    :param slowest: the least share of it that counts.
     :param fastest: how many times as fast it may be; infinite where the specification leaves it
         open.
     """
@@ -108,16 +110,16 @@ def turns(
     async def check(tester: T) -> str:
         before = await tester.begin()
         one = await send(tester, speed)
-        await tester.pause(1.0)
+        await tester.pause(seconds)
         after = await tester.pose()
         await send(tester, 0.0)
         if one:
             one.expect(accepted=True)
         turned = after.pitch - before.pitch
-        text = f'turned {turned:.1f} deg in 1 s'
+        text = f'turned {turned:.1f} deg in {seconds:g} s'
         if fastest < math.inf:
             text = f'commanded {speed:g} deg/s, {text}'
-        if not fastest * speed < turned < 0.25 * speed:
+        if not fastest * speed * seconds < turned < slowest * speed * seconds:
             raise Failed(text)
         return text
     return check
@@ -336,7 +338,8 @@ MOTION: tuple[AnyRequirement, ...] = (
             'GIMBAL_DEVICE_SET_ATTITUDE', 'a setpoint of NaN',
             lambda tester, pose: tester.point(None)),
     turns('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE',
-          lambda tester, speed: tester.point(None, rates=(NAN, speed, NAN))),
+          lambda tester, speed: tester.point(None, rates=(NAN, speed, NAN)), -RATE,
+          seconds=1.5, slowest=1 / 3, fastest=2.0),
     stop, within_range, limit_flags, *POSITIONS)
 
 
