@@ -70,10 +70,11 @@ class MinimalLight:
             self._heartbeat_due = now + 1.0
             self._send(mav.heartbeat(mav.MavType.ILLUMINATOR))
             self._answer()
-        message = IlluminatorStatus(
-            uptime, self._on, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0)
+        frame = self._frame(IlluminatorStatus(
+            uptime, self._on, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
         self.sent[uptime] = time.monotonic()
-        self._send(message)
+        with contextlib.suppress(ConnectionError):
+            self._socket.send(frame)
 
     def stream(self, seconds: float, interval: float) -> None:
         """Send statuses for some time."""
@@ -115,9 +116,12 @@ class MinimalLight:
         self.status()
 
     def _send(self, message: mav.Message) -> None:
-        self._sequence = (self._sequence + 1) & 0xFF
         with contextlib.suppress(ConnectionError):
-            self._socket.send(frame_of(message, self._sequence, self._address))
+            self._socket.send(self._frame(message))
+
+    def _frame(self, message: mav.Message) -> bytes:
+        self._sequence = (self._sequence + 1) & 0xFF
+        return frame_of(message, self._sequence, self._address)
 
 
 @contextlib.contextmanager
