@@ -123,11 +123,7 @@ class NodeInterface:
         publications: Iterable[Publication] = (), services: Iterable[AnyService] = (),
         commands: Iterable[AnyCommand] = (),
     ) -> None:
-        self._publishers = {
-            one.name: (
-                node.create_publisher(one.type, f'~/{one.name}', one.qos or STATE_QOS).publish,
-                serializer(one.type))
-            for one in publications}
+        self._topics = {one.name: _Topic(node, one) for one in publications}
         for service in services:
             node.create_service(
                 service.type, f'~/{service.name}',
@@ -144,8 +140,44 @@ class NodeInterface:
 
         :param value: ``data`` for a type of std_msgs, else the message or its serialized bytes.
         """
-        publish, serialize = self._publishers[name]
-        publish(serialize(value))
+        self._topics[name].publish(value)
+
+    def publisher(self, name: str) -> Callable[[object], None]:
+        """Return :meth:`publish` for one topic."""
+        return self._topics[name].publish
+
+    def is_subscribed(self, name: str) -> bool:
+        """Return whether anybody subscribes to a topic; callable from any thread."""
+        return self._topics[name].is_subscribed()
+
+
+class _Topic:
+    """
+    A published topic.
+
+    A state that has not changed is not published again where nobody subscribes: a later subscriber
+    gets the last one in any case. To count the subscriptions takes a quarter of publishing.
+    """
+
+    def __init__(self, node: Node, publication: Publication) -> None:
+        qos = publication.qos or STATE_QOS
+        publisher = node.create_publisher(publication.type, f'~/{publication.name}', qos)
+        self._publish = publisher.publish
+        self._count_subscriptions = publisher.get_subscription_count
+        self._serialize = serializer(publication.type)
+        self._keeps_last = qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        self._last: object = None
+
+    def publish(self, value: object) -> None:
+        message = self._serialize(value)
+        if message == self._last and not self._count_subscriptions():
+            return
+        self._publish(message)
+        if self._keeps_last:
+            self._last = message
+
+    def is_subscribed(self) -> bool:
+        return bool(self._count_subscriptions())
 
 
 def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:

@@ -182,13 +182,16 @@ class GimbalNode:
         self._interface.publish('controller', controller(control))
 
     def _publish_attitude(self, event: events.AttitudeReceived) -> None:
-        publish, attitude = self._interface.publish, event.attitude
+        publish, is_subscribed = self._interface.publish, self._interface.is_subscribed
+        attitude = event.attitude
         if attitude is not None:
             header = Header(stamp=self._clock.now().to_msg(),
                             frame_id=self._frames.name(attitude.frame))
-            publish('attitude', quaternion_message(header, attitude.rotation))
-            publish('angles', conversions.vector_message(header, attitude.rotation.euler()))
-            if attitude.rates is not None:
+            if is_subscribed('attitude'):
+                publish('attitude', quaternion_message(header, attitude.rotation))
+            if is_subscribed('angles'):
+                publish('angles', conversions.vector_message(header, attitude.rotation.euler()))
+            if attitude.rates is not None and is_subscribed('angular_velocity'):
                 publish('angular_velocity', conversions.vector_message(header, attitude.rates))
         lock = bool(event.flags & MountFlags.YAW_LOCK)
         if lock is not self._yaw_lock:
