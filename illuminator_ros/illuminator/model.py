@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum, IntFlag
-from functools import lru_cache
+from functools import cached_property, lru_cache
 import math
 import reprlib
 import struct
@@ -79,7 +79,7 @@ class Mode(IntEnum):
     INTERNAL_CONTROL = 1
     EXTERNAL_SYNC = 2
 
-    @property
+    @cached_property
     def label(self) -> str:
         """Return the name that the ROS interface uses."""
         return self.name.lower()
@@ -98,6 +98,8 @@ def float32(value: float) -> float:
         return math.copysign(math.inf, value)
 
 
+# A light reports the same numbers again and again.
+@lru_cache(maxsize=256)
 def shortest(value: float) -> float:
     """Return the shortest decimal number that is this float32: 60.1 for 60.099998474."""
     for digits in range(1, 9):

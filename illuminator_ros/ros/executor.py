@@ -26,7 +26,6 @@ from collections import Counter, deque
 from collections.abc import Callable
 import contextlib
 import functools
-import os
 import threading
 import time
 from typing import Generic, TypeVar
@@ -40,6 +39,7 @@ from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from .processor import processor
 from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
@@ -151,7 +151,8 @@ class NodeExecutor(SingleThreadedExecutor):
                 self._serve(service)
             for subscription in subscriptions:
                 self._deliver(subscription)
-        self._send_spaced()
+        if self._spaced:
+            self._send_spaced()
         while self._calls:
             self._calls.popleft()()
         if not self.context.ok():
@@ -166,12 +167,13 @@ class NodeExecutor(SingleThreadedExecutor):
         """See rclpy's Executor, whose loop calls it."""
         if not isinstance(service.callback, DeferredService):
             return super()._take_service(service)  # type: ignore[misc]
-        self._serve(service)
+        with service.handle:
+            self._serve(service)
         return None
 
     def _serve(self, service: Service) -> None:
-        with service.handle:
-            request, header = service.handle.service_take_request(service.srv_type.Request)
+        """Take a request; the handle of its service is protected from destruction."""
+        request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is None:
             return
         with self._counting:
@@ -229,8 +231,7 @@ def _send(service: Service, header: _rclpy.rmw_service_info_t, response: object)
     except InvalidHandle:
         # The node of a forgotten device may be gone.
         return
-    # The client may wait for this processor.
-    os.sched_yield()
+    processor.give_way()
 
 
 class _Entities:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import logging
+import operator
 
 from rclpy.node import Node
 from sensor_msgs.msg import Temperature
@@ -30,16 +31,17 @@ from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import NodeInterface, Publication, STREAM_QOS
 from ...ros.parameters import DeviceParameters
+from ...ros.processor import processor
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
 STATUS_TOPICS: dict[str, tuple[type[object], Callable[[model.Status], object]]] = {
-    'enabled': (Bool, lambda status: status.enabled),
-    'brightness': (Float32, lambda status: status.brightness),
-    'mode': (String, lambda status: status.mode.label),
-    'strobe_period': (Float32, lambda status: status.strobe_period),
-    'strobe_duty_cycle': (Float32, lambda status: status.strobe_duty_cycle),
-    'error_flags': (UInt32, lambda status: status.error_flags),
+    'enabled': (Bool, operator.attrgetter('enabled')),
+    'brightness': (Float32, operator.attrgetter('brightness')),
+    'mode': (String, operator.attrgetter('mode.label')),
+    'strobe_period': (Float32, operator.attrgetter('strobe_period')),
+    'strobe_duty_cycle': (Float32, operator.attrgetter('strobe_duty_cycle')),
+    'error_flags': (UInt32, operator.attrgetter('error_flags')),
     'uptime': (Float64, lambda status: status.uptime_ms / 1000.0),
 }
 PUBLICATIONS = (
@@ -68,6 +70,9 @@ class EventPublisher:
     ) -> None:
         self._clock = node.get_clock()
         self._interface = interface
+        self._status_topics = tuple(
+            (read, interface.publisher(name)) for name, (_, read) in STATUS_TOPICS.items())
+        self._publish_enabled = self._status_topics[0][1]
         self._parameters = parameters
         self._log = log
         self._frame_id = frame_id
@@ -150,14 +155,16 @@ class EventPublisher:
 
     def _status_received(self, event: events.StatusReceived) -> None:
         status = event.status
-        publish = self._interface.publish
-        for name, (_, read) in STATUS_TOPICS.items():
+        for read, publish in self._status_topics:
             # An implausible value is None.
             if (value := read(status)) is not None:
-                publish(name, value)
-        if event.temperature is not None:
-            publish('temperature', temperature(
+                publish(value)
+            if publish is self._publish_enabled:
+                processor.give_way()
+        if event.temperature is not None and self._interface.is_subscribed('temperature'):
+            self._interface.publish('temperature', temperature(
                 event.temperature, self._clock.now().nanoseconds, self._frame_id))
+        processor.give_way()
         condition = (status.error_flags, status.invalid, status.limits)
         if condition != self._condition:
             self._condition = condition
