@@ -45,8 +45,9 @@ from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
 
-# s of one wait: select() cannot wait for infinity.
-MAX_WAIT = 1.0
+# s of one wait, not longer than for the acknowledgement of a command: a caller's turn that sends
+# one then need not wake the thread, which would take a processor from the component that answers.
+MAX_WAIT = 0.2
 # To wake the loop costs as much as ten foreign frames. Where more than BATCH_THRESHOLD come per
 # second, the loop lets them collect for BATCH_TIME s, or until BATCH_SIZE are expected; a UDP
 # socket has room for 250. A call ends that, and it does not begin within ANSWER_TIME s of a
@@ -57,6 +58,8 @@ BATCH_SIZE = 128
 ANSWER_TIME = 1.0
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
+# s for which a caller waits at most for the answer to what it has sent.
+PATIENCE = 0.002
 # s that a channel stays open until it is proved without a frame.
 PROOF_TIME = 1.0
 # s for which the line may still be busy when the next group of a stream is written, so that it has
@@ -129,6 +132,8 @@ class Link:
         self._channel: Channel | None = None
         self._receiver = FrameReader(self._signing, self._classes)
         self._router = RoutingTable()
+        # From which address and peer the last frame came, and when, s.
+        self._heard_last: tuple[Address, Peer, float] | None = None
         self._traffic = Traffic()
         # Messages that wait for the line, and when it will have sent everything written, s.
         self._streams = ConflatingQueue(endpoint.streams)
@@ -167,6 +172,8 @@ class Link:
         self._waits_until = -math.inf
         # The thread of the caller that has taken the turn.
         self._taker: int | None = None
+        # Whether a caller has received meanwhile, so that what was ready may be so no longer.
+        self._received_by_caller = False
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
     # From any thread
@@ -210,12 +217,17 @@ class Link:
         self._calls.append(function)
         self._wake()
 
-    def run_turn(self, function: Callable[[float], None]) -> None:
+    def run_turn(
+        self, function: Callable[[float], None], is_done: Callable[[], bool] | None = None,
+    ) -> None:
         """
         Call ``function(now)`` in a turn here if the link's thread waits, else as :meth:`call`.
 
         The function and the sending of what follows take less time than a change of threads. The
         caller must not hold a lock that is taken in a turn.
+
+        :param is_done: where it is given, the caller receives what comes, in this turn, until it
+            returns True, for :data:`PATIENCE` at most.
         """
         if self._calls or not self._turn.acquire(blocking=False):
             self.call(function)
@@ -224,7 +236,13 @@ class Link:
         try:
             self._safe_call(function, self.clock())
             self._flush()
-            self._due = self._next_deadline()
+            if is_done is not None:
+                self._receive_until(is_done)
+            # The component that answers may wait for this processor. Where nothing was received,
+            # all else is due as before.
+            is_complete = self._received_by_caller or self._channel is None
+            self._due = self._next_deadline() if is_complete else min(
+                self._due, self.endpoint.next_deadline(), self._stream_due())
             wakes = self._due < self._waits_until
         except Exception:
             self._log_fault()
@@ -235,6 +253,24 @@ class Link:
             self._turn.release()
         if wakes:
             self._wake()
+
+    def _receive_until(self, is_done: Callable[[], bool]) -> None:
+        """Receive in the turn of a caller, which need not wait for a change of threads."""
+        until = min(self.clock() + PATIENCE, self._due)
+        while not is_done() and self._channel is not None and (wait := until - self.clock()) > 0:
+            handles = {key.fd: key.fileobj for key in self._selector.get_map().values()
+                       if key.fileobj is not self._wake_out}
+            poll = select.poll()
+            for descriptor in handles:
+                poll.register(descriptor, select.POLLIN)
+            ready = poll.poll(1000 * wait)
+            if not ready:
+                break
+            self._received_by_caller = True
+            # One after the other: the first may close the others.
+            self._serve(handles[ready[0][0]], selectors.EVENT_READ)
+            if not is_done():
+                until = min(until, self.endpoint.next_deadline())
 
     def _wake(self) -> None:
         # A full buffer has woken the thread already; a closed one has no thread to wake.
@@ -286,7 +322,7 @@ class Link:
         now = self.clock()
         wait = min(max(due - now, self._pause), MAX_WAIT)
         self._pause = 0.0
-        self._waits_until = due
+        self._waits_until = now + wait
         self._turn.release()
         try:
             ready = self._selector.select(wait)
@@ -297,8 +333,9 @@ class Link:
                 with contextlib.suppress(BlockingIOError):
                     self._wake_out.recv(4096)
             # A caller's turn may have lost the channel meanwhile, but only the thread opens one.
-            elif self._channel is not None:
+            elif self._channel is not None and not self._received_by_caller:
                 self._serve(key.fileobj, events)
+        self._received_by_caller = False
         now = self.clock()
         if self._work_pending or self._calls or now >= min(due, self._due):
             self._work()
@@ -380,15 +417,17 @@ class Link:
                     self._accept(channel, peer, frame, now)
                 elif frame.source not in self._writer.sequences:
                     # Those from our own address are our own, returned, or an address conflict.
-                    self._heard(channel, peer, frame.source, frame.sequences, now)
+                    self._traffic.count(frame.source, frame.sequences)
+                    self._heard(channel, peer, frame.source, now)
             self._flush()
         self._traffic.bytes_received += len(data)
 
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
             return
-        sender = self._heard(channel, peer, frame.source, bytes((frame.sequence,)), now,
-                             hash((frame.message_id, frame.payload)))
+        sender = self._traffic.count(
+            frame.source, bytes((frame.sequence,)), hash((frame.message_id, frame.payload)))
+        self._heard(channel, peer, frame.source, now)
         cls = self._classes.get(frame.message_id)
         if cls is not None:
             self._work_pending = True
@@ -398,26 +437,29 @@ class Link:
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('received from %s: %s', frame.source, message,
                                  extra={'address': frame.source})
-            self._safe_call(self.endpoint.receive, frame.source, message, now)
+            try:
+                self.endpoint.receive(frame.source, message, now)
+            except Exception:
+                self._fault()
 
-    def _heard(
-        self, channel: Channel, peer: Peer, source: Address, sequences: bytes | bytearray,
-        now: float, content: int | None = None,
-    ) -> int:
-        """Note frames from an address, and return which of its senders has sent the last one."""
+    def _heard(self, channel: Channel, peer: Peer, source: Address, now: float) -> None:
+        """Note that frames from an address have come from a peer."""
+        heard = source, peer, now
+        if heard == self._heard_last:
+            # In the same datagram.
+            return
+        self._heard_last = heard
         if not self._frame_received:
             self._frame_received = self._work_pending = True
             self._connector.backoff.answered()
             self._status.take(LinkInput.PROVED, now, channel.name)
         self._greet_at = now + SILENCE
-        sender = self._traffic.count(source, sequences, content)
         if channel.heard(peer, now):
             self._work_pending = True
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('new peer %s on %s', peer, channel.name)
             self._safe_call(self.endpoint.link_opened, now)
         self._router.heard(source, peer, now)
-        return sender
 
     def _poll_channel(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
@@ -572,14 +614,19 @@ class Link:
         self._proven_at = self._greet_at = math.inf
         self._receiver.clear()
         self._router.clear()
+        self._heard_last = None
 
     def _safe_call(self, function: Callable[..., None], *arguments: object) -> None:
         """Call what is not ours: its fault must not end the thread."""
         try:
             function(*arguments)
         except Exception:
-            self._pause = FAULT_PAUSE
-            self._log_fault()
+            self._fault()
+
+    def _fault(self) -> None:
+        """Note the exception that is handled: the loop must not repeat it without a pause."""
+        self._pause = FAULT_PAUSE
+        self._log_fault()
 
     def _log_fault(self) -> None:
         """Log the exception that is handled, at a limited rate."""

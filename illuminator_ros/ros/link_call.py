@@ -21,7 +21,7 @@ import threading
 from typing import Generic, TypeVar
 
 from .throttled_log import NodeLog
-from ..mavlink.link import Link
+from ..mavlink.link import Link, PATIENCE
 
 T = TypeVar('T')
 
@@ -45,13 +45,17 @@ class LinkCalls:
         self._log = log
         self._limit = limit
         self._pending = 0
+        # Whether the last answer came soon enough for the caller to wait for the next one.
+        self._is_quick = False
         self._lock = threading.Lock()
 
     def ask(
         self, request: Request[T], answer: Callable[[T], None], refusal: Callable[[str], T],
     ) -> None:
         """
-        Start a request without waiting for the link.
+        Start a request, and wait for its answer for :data:`~..mavlink.link.PATIENCE` at most.
+
+        It waits only if the last answer came so soon, and no other request waits.
 
         :param answer: called once with the answer, in any thread.
         :param refusal: returns the answer for a reason why the request cannot be carried out.
@@ -59,10 +63,11 @@ class LinkCalls:
         with self._lock:
             busy = self._pending >= self._limit
             self._pending += not busy
+            waits = self._is_quick and self._pending == 1
         if busy:
             answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
             return
-        answered = False
+        asked_at, answered = self._link.clock(), False
 
         def end(value: T) -> None:
             nonlocal answered
@@ -70,6 +75,7 @@ class LinkCalls:
                 answered = True
                 with self._lock:
                     self._pending -= 1
+                    self._is_quick = self._link.clock() <= asked_at + PATIENCE
                 answer(value)
 
         def run(now: float) -> None:
@@ -80,7 +86,7 @@ class LinkCalls:
                 self._log.error(reason, 'request')
                 end(refusal(reason))
 
-        self._link.run_turn(run)
+        self._link.run_turn(run, (lambda: answered) if waits else None)
 
 
 class LatestOnly(Generic[T]):

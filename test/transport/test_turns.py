@@ -21,7 +21,8 @@ import selectors
 import threading
 from typing import Any
 
-from illuminator_ros.mavlink.messages import heartbeat
+from illuminator_ros.mavlink.command_sender import MIN_TIMEOUT
+from illuminator_ros.mavlink.messages import Address, heartbeat, Message
 import pytest
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Run, Talker
@@ -67,14 +68,14 @@ def link(talker: Talker) -> SimulatedLink:
 
 def take_turn(
     link: LiveLink, selector: Waiting, function: Callable[[float], None],
-    takers: Log[threading.Thread],
+    takers: Log[threading.Thread], is_done: Callable[[], bool] | None = None,
 ) -> None:
     """Take a turn in this thread, which appears among the takers then."""
     # The thread goes round each 0.25 s, since no peer answers, and may do so just now.
     for _ in range(20):
         selector.begins.clear()
         assert selector.begins.wait(PATIENCE)
-        link.link.run_turn(function)
+        link.link.run_turn(function, is_done)
         if threading.current_thread() in takers:
             return
     pytest.fail('each turn was left to the thread of the link')
@@ -98,6 +99,46 @@ def test_caller_takes_the_turn_and_sends_while_the_thread_waits(run: Run, channe
         data += b''.join(piece for _, piece in other.receive())
 
 
+def test_caller_that_waits_receives_the_answer_in_its_turn(run: Run, channel: Open) -> None:
+    other, selector = channel(URL), Waiting()
+    link = run(LiveLink(URL, selector=selector))
+    link.wait_open()
+    callers: Log[threading.Thread] = Log()
+    receivers: Log[threading.Thread] = Log()
+    genuine = link.endpoint.receive
+
+    def receive(source: Address, message: Message, now: float) -> None:
+        receivers.append(threading.current_thread())
+        genuine(source, message, now)
+
+    link.endpoint.receive = receive  # type: ignore[method-assign]
+
+    def ask(now: float) -> None:
+        callers.append(threading.current_thread())
+        other.broadcast(heartbeat_frame())
+
+    caller = threading.current_thread()
+    take_turn(link, selector, ask, callers, lambda: caller in receivers)
+    assert list(receivers)[-1] is caller
+    # What the thread was woken for has been received; what comes now is new.
+    count = len(receivers) + 1
+    other.broadcast(heartbeat_frame(sequence=1))
+    link.endpoint.wait_heard(count)
+    assert list(receivers)[-1] is not caller
+
+
+def test_caller_that_gets_no_answer_leaves_the_link_to_its_thread(
+        run: Run, channel: Open) -> None:
+    other, selector = channel(URL), Waiting()
+    link = run(LiveLink(URL, selector=selector))
+    link.wait_open()
+    callers: Log[threading.Thread] = Log()
+    take_turn(link, selector, lambda now: callers.append(threading.current_thread()), callers,
+              lambda: False)
+    other.broadcast(heartbeat_frame())
+    link.endpoint.wait_heard()
+
+
 def test_turn_within_a_turn_is_left_to_the_thread(link: SimulatedLink) -> None:
     done: list[str] = []
 
@@ -118,7 +159,9 @@ def test_turn_of_a_caller_does_not_overtake_a_call(link: SimulatedLink) -> None:
     assert done == ['call', 'turn']
 
 
-@pytest.mark.parametrize(('ahead', 'wakes'), [(0.001, True), (1000.0, False)])
+# A command is waited for so long at least: one that a caller sends does not wake the thread.
+@pytest.mark.parametrize(('ahead', 'wakes'), [
+    (0.001, True), (MIN_TIMEOUT, False), (1000.0, False)])
 def test_turn_of_a_caller_wakes_the_thread_for_an_earlier_deadline_only(
         link: SimulatedLink, talker: Talker, ahead: float, wakes: bool) -> None:
     found: list[bool] = []

@@ -1,0 +1,107 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Requests of ROS callbacks to the link: which of them wait for their answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from illuminator_ros.mavlink.link import PATIENCE
+from illuminator_ros.ros.link_call import LinkCalls
+import pytest
+
+
+class CallerLink:
+    """
+    A link whose turns are those of callers.
+
+    :ivar now: s.
+    :ivar waited: whether each caller waited, and was told of its answer.
+    """
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.waited: list[bool] = []
+        self._answers: list[Callable[[str], None]] = []
+
+    def clock(self) -> float:
+        return self.now
+
+    def run_turn(
+        self, function: Callable[[float], None], is_done: Callable[[], bool] | None = None,
+    ) -> None:
+        function(self.now)
+        self.waited.append(is_done is not None)
+
+    def ask(self, calls: LinkCalls) -> None:
+        def start(now: float, answer: Callable[[str], None]) -> None:
+            self._answers.append(answer)
+
+        calls.ask(start, lambda answer: None, str)
+
+    def answer(self, after: float) -> None:
+        self.now += after
+        self._answers.pop(0)('done')
+
+
+@pytest.fixture
+def link() -> CallerLink:
+    return CallerLink()
+
+
+@pytest.fixture
+def calls(link: CallerLink) -> LinkCalls:
+    anything: Any = link
+    return LinkCalls(anything, anything)
+
+
+@pytest.mark.parametrize(('after', 'waits'), [
+    (0.0, True), (0.9 * PATIENCE, True), (1.1 * PATIENCE, False), (1.0, False)])
+def test_caller_waits_where_the_last_answer_came_soon(
+        link: CallerLink, calls: LinkCalls, after: float, waits: bool) -> None:
+    link.ask(calls)
+    link.answer(after)
+    link.ask(calls)
+    assert link.waited == [False, waits]
+
+
+def test_caller_does_not_wait_while_another_request_has_no_answer(
+        link: CallerLink, calls: LinkCalls) -> None:
+    link.ask(calls)
+    link.answer(0.0)
+    for _ in range(3):
+        link.ask(calls)
+    assert link.waited == [False, True, False, False]
+
+
+def test_caller_that_waits_is_told_when_the_answer_has_come(calls: LinkCalls) -> None:
+    found: list[bool] = []
+    answers: list[Callable[[str], None]] = []
+    link = CallerLink()
+
+    def run_turn(function: Callable[[float], None], is_done: Callable[[], bool]) -> None:
+        function(0.0)
+        found.append(is_done())
+        answers.pop()('done')
+        found.append(is_done())
+
+    anything: Any = link
+    calls = LinkCalls(anything, anything)
+    link.ask(calls)
+    link.answer(0.0)
+    anything.run_turn = run_turn
+    calls.ask(lambda now, answer: answers.append(answer), lambda answer: None, str)
+    assert found == [False, True]
