@@ -110,6 +110,7 @@ class SimulatedIlluminator(SimulatedDevice):
         self.warm(now)
         super().behave(behaviour, now)
         self.thermal.sensor_failed = self.behaviour.thermistor_failed
+        self.thermal.advance(0.0, 0.0)
 
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; the temperature stays."""
@@ -138,11 +139,11 @@ class SimulatedIlluminator(SimulatedDevice):
     def status(self, now: float) -> IlluminatorStatus:
         """Return the ILLUMINATOR_STATUS of this moment."""
         self.warm(now)
-        behaviour, configuration = self.behaviour, self.configuration
-        brightness = configuration.brightness * self.thermal.output
+        behaviour, configuration, thermal = self.behaviour, self.configuration, self.thermal
+        brightness = configuration.brightness * thermal.output
         if behaviour.brightness_is_switch and not self.enabled:
             brightness = 0.0
-        flags = self.thermal.flags | behaviour.false_flags
+        flags = thermal.flags | behaviour.false_flags
         if behaviour.inverted_flags and self.enabled:
             flags ^= model.ErrorFlag.THERMAL_THROTTLING
         limits = self.properties.limits if behaviour.measures else model.Limits()
@@ -150,7 +151,7 @@ class SimulatedIlluminator(SimulatedDevice):
             self.uptime_ms(now) if behaviour.has_clock else 0, int(self.enabled),
             self.properties.reported_bitmask, flags, int(configuration.mode), brightness,
             configuration.strobe_period, configuration.strobe_duty_cycle,
-            self.thermal.reading if behaviour.measures else 0.0,
+            thermal.reading if behaviour.measures else 0.0,
             limits.min_strobe_period, limits.max_strobe_period)
         return IlluminatorStatus(*fields, *(behaviour.extension or ()))
 
@@ -241,6 +242,7 @@ class SimulatedIlluminator(SimulatedDevice):
         """Set the temperature, degC."""
         self.warm(now)
         self.thermal.temperature = temperature
+        self.thermal.advance(0.0, 0.0)
 
     def set_ambient(self, temperature: float, now: float) -> None:
         """Set the ambient temperature, degC."""
@@ -249,6 +251,8 @@ class SimulatedIlluminator(SimulatedDevice):
 
     def warm(self, now: float) -> None:
         """Advance the temperature to this moment; call it before each change of the state."""
+        if now == self._warmed_at:
+            return
         configuration = self.configuration
         power = configuration.brightness / 100 if self.enabled else 0.0
         if configuration.strobe_period:

@@ -75,6 +75,7 @@ class ThermalModel:
         self.ambient = self.temperature = properties.ambient
         self.sensor_failed = False
         self._flags = 0
+        self.advance(0.0, 0.0)
 
     @property
     def flags(self) -> int:
@@ -96,7 +97,7 @@ class ThermalModel:
 
     def advance(self, seconds: float, power: float) -> None:
         """
-        Let time pass.
+        Let time pass, or none after a change of the temperature or of the sensor.
 
         :param power: the commanded share of full power (0..1).
         """
@@ -108,19 +109,21 @@ class ThermalModel:
 
     def _step(self, seconds: float, power: float) -> bool:
         """Return whether the temperature and the flags have reached their final values."""
-        properties, flags = self.properties, self.flags
+        properties, before = self.properties, self.flags
         final = self.ambient + properties.rise * power * self.output
         decay = math.exp(-seconds / properties.time_constant)
-        self.temperature = final + (self.temperature - final) * decay
+        self.temperature = temperature = final + (self.temperature - final) * decay
+        flags = self._flags
         if self.sensor_failed:
-            self._flags = 0
+            flags = 0
         else:
-            self._switch(_THROTTLING, properties.throttle_at, properties.throttle_until)
-            self._switch(_SHUTDOWN, properties.shutdown_at, properties.shutdown_until)
-        return self.flags == flags and abs(self.temperature - final) < 1e-9
-
-    def _switch(self, flag: int, on_at: float, off_below: float) -> None:
-        if self.temperature >= on_at:
-            self._flags |= flag
-        elif self.temperature < off_below:
-            self._flags &= ~flag
+            if temperature >= properties.throttle_at:
+                flags |= _THROTTLING
+            elif temperature < properties.throttle_until:
+                flags &= ~_THROTTLING
+            if temperature >= properties.shutdown_at:
+                flags |= _SHUTDOWN
+            elif temperature < properties.shutdown_until:
+                flags &= ~_SHUTDOWN
+        self._flags = flags
+        return self.flags == before and abs(temperature - final) < 1e-9

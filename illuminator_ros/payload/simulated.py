@@ -290,7 +290,8 @@ class SimulatedComponent(Generic[D]):
 
     def power_on(self, now: float) -> None:
         """Begin; the faults that last for a time last from now on."""
-        self._silent_until = now + (self.behaviour.silence or -math.inf)
+        # Until then it neither receives nor sends, s.
+        self._silent_until = now + (self.device.behaviour.silence or -math.inf)
         self.restart(now)
 
     def restart(self, now: float) -> None:
@@ -300,15 +301,15 @@ class SimulatedComponent(Generic[D]):
         self._streams = {message_id: _Stream(interval, now)
                          for message_id, interval in self.device.streams().items()}
         self._in_progress: set[int] = set()
-        self._heartbeat_due = now if self.behaviour.heartbeat_interval else math.inf
+        self._heartbeat_due = now if self.device.behaviour.heartbeat_interval else math.inf
         # Actions that are due later.
         self._schedule: DeadlineQueue[Callable[[float], None]] = DeadlineQueue()
-        self._reboot_due = now + (self.behaviour.reboot_interval or math.inf)
+        self._reboot_due = now + (self.device.behaviour.reboot_interval or math.inf)
         self._changed()
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
-        before = self.behaviour
+        before = self.device.behaviour
         self.device.behave(behaviour, now)
         if behaviour.silence != before.silence:
             self._silent_until = now + behaviour.silence
@@ -318,14 +319,10 @@ class SimulatedComponent(Generic[D]):
             self._heartbeat_due = now if behaviour.heartbeat_interval else math.inf
         self._changed()
 
-    def silent(self, now: float) -> bool:
-        """Return whether it neither receives nor sends."""
-        return now < self._silent_until
-
     def apply(self, change: Change, now: float) -> None:
         """Make a change, by command or by hand, and send the streamed messages."""
         change()
-        if self.behaviour.status_on_change:
+        if self.device.behaviour.status_on_change:
             for message_id, stream in self._streams.items():
                 if stream.interval:
                     stream.due = now + stream.interval
@@ -334,7 +331,7 @@ class SimulatedComponent(Generic[D]):
 
     def _is_addressed(self, message: Message) -> bool:
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
-        behaviour = self.behaviour
+        behaviour = self.device.behaviour
         system = getattr(message, 'target_system', 0)
         component = getattr(message, 'target_component', 0)
         if behaviour.adopts_system_id:
@@ -346,8 +343,8 @@ class SimulatedComponent(Generic[D]):
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Take a command or a message for this component, or for no one in particular."""
-        behaviour = self.behaviour
-        if self.silent(now):
+        behaviour = self.device.behaviour
+        if now < self._silent_until:
             return
         if behaviour.adopts_system_id and source.system:
             self.address = Address(source.system, self.address.component)
@@ -372,7 +369,7 @@ class SimulatedComponent(Generic[D]):
 
     def _consider(self, source: Address, message: AnyCommand, now: float) -> None:
         """Answer a command at once, or report its progress first."""
-        behaviour = self.behaviour
+        behaviour = self.device.behaviour
         if message.command not in self.device.changes:
             self._finish(source, message, now)
         elif behaviour.rejections or message.command in self._in_progress:
@@ -389,7 +386,7 @@ class SimulatedComponent(Generic[D]):
     def _acknowledge(
         self, source: Address, command: int, result: int, now: float, progress: int = 0,
     ) -> None:
-        behaviour = self.behaviour
+        behaviour = self.device.behaviour
         target = source if behaviour.acks_target else Address(0, 0)
         if behaviour.acks_wrong_target:
             target = Address(source.system, source.component ^ 1)
@@ -399,7 +396,7 @@ class SimulatedComponent(Generic[D]):
         self, source: Address, message: AnyCommand, begun: float, now: float,
     ) -> None:
         """Report progress until its time is over, then finish the command."""
-        duration = self.behaviour.progress
+        duration = self.device.behaviour.progress
         if now >= begun + duration:
             self._in_progress.discard(message.command)
             self._finish(source, message, now)
@@ -412,7 +409,7 @@ class SimulatedComponent(Generic[D]):
 
     def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
         """Acknowledge a command and do what it asks for."""
-        behaviour = self.behaviour
+        behaviour = self.device.behaviour
         if message.command == messages.MavCmd.REQUEST_MESSAGE:
             requested = self._requested(message.param1, now)
             result = MavResult.ACCEPTED if requested else self._unknown(MavResult.DENIED)
@@ -436,16 +433,16 @@ class SimulatedComponent(Generic[D]):
 
     def _requested(self, message_id: float, now: float) -> Message | None:
         if not math.isfinite(message_id) or (
-                message_id in self._streams and not self.behaviour.on_request):
+                message_id in self._streams and not self.device.behaviour.on_request):
             return None
         return self.device.message(int(message_id), now) if message_id % 1 == 0 else None
 
     def _unknown(self, result: MavResult) -> MavResult:
-        return MavResult.ACCEPTED if self.behaviour.accepts_unknown else result
+        return MavResult.ACCEPTED if self.device.behaviour.accepts_unknown else result
 
     def _set_interval(self, message: AnyCommand, now: float) -> MavResult:
         """MAV_CMD_SET_MESSAGE_INTERVAL: param2 is µs, -1 stops, 0 is the default rate."""
-        behaviour, microseconds = self.behaviour, message.param2
+        behaviour, microseconds = self.device.behaviour, message.param2
         stream = next((one for id_, one in self._streams.items() if id_ == message.param1), None)
         if stream is None or not math.isfinite(microseconds):
             return MavResult.DENIED
@@ -461,22 +458,25 @@ class SimulatedComponent(Generic[D]):
         return MavResult.ACCEPTED
 
     def _send(self, message: Message | None, now: float) -> None:
-        if message is None or self.silent(now):
+        if message is None or now < self._silent_until:
             return
-        for delay, sent in self._injector.inject(message, self.behaviour):
-            self._after(delay, functools.partial(self._transmit, sent), now)
+        for delay, sent in self._injector.inject(message, self.device.behaviour):
+            if delay:
+                self._after(delay, functools.partial(self._transmit, sent), now)
+            else:
+                self._transmit(sent, now)
 
     def _transmit(self, message: Message, now: float) -> None:
         self.outgoing.append((self.device.sender(message, self.address), message))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""
-        if self.behaviour.heartbeat_interval:
+        if self.device.behaviour.heartbeat_interval:
             self._send_heartbeat(now)
         self._changed()
 
     def _send_heartbeat(self, now: float) -> None:
-        behaviour = self.behaviour
+        behaviour = self.device.behaviour
         self._heartbeat_due = now + (behaviour.heartbeat_interval or math.inf)
         self._send(messages.Heartbeat(
             behaviour.heartbeat_type, behaviour.heartbeat_autopilot,
@@ -487,7 +487,7 @@ class SimulatedComponent(Generic[D]):
         """See :meth:`Endpoint.poll`."""
         if now >= self._silent_until > -math.inf:
             self._silent_until = -math.inf
-            self.device.behave(replace(self.behaviour, silence=0.0), now)
+            self.device.behave(replace(self.device.behaviour, silence=0.0), now)
         if now >= self._reboot_due:
             self.restart(now)
         for action in self._schedule.due(now):
@@ -506,9 +506,11 @@ class SimulatedComponent(Generic[D]):
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
         end_of_silence = math.inf if self._silent_until == -math.inf else self._silent_until
-        return min(self._heartbeat_due, self._reboot_due, end_of_silence,
-                   self._schedule.next_deadline(), self.device.next_deadline(),
-                   *(stream.due for stream in self._streams.values()))
+        due = min(self._heartbeat_due, self._reboot_due, end_of_silence,
+                  self._schedule.next_deadline(), self.device.next_deadline())
+        for stream in self._streams.values():
+            due = min(due, stream.due)
+        return due
 
 
 class SimulatedComponents(Endpoint, Generic[D]):
