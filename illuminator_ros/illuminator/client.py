@@ -94,7 +94,7 @@ class IlluminatorClient(Payload):
 
     def _changed(self, light: Light, now: float) -> None:
         self._discovery.changed(light.address)
-        if light.has_answered:
+        if light.has_answered and light.address not in self.lights:
             self._discovery.prove(light.address, now)
 
     def _found(self, light: Light, now: float) -> None:

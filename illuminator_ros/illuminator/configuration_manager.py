@@ -541,10 +541,10 @@ class ConfigurationManager:
 
     def next_deadline(self, *, connected: bool) -> float:
         """Return when :meth:`poll` has something to do."""
-        if not connected:
-            return self._queue.next_deadline()
-        if self._setpoint is not None and (not self.is_changing or self._accepted_setpoint):
+        is_changing = self._queue.current is not None
+        if connected and self._setpoint is not None and (
+                not is_changing or self._accepted_setpoint):
             return -math.inf
-        if self.is_changing:
+        if is_changing or not connected:
             return self._queue.next_deadline()
         return self._pending.due if self._pending else math.inf

@@ -132,6 +132,8 @@ class Light:
         self._link_failure = ''
         self._status_due = math.inf
         self._asked_at = -math.inf
+        # s until it is asked for a status. Its answer takes time, too.
+        self._longest_silence = min(STATUS_TIMEOUT, settings.heartbeat_timeout / 1.2)
         self._was_lost = False
         self._enabled: bool | None = None
         self._last_switch: tuple[bool, float] = False, -math.inf
@@ -169,20 +171,23 @@ class Light:
 
         :param sender: of the message.
         """
-        self.heard(now)
+        self.heard_at = now
+        if not self.connected:
+            self.heard(now)
         was_lost, self._was_lost = self._was_lost, False
         uptime = self._tracker.take_uptime(status, now)
         # A request that waits for the status is answered before the status is published. Otherwise
         # it is published first: the comparison with earlier ones would delay it by a quarter.
-        is_awaited = (self._switching.is_confirming or self._configuration.is_confirming
-                      or bool(self._refreshes))
+        is_confirming = self._switching.is_confirming or self._configuration.is_confirming
+        is_awaited = is_confirming or bool(self._refreshes)
         is_first = uptime is Uptime.RUNNING and not is_awaited
         if is_first:
             self._note(status, now)
             self._publish(status, now)
         report, restarted = self._tracker.take(
             status, uptime, now, sender=sender, was_lost=was_lost,
-            commanded=bool(self._switching.current or self._configuration.is_changing))
+            commanded=is_confirming or bool(
+                self._switching.current or self._configuration.is_changing))
         if report is None:
             self._was_lost = was_lost
             if self._tracker.is_suspecting:
@@ -227,9 +232,10 @@ class Light:
         self._configuration.take(
             report, now, can_follow=self._tracker.conflict.can_follow,
             switched_at=self._last_switch[1])
-        for refresh in self._refreshes:
-            refresh.outcomes['ILLUMINATOR_STATUS'] = ''
-        self._check_refreshes(now)
+        if self._refreshes:
+            for refresh in self._refreshes:
+                refresh.outcomes['ILLUMINATOR_STATUS'] = ''
+            self._check_refreshes(now)
 
     def _follow_switch(self, before: bool | None, report: Report[Status], now: float) -> None:
         """Report that the light was switched without a request under way."""
@@ -585,9 +591,7 @@ class Light:
         It may have no heartbeat, and have been asked to send its status less often than that.
         """
         silent_since = max(self.heard_at, self._asked_at) if self.connected else math.inf
-        # Its answer takes time, too.
-        wait = min(STATUS_TIMEOUT, self.settings.heartbeat_timeout / 1.2)
-        return min(self._status_due, silent_since + wait)
+        return min(self._status_due, silent_since + self._longest_silence)
 
     @property
     def _silence_due(self) -> float:
@@ -630,12 +634,21 @@ class Light:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        lost = self.heard_at + self.settings.heartbeat_timeout if self.connected else math.inf
-        refresh = min((one.started for one in self._refreshes), default=math.inf) + REFRESH_LIMIT
-        return min(lost, self._question_due, refresh, self._silence_due, self._automatic_due,
-                   self._identity_query.next_deadline(), self._sources.next_deadline(),
-                   self._switching.next_deadline(),
-                   self._configuration.next_deadline(connected=self.connected))
+        due = min(self._question_due, self._identity_query.next_deadline(),
+                  self._switching.next_deadline(),
+                  self._configuration.next_deadline(connected=self.connected))
+        if self.connected:
+            due = min(due, self.heard_at + self.settings.heartbeat_timeout)
+        # It is asked for after each message; most of these are not in use.
+        if self.settings.off_after_silence:
+            due = min(due, self._silence_due)
+        if self._automatic:
+            due = min(due, self._automatic_due)
+        if self._refreshes:
+            due = min(due, min(one.started for one in self._refreshes) + REFRESH_LIMIT)
+        if self._sources.are_ranked:
+            due = min(due, self._sources.next_deadline())
+        return due
 
 
 @dataclass(eq=False)

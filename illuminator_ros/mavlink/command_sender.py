@@ -279,10 +279,10 @@ class RttEstimator:
 
         :param longest: s; the wait while fewer than :data:`MIN_SAMPLES` samples are known.
         """
-        slow = self.quantile(0.95)
-        if slow is None or len(self._sorted) < MIN_SAMPLES:
+        count = len(self._sorted)
+        if count < MIN_SAMPLES:
             return longest
-        return min(max(4 * slow, MIN_TIMEOUT), longest)
+        return min(max(4 * self._sorted[int(0.95 * count)], MIN_TIMEOUT), longest)
 
 
 class RequestState(Enum):
@@ -331,9 +331,6 @@ class _Request:
     deadline: float = math.inf
     result: int | None = None
     progress: int | None = None
-
-    def next_deadline(self) -> float:
-        return min(self.due, self.limit)
 
     def answers_another_try(self, result: int) -> bool:
         """
@@ -416,7 +413,7 @@ class CommandSender:
         key = command.key
         request = _Request(command, key, done, limit, as_int=command.position is not None)
         requests = self._requests.setdefault(command.target, [])
-        kind = [other for other in requests if other.key == key]
+        kind = [other for other in requests if other.key == key] if requests else []
         if not kind or overtake:
             requests.append(request)
             self._begin(request, now)
@@ -523,7 +520,7 @@ class CommandSender:
         """Resend or end what is due."""
         for requests in list(self._requests.values()):
             for request in list(requests):
-                if request in requests and now >= request.next_deadline():
+                if request in requests and now >= min(request.due, request.limit):
                     self._overdue(request, now)
 
     def _overdue(self, request: _Request, now: float) -> None:
@@ -542,8 +539,11 @@ class CommandSender:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do, infinity if never."""
-        return min((request.next_deadline() for requests in self._requests.values()
-                    for request in requests), default=math.inf)
+        due = math.inf
+        for requests in self._requests.values():
+            for request in requests:
+                due = min(due, request.due, request.limit)
+        return due
 
     def end_all(
         self, now: float, status: CommandStatus, target: Address | None = None,
@@ -569,7 +569,7 @@ class CommandSender:
 
     def _transmit(self, request: _Request, now: float) -> None:
         command = request.command
-        self.send(command.message(request.tries, request.as_int))
+        self.outgoing.append((self.address, command.message(request.tries, request.as_int)))
         request.tries += 1
         self.counters.sent += 1
         self.counters.resent += request.tries > 1

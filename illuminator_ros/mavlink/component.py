@@ -231,5 +231,7 @@ class Component(Endpoint):
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
-        return min(self._heartbeat.due, self.commands.next_deadline(),
-                   *(payload.next_deadline() for payload in self._payloads))
+        due = min(self._heartbeat.due, self.commands.next_deadline())
+        for payload in self._payloads:
+            due = min(due, payload.next_deadline())
+        return due

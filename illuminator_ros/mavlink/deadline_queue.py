@@ -32,12 +32,16 @@ class DeadlineQueue(Generic[K]):
     Postponing, which every heartbeat does, costs next to nothing: the entry in the heap stays
     and is looked at again when its old time comes.
 
-    :param deadline_of: returns the deadline of a key that was noted by :meth:`changed`.
+    :param deadline_of: returns the deadline of a key that was noted by ``changed``.
+    :ivar changed: must be called with a key whose deadline may have changed; that is asked for
+        when it is needed.
     """
 
     def __init__(self, deadline_of: Callable[[K], float] = lambda key: math.inf) -> None:
         self._deadline_of = deadline_of
         self._changed: set[K] = set()
+        # Not a method of this class: it is called for each message, and often more than once.
+        self.changed: Callable[[K], None] = self._changed.add
         self._deadlines: dict[K, float] = {}
         self._heap: list[tuple[float, int, K]] = []
         # The earliest entry of each key in the heap.
@@ -56,10 +60,6 @@ class DeadlineQueue(Generic[K]):
         self._deadlines[key] = deadline
         if deadline < self._entered.get(key, math.inf):
             self._enter(key, deadline)
-
-    def changed(self, key: K) -> None:
-        """Note that the deadline of a key may have changed; it is asked for when it is needed."""
-        self._changed.add(key)
 
     def _enter(self, key: K, deadline: float) -> None:
         self._entered[key] = deadline

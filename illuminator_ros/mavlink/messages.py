@@ -27,7 +27,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import IntEnum
 import struct
-from typing import Annotated, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTuple, TypeVar
 
 from fastcrc.crc16 import mcrf4xx
 
@@ -72,8 +72,8 @@ class Layout(NamedTuple):
 class _Codec(NamedTuple):
     encode: Callable[[Message], bytes]
     unpack: Callable[[bytes], tuple[object, ...]]
-    # Returns unpacked values in the order of the fields.
-    arguments: Callable[[tuple[object, ...]], tuple[object, ...]]
+    # Returns the message of unpacked values.
+    make: Callable[[tuple[object, ...]], Any]
     size: int
 
 
@@ -146,7 +146,7 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
         # Made from text, as dataclasses do: attrgetter and loops take twice the time.
         cls.codec = _Codec(
             eval(f'lambda message: pack({sent})', {'pack': layout.pack}), layout.unpack,
-            eval(f'lambda values: ({received},)'), layout.size)
+            eval(f'lambda values: cls({received})', {'cls': cls}), layout.size)
         LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
         return cls
     return complete
@@ -173,7 +173,7 @@ def decode_payload(cls: type[M], payload: bytes, sender: int = 0) -> M:
     size = codec.size
     if len(payload) != size:
         payload = payload[:size].ljust(size, b'\0')
-    message = cls(*codec.arguments(codec.unpack(payload)))
+    message: M = codec.make(codec.unpack(payload))
     message.sender = sender
     return message
 

@@ -78,6 +78,7 @@ class Discovery(Generic[D]):
     :ivar devices: the announced devices, by address, in the order of their announcement.
     :ivar ignored: the first devices that are not wanted, by address.
     :ivar changed: must be called with the address of a device whose deadline may have changed.
+    :ivar next_deadline: returns when :meth:`poll` is due, infinity if never.
     :ivar limit_reached: whether more than :data:`MAX_DEVICES` have been heard.
     """
 
@@ -99,6 +100,7 @@ class Discovery(Generic[D]):
         self._found_at: dict[Address, float] = {}
         self._deadlines: DeadlineQueue[Address] = DeadlineQueue(self._deadline_of)
         self.changed = self._deadlines.changed
+        self.next_deadline = self._deadlines.next_deadline
 
     def __iter__(self) -> Iterator[D]:
         """Return the devices and the candidates."""
@@ -176,10 +178,6 @@ class Discovery(Generic[D]):
             else:
                 device.poll(now)
                 self.changed(address)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
-        return self._deadlines.next_deadline()
 
     def _deadline_of(self, address: Address) -> float:
         device = self.get(address)

@@ -37,7 +37,7 @@ CONFIRMATION_TIMEOUT = 1.0
 ASK_INTERVAL = 0.25
 # s from a status that is too old to tell to the next request, doubled each time: it may have been
 # sent in the same millisecond as the command.
-OUTDATED_INTERVAL = 0.002
+OUTDATED_INTERVAL = 0.001
 # Requests that may wait for one device.
 MAX_WAITING = 32
 # The result of a request that was not carried out since another one overtook it.
@@ -303,9 +303,6 @@ class Request(Generic[S]):
         assert self._outcome is not None
         return self._outcome
 
-    def _step(self, step: Step) -> None:
-        self.phase = TRANSITIONS[self.phase, step]
-
     def start(self, status: S | None, now: float) -> None:
         """
         Send the command.
@@ -318,16 +315,17 @@ class Request(Generic[S]):
         self._send(Step.SEND, now)
 
     def _send(self, step: Step, now: float) -> None:
-        self._step(step)
+        self.phase = TRANSITIONS[self.phase, step]
         # A status from between two repeats may show what an earlier command still undoes.
         self._sent_at = now
-        change = self._sent
+        change = self.change
+        assert change is not None
         self._target.send(
             change.command, change.params, now, self._answered, limit=self.limit,
             overtake=self.overtakes)
 
     def _answered(self, outcome: command_sender.CommandResult, now: float) -> None:
-        if self.is_finished:
+        if self.phase is Phase.FINISHED:
             return
         self._outcome = outcome
         accepted = outcome.accepted
@@ -336,7 +334,7 @@ class Request(Generic[S]):
         elif accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
         elif accepted or outcome.may_answer_earlier(now):
-            self._step(Step.ACKNOWLEDGED)
+            self.phase = TRANSITIONS[self.phase, Step.ACKNOWLEDGED]
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
             # On the next poll, not immediately: many devices send a status after the
@@ -371,11 +369,12 @@ class Request(Generic[S]):
         late acknowledgement, it would even confirm a change that was never made.
         """
         self._has_status = True
-        if not self.is_confirming:
+        if self.phase is not Phase.CONFIRMING:
             return
         delay = (self._target.shortest_round_trip(now) if report.has_clock
                  else self._target.status_delay)
-        change = self._sent
+        change = self.change
+        assert change is not None
         shown = change.shown_by(report.status)
         if (shown and not self._was_repeated and self._before is not None
                 and not change.shown_by(self._before)):
@@ -416,7 +415,8 @@ class Request(Generic[S]):
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        return min(self._confirm_until, self._ask_at) if self.is_confirming else math.inf
+        return (min(self._confirm_until, self._ask_at) if self.phase is Phase.CONFIRMING
+                else math.inf)
 
     # The end
 
@@ -473,7 +473,7 @@ class Request(Generic[S]):
         self._finish(Result(success, f'{text} ({timing})', note=note, **flags), now, status)
 
     def _finish(self, result: Result, now: float, status: S | None = None) -> None:
-        self._step(Step.FINISH)
+        self.phase = TRANSITIONS[self.phase, Step.FINISH]
         self._done(result, self.change, status, now)
 
 
@@ -532,7 +532,10 @@ class RequestQueue(Generic[S]):
         """Take a status that is newer than all before."""
         self._status = report.status
         if self._requests:
-            self._requests[0].take(report, now)
+            first = self._requests[0]
+            first.take(report, now)
+            if first.phase is Phase.FINISHED:
+                self._start_next(now)
 
     def poll(self, now: float) -> None:
         """Do what is due, and start the request that has waited."""
@@ -558,7 +561,8 @@ class RequestQueue(Generic[S]):
         """Return when :meth:`poll` has something to do."""
         if not self._requests:
             return math.inf
-        if self._requests[0].is_finished:
+        first = self._requests[0]
+        if first.phase is Phase.FINISHED:
             return -math.inf
         waiting = self._requests[1].limit if len(self._requests) > 1 else math.inf
-        return min(self._requests[0].next_deadline(), waiting)
+        return min(first.next_deadline(), waiting)
