@@ -64,6 +64,9 @@ class Switch(NamedTuple):
         return _with_flags(shown, status)
 
 
+SWITCHES = {on: Switch(on) for on in (False, True)}
+
+
 class Configure(NamedTuple):
     """
     Configures a light; the command carries all four fields.

@@ -22,7 +22,7 @@ import math
 
 from . import configuration_manager, events
 from .command_sources import LightSources
-from .commands import Switch
+from .commands import SWITCHES
 from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
 from .model import Changes, DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
@@ -351,9 +351,10 @@ class Light:
 
     def _can_reach(self, now: float, done: Done, refusal: str = '') -> bool:
         """Return whether the light is heard; if not, fail a request with the reason."""
-        if reason := refusal or self.unreachable(now):
-            done(Result(False, reason), now)
-        return not reason
+        if self.connected and not refusal:
+            return True
+        done(Result(False, refusal or self.unreachable(now)), now)
+        return False
 
     def enable(
         self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
@@ -447,7 +448,7 @@ class Light:
 
     def _switch(self, on: bool, now: float, done: Done, detail: str | None) -> None:
         """Submit a request; ``detail`` is None where its caller reports the change itself."""
-        change = Switch(on)
+        change = SWITCHES[on]
         was_on: bool | None = None
 
         def prepare(now: float) -> Change[Status]:

@@ -94,10 +94,10 @@ class UptimeClock:
         if uptime_ms == last_ms:
             # The same status twice or within a millisecond, or a light that has no clock.
             return Uptime.RUNNING if elapsed < NO_CLOCK_TIME else Uptime.NO_CLOCK
-        ahead = uptime_difference(uptime_ms, last_ms) / 1000
-        lag = elapsed - ahead
+        ahead_ms = (uptime_ms - last_ms) % WRAP_MS
+        has_progressed = ahead_ms < WRAP_MS // 2
+        lag = elapsed - (ahead_ms if has_progressed else ahead_ms - WRAP_MS) / 1000
         may_have_restarted = uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
-        has_progressed = (uptime_ms - last_ms) % WRAP_MS < WRAP_MS // 2
         if has_progressed and not (may_have_restarted and lag > MAX_LAG + DRIFT * elapsed):
             return Uptime.RUNNING
         if not has_progressed and may_have_restarted and lag > MAX_DELAY:
@@ -217,7 +217,8 @@ class _Senders:
 
     def take(self, value: float, now: float) -> None:
         """Take the value of a status."""
-        self._senders = [one for one in self._senders if now - one.seen_at <= SENDER_TIME]
+        if len(self._senders) > 1:
+            self._senders = [one for one in self._senders if now - one.seen_at <= SENDER_TIME]
         for one in self._senders:
             if self._is_same(value, one.value):
                 break

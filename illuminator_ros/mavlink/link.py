@@ -258,17 +258,13 @@ class Link:
         """Receive in the turn of a caller, which need not wait for a change of threads."""
         until = min(self.clock() + PATIENCE, self._due)
         while not is_done() and self._channel is not None and (wait := until - self.clock()) > 0:
-            handles = {key.fd: key.fileobj for key in self._selector.get_map().values()
-                       if key.fileobj is not self._wake_out}
-            poll = select.poll()
-            for descriptor in handles:
-                poll.register(descriptor, select.POLLIN)
-            ready = poll.poll(1000 * wait)
-            if not ready:
+            # Both this thread and the link's may wait for the selector.
+            ready = self._selector.select(wait)
+            if not ready or any(key.fileobj is self._wake_out for key, _ in ready):
                 break
             self._received_by_caller = True
             # One after the other: the first may close the others.
-            self._serve(handles[ready[0][0]], selectors.EVENT_READ)
+            self._serve(ready[0][0].fileobj, ready[0][1])
             if not is_done():
                 until = min(until, self.endpoint.next_deadline())
 
@@ -516,7 +512,8 @@ class Link:
         for source, message in messages:
             if getattr(message, 'target_system', 0):
                 self._answer_expected_until = now + ANSWER_TIME
-            towards = self._router.towards(message, all_peers, now)
+            towards = (self._router.towards(message, all_peers, now) if len(all_peers) > 1
+                       else all_peers)
             if frames and towards != peers:
                 self._send(frames, peers, now)
                 frames = []

@@ -75,7 +75,7 @@ class RoutingTable:
     def towards(self, message: object, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
         """Return the peers that lead to the message's target, all peers if none does."""
         system = getattr(message, 'target_system', 0)
-        if not system or len(peers) < 2:
+        if not system:
             return peers
         target = system, getattr(message, 'target_component', 0)
         if self._overflowed and now - self._overflowed.get(target, -math.inf) <= EXPIRY:

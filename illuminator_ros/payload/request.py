@@ -461,8 +461,9 @@ class Request(Generic[S]):
     def _succeed(
         self, how: str, now: float, status: S | None = None, *, superseded: bool = False,
     ) -> None:
-        change = self._sent
-        self._end(f'{change.goal}, {how}: {self._answer.describe()}', now, status,
+        change, answer = self.change, self._outcome
+        assert change is not None and answer is not None
+        self._end(f'{change.goal}, {how}: {answer.describe()}', now, status,
                   success=True, superseded=superseded, note=change.note)
 
     def _end(
@@ -515,8 +516,10 @@ class RequestQueue(Generic[S]):
 
     def overtake(self, request: Request[S], now: float) -> None:
         """Send a request before those that do not overtake, which are cancelled."""
-        overtaken = [one for one in self._requests if not one.overtakes]
-        self._requests = [one for one in self._requests if one.overtakes]
+        overtaken: list[Request[S]] = []
+        if self._requests:
+            overtaken = [one for one in self._requests if not one.overtakes]
+            self._requests = [one for one in self._requests if one.overtakes]
         self.submit(request, now)
         for one in overtaken:
             one.fail(OVERTAKEN, now)
