@@ -26,10 +26,10 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
 from ..light import serving
-from ..rig import Bench, bridge, Client, cpu, free_port, Program, simulator
+from ..rig import Bench, bridge, Client, cpu, free_port, peer, Program, simulator
 from ..rows import at_most, one, quantile, Row
 
-ANSWER, REFUSAL, END = 900.0, 300.0, 1000.0
+ANSWER, REFUSAL, END, PAUSE = 900.0, 300.0, 1000.0, 10.0
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -89,3 +89,13 @@ def measure(bench: Bench) -> Iterator[Row]:
                 client.call('/illuminator/enable', True)
                 took.append(ended(program, SIGNALS[number % 2]))
         yield limited(name, took, END)
+    yield limited('a collection of all garbage stops the bridge', collections(len(tries)), PAUSE)
+
+
+def collections(count: int) -> list[float]:
+    """Return how long collections of garbage stop a bridge that serves a light, s."""
+    port = free_port()
+    with (serving(port), peer('collecting_bridge', str(count), '--ros-args', '-p',
+                              f'connection_url:=udpin://127.0.0.1:{port}') as program):
+        program.wait_for('collected in', count=count)
+        return [float(line.split()[2]) / 1e3 for line in program.lines if 'collected in' in line]
