@@ -56,6 +56,7 @@ class DeviceNodes(Generic[K, N]):
     :param make: gives the node of a further device its interface; in the thread that makes nodes.
     :param bind: has a node serve a device from then on, given its key and the time (s).
     :ivar first: the payload's own node.
+    :ivar get: returns the node that serves a device, None if there is none.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class DeviceNodes(Generic[K, N]):
         self._make = make
         self._bind_node = bind
         self._nodes: dict[K, N] = {}
+        self.get = self._nodes.get
         # Requests for the nodes of further devices, also before those are made.
         self._requests: dict[K, NodeRequest] = {}
         self._absence_due = host.link.clock() + ABSENCE_DELAY
@@ -75,10 +77,6 @@ class DeviceNodes(Generic[K, N]):
 
     def __iter__(self) -> Iterator[N]:
         return iter(self._nodes.values())
-
-    def get(self, key: K) -> N | None:
-        """Return the node that serves a device."""
-        return self._nodes.get(key)
 
     def has_name(self, name: str) -> bool:
         """Return whether the node of a further device has a name, without namespace."""

@@ -92,7 +92,7 @@ class UdpChannel(Channel):
             return self._receive_more(None, False, 0)
         except OSError as error:
             raise ChannelLost(error.errno, error.strerror) from None
-        is_heard = self._is_heard(peer)
+        is_heard = self._hears_all or self._is_heard(peer)
         more = self._receive_more(peer, is_heard, len(datagram))
         return itertools.chain([(peer, datagram)], more) if is_heard else more
 
@@ -127,7 +127,7 @@ class UdpChannel(Channel):
                 if datagrams:
                     yield sender, b''.join(datagrams)
                     datagrams = []
-                sender, is_heard = peer, self._is_heard(peer)
+                sender, is_heard = peer, self._hears_all or self._is_heard(peer)
                 if is_heard:
                     yield peer, datagram
             elif is_heard:
@@ -138,8 +138,6 @@ class UdpChannel(Channel):
             raise lost
 
     def _is_heard(self, peer: SocketName) -> bool:
-        if self._hears_all:
-            return True
         assert self._remote is not None
         host = peer[0]
         # Each loopback address, such as 127.0.0.2, is this machine.
