@@ -263,8 +263,9 @@ class Link:
             if not ready or any(key.fileobj is self._wake_out for key, _ in ready):
                 break
             self._received_by_caller = True
-            # One after the other: the first may close the others.
-            self._serve(ready[0][0].fileobj, ready[0][1])
+            # One after the other: the first may close the others. Where many bytes wait, to read
+            # them all may take much longer than the caller waits.
+            self._serve(ready[0][0].fileobj, ready[0][1], once=True)
             if not is_done():
                 until = min(until, self.endpoint.next_deadline())
 
@@ -390,7 +391,8 @@ class Link:
             self._safe_call(
                 self._store.keep, self._signing.timestamp, self._wall_clock(), last)
 
-    def _serve(self, handle: object, events: int) -> None:
+    def _serve(self, handle: object, events: int, *, once: bool = False) -> None:
+        """Send or receive on a handle that is ready; ``once`` leaves the rest for later."""
         assert self._channel is not None
         try:
             if events & selectors.EVENT_WRITE:
@@ -399,7 +401,7 @@ class Link:
             if events & selectors.EVENT_READ:
                 for peer, data in self._channel.receive(handle):
                     self._take(self._channel, peer, data)
-                    if self._channel is None:
+                    if once or self._channel is None:
                         return
         except OSError as error:
             self._lost(error)

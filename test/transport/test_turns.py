@@ -27,6 +27,7 @@ import pytest
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Run, Talker
 from support.open_channel import Open
+from support.ports import free_port
 from support.simulated_link import SimulatedLink
 from support.waiting import eventually, Log, PATIENCE
 
@@ -125,6 +126,38 @@ def test_caller_that_waits_receives_the_answer_in_its_turn(run: Run, channel: Op
     other.broadcast(heartbeat_frame(sequence=1))
     link.endpoint.wait_heard(count)
     assert list(receivers)[-1] is not caller
+
+
+@pytest.mark.parametrize('is_udp', [False, True])
+def test_caller_receives_no_more_than_it_waits_for(
+        run: Run, channel: Open, is_udp: bool) -> None:
+    url, selector, port = URL, Waiting(), free_port()
+    if is_udp:
+        url = f'udpin://127.0.0.1:{port}'
+    link = run(LiveLink(url, selector=selector))
+    link.wait_open()
+    others = [channel(f'udpout://127.0.0.1:{port}' if is_udp else URL) for _ in range(2)]
+    callers: Log[threading.Thread] = Log()
+    receivers: Log[threading.Thread] = Log()
+    genuine = link.endpoint.receive
+
+    def receive(source: Address, message: Message, now: float) -> None:
+        receivers.append(threading.current_thread())
+        genuine(source, message, now)
+
+    link.endpoint.receive = receive  # type: ignore[method-assign]
+
+    def ask(now: float) -> None:
+        callers.append(threading.current_thread())
+        for sequence in range(10):
+            for other in others:
+                other.broadcast(heartbeat_frame(sequence=sequence))
+
+    caller = threading.current_thread()
+    take_turn(link, selector, ask, callers, lambda: caller in receivers)
+    count = 20 * len(callers)
+    link.endpoint.wait_heard(count)
+    assert list(receivers).count(caller) == 1
 
 
 def test_caller_that_gets_no_answer_leaves_the_link_to_its_thread(

@@ -74,6 +74,8 @@ class Channel(ABC):
         """
         Read from a registered handle; return bytes with their origin.
 
+        Nothing is lost where only the first bytes are taken from the iterator.
+
         :raises ChannelLost: if the channel is closed.
         """
 
