@@ -541,7 +541,7 @@ class ConfigurationManager:
 
     def next_deadline(self, *, connected: bool) -> float:
         """Return when :meth:`poll` has something to do."""
-        is_changing = self._queue.current is not None
+        is_changing = self.is_changing
         if connected and self._setpoint is not None and (
                 not is_changing or self._accepted_setpoint):
             return -math.inf

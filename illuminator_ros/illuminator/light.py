@@ -132,7 +132,7 @@ class Light:
         self._link_failure = ''
         self._status_due = math.inf
         self._asked_at = -math.inf
-        # s until it is asked for a status. Its answer takes time, too.
+        # s of silence after which the light is asked for a status; its answer takes time, too.
         self._longest_silence = min(STATUS_TIMEOUT, settings.heartbeat_timeout / 1.2)
         self._was_lost = False
         self._enabled: bool | None = None
@@ -640,7 +640,7 @@ class Light:
                   self._configuration.next_deadline(connected=self.connected))
         if self.connected:
             due = min(due, self.heard_at + self.settings.heartbeat_timeout)
-        # It is asked for after each message; most of these are not in use.
+        # Called after each message, so only the deadlines in use are computed.
         if self.settings.off_after_silence:
             due = min(due, self._silence_due)
         if self._automatic:

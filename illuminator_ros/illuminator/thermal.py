@@ -97,7 +97,7 @@ class ThermalModel:
 
     def advance(self, seconds: float, power: float) -> None:
         """
-        Let time pass, or none after a change of the temperature or of the sensor.
+        Let time pass; call it with 0 s after a change of the temperature or of the sensor.
 
         :param power: the commanded share of full power (0..1).
         """

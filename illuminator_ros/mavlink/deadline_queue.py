@@ -33,14 +33,14 @@ class DeadlineQueue(Generic[K]):
     and is looked at again when its old time comes.
 
     :param deadline_of: returns the deadline of a key that was noted by ``changed``.
-    :ivar changed: must be called with a key whose deadline may have changed; that is asked for
-        when it is needed.
+    :ivar changed: must be called with a key whose deadline may have changed; ``deadline_of`` is
+        called when the deadline is needed.
     """
 
     def __init__(self, deadline_of: Callable[[K], float] = lambda key: math.inf) -> None:
         self._deadline_of = deadline_of
         self._changed: set[K] = set()
-        # Not a method of this class: it is called for each message, and often more than once.
+        # The method of the set itself: each message calls it, often more than once.
         self.changed: Callable[[K], None] = self._changed.add
         self._deadlines: dict[K, float] = {}
         self._heap: list[tuple[float, int, K]] = []

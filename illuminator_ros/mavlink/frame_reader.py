@@ -61,9 +61,9 @@ class FrameReader:
     def __init__(self, signing: Signing, handled: Collection[int]) -> None:
         self.counters = DecoderCounters()
         self._signing = signing
-        self._is_off = signing.mode is SigningMode.OFF
+        self._signing_is_off = signing.mode is SigningMode.OFF
         # Making a Frame of each foreign frame takes twice the time on a busy link.
-        self._foreign = {} if not self._is_off else {
+        self._foreign = {} if not self._signing_is_off else {
             id_: bytes((layout.crc_extra,))
             for id_, layout in LAYOUTS.items() if id_ not in handled}
         self._streams: dict[Peer, _Stream] = {}
@@ -84,9 +84,9 @@ class FrameReader:
         if decoder.rest or self._waits:
             self._watch(peer, decoder, now)
         if frames:
-            # Without a call for each frame.
+            # A frame without a signature passes where signing is off, here without a call.
             frames = [one for one in frames if isinstance(one, ForeignFrames)
-                      or self._is_off and one.signature is None
+                      or self._signing_is_off and one.signature is None
                       or self._signing.accepts(one, unix_time)]
             stream.good = stream.good or bool(frames)
         return frames

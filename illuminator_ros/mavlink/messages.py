@@ -72,7 +72,7 @@ class Layout(NamedTuple):
 class _Codec(NamedTuple):
     encode: Callable[[Message], bytes]
     unpack: Callable[[bytes], tuple[object, ...]]
-    # Returns the message of unpacked values.
+    # Returns the message of unpacked values. Untyped: of the class that has the codec.
     make: Callable[[tuple[object, ...]], Any]
     size: int
 

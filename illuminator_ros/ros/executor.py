@@ -39,7 +39,7 @@ from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from .processor import processor
+from .processor import yield_processor
 from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
@@ -172,7 +172,7 @@ class NodeExecutor(SingleThreadedExecutor):
         return None
 
     def _serve(self, service: Service) -> None:
-        """Take a request; the handle of its service is protected from destruction."""
+        """Take a request; the caller protects the handle of its service from destruction."""
         request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is None:
             return
@@ -231,7 +231,7 @@ def _send(service: Service, header: _rclpy.rmw_service_info_t, response: object)
     except InvalidHandle:
         # The node of a forgotten device may be gone.
         return
-    processor.give_way()
+    yield_processor()
 
 
 class _Entities:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Giving the processor to the thread that a message wakes."""
+"""Yielding the processor to the threads that a message wakes."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ import math
 import os
 import time
 
-# s for which a thread that was given the processor may keep it, and for which it is then not
-# given any more: on a busy machine each yield would take as long as that.
-SHORT = 0.001
-PAUSE = 1.0
+# s that a yield may take. After a longer one none follows for YIELD_PAUSE s: on a busy machine
+# each takes as long as the other threads keep the processor.
+MAX_YIELD = 0.001
+YIELD_PAUSE = 1.0
 
 
-class Processor:
+class LimitedYield:
     """
-    Yields the processor of a thread, which the kernel gives to the threads that it has woken.
+    Yields the processor to the threads that the calling thread has woken.
 
-    Otherwise these wait until the thread that has woken them waits, too.
+    The kernel puts those on the same processor, where they otherwise wait until the calling
+    thread waits, too.
     """
 
     def __init__(
@@ -42,13 +43,13 @@ class Processor:
         self._sched_yield = sched_yield
         self._due = -math.inf
 
-    def give_way(self) -> None:
-        """Yield; on a machine where other threads keep the processor, seldom."""
+    def __call__(self) -> None:
+        """Yield, at most once in :data:`YIELD_PAUSE` where other threads keep the processor."""
         now = self._clock()
         if now >= self._due:
             self._sched_yield()
-            if self._clock() > now + SHORT:
-                self._due = now + PAUSE
+            if self._clock() > now + MAX_YIELD:
+                self._due = now + YIELD_PAUSE
 
 
-processor = Processor()
+yield_processor = LimitedYield()

@@ -29,12 +29,14 @@ class CallerLink:
     A link whose turns are those of callers.
 
     :ivar now: s.
-    :ivar waited: whether each caller waited, and was told of its answer.
+    :ivar waited: whether each caller waited.
+    :ivar is_done: of the last caller, None if it did not wait.
     """
 
     def __init__(self) -> None:
         self.now = 0.0
         self.waited: list[bool] = []
+        self.is_done: Callable[[], bool] | None = None
         self._answers: list[Callable[[str], None]] = []
 
     def clock(self) -> float:
@@ -44,6 +46,7 @@ class CallerLink:
         self, function: Callable[[float], None], is_done: Callable[[], bool] | None = None,
     ) -> None:
         function(self.now)
+        self.is_done = is_done
         self.waited.append(is_done is not None)
 
     def ask(self, calls: LinkCalls) -> None:
@@ -87,21 +90,12 @@ def test_caller_does_not_wait_while_another_request_has_no_answer(
     assert link.waited == [False, True, False, False]
 
 
-def test_caller_that_waits_is_told_when_the_answer_has_come(calls: LinkCalls) -> None:
-    found: list[bool] = []
-    answers: list[Callable[[str], None]] = []
-    link = CallerLink()
-
-    def run_turn(function: Callable[[float], None], is_done: Callable[[], bool]) -> None:
-        function(0.0)
-        found.append(is_done())
-        answers.pop()('done')
-        found.append(is_done())
-
-    anything: Any = link
-    calls = LinkCalls(anything, anything)
+def test_caller_that_waits_is_done_when_the_answer_has_come(
+        link: CallerLink, calls: LinkCalls) -> None:
     link.ask(calls)
     link.answer(0.0)
-    anything.run_turn = run_turn
-    calls.ask(lambda now, answer: answers.append(answer), lambda answer: None, str)
-    assert found == [False, True]
+    link.ask(calls)
+    assert link.is_done is not None
+    assert not link.is_done()
+    link.answer(0.0)
+    assert link.is_done()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a node publishes and what it leaves out, with a middleware that tells who subscribes."""
+"""Messages that a node publishes or leaves out, by the number of subscriptions."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def interface(topic: Topic, *qos: Any) -> NodeInterface:
     return NodeInterface(node, link, log, publications=[Publication('enabled', Bool, *qos)])
 
 
-def test_unchanged_state_is_published_again_only_where_somebody_subscribes() -> None:
+def test_unchanged_state_is_published_again_only_while_its_topic_has_a_subscriber() -> None:
     topic = Topic()
     publish = interface(topic).publisher('enabled')
     for topic.subscriptions, value, count in (
@@ -66,9 +66,17 @@ def test_every_value_of_a_stream_is_published() -> None:
     assert topic.published == [True] * 3
 
 
-@pytest.mark.parametrize('subscriptions', [0, 1, 2])
-def test_interface_tells_whether_anybody_subscribes(subscriptions: int) -> None:
+@pytest.mark.parametrize(('subscriptions', 'published'), [(0, []), (1, [True]), (2, [True])])
+def test_value_for_subscribers_is_made_and_published_only_where_there_are_any(
+        subscriptions: int, published: list[bool]) -> None:
     topic = Topic()
-    node = interface(topic)
+    node = interface(topic, STREAM_QOS)
     topic.subscriptions = subscriptions
-    assert node.is_subscribed('enabled') == (subscriptions > 0)
+    made: list[bool] = []
+
+    def make() -> bool:
+        made.append(True)
+        return True
+
+    node.publish_to_subscribers('enabled', make)
+    assert topic.published == made == published

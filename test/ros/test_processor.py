@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
-from illuminator_ros.ros.processor import PAUSE, Processor, SHORT
+from illuminator_ros.ros.processor import LimitedYield, MAX_YIELD, YIELD_PAUSE
 import pytest
 
 
-@pytest.mark.parametrize(('taken', 'yields'), [(0.0, 200), (SHORT, 200), (1.1 * SHORT, 2)])
-def test_processor_is_given_seldom_where_others_keep_it(taken: float, yields: int) -> None:
+@pytest.mark.parametrize(('taken', 'yields'), [
+    (0.0, 200), (MAX_YIELD, 200), (1.1 * MAX_YIELD, 2)])
+def test_processor_is_yielded_seldom_where_other_threads_keep_it(
+        taken: float, yields: int) -> None:
     now, count = 0.0, 0
 
     def sched_yield() -> None:
@@ -29,8 +31,8 @@ def test_processor_is_given_seldom_where_others_keep_it(taken: float, yields: in
         now += taken
         count += 1
 
-    processor = Processor(lambda: now, sched_yield)
+    yield_processor = LimitedYield(lambda: now, sched_yield)
     for turn in range(200):
-        now = max(now, turn * PAUSE / 100)
-        processor.give_way()
+        now = max(now, turn * YIELD_PAUSE / 100)
+        yield_processor()
     assert count == yields

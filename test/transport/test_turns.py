@@ -121,7 +121,7 @@ def test_caller_that_waits_receives_the_answer_in_its_turn(run: Run, channel: Op
     caller = threading.current_thread()
     take_turn(link, selector, ask, callers, lambda: caller in receivers)
     assert list(receivers)[-1] is caller
-    # What the thread was woken for has been received; what comes now is new.
+    # The caller has received the frame that woke the thread; the next frame is another one.
     count = len(receivers) + 1
     other.broadcast(heartbeat_frame(sequence=1))
     link.endpoint.wait_heard(count)

@@ -182,21 +182,19 @@ class GimbalNode:
         self._interface.publish('controller', controller(control))
 
     def _publish_attitude(self, event: events.AttitudeReceived) -> None:
-        publish, is_subscribed = self._interface.publish, self._interface.is_subscribed
-        attitude = event.attitude
+        publish, attitude = self._interface.publish_to_subscribers, event.attitude
         if attitude is not None:
             header = Header(stamp=self._clock.now().to_msg(),
                             frame_id=self._frames.name(attitude.frame))
-            if is_subscribed('attitude'):
-                publish('attitude', quaternion_message(header, attitude.rotation))
-            if is_subscribed('angles'):
-                publish('angles', conversions.vector_message(header, attitude.rotation.euler()))
-            if attitude.rates is not None and is_subscribed('angular_velocity'):
-                publish('angular_velocity', conversions.vector_message(header, attitude.rates))
+            rotation, rates = attitude.rotation, attitude.rates
+            publish('attitude', lambda: quaternion_message(header, rotation))
+            publish('angles', lambda: conversions.vector_message(header, rotation.euler()))
+            if rates is not None:
+                publish('angular_velocity', lambda: conversions.vector_message(header, rates))
         lock = bool(event.flags & MountFlags.YAW_LOCK)
         if lock is not self._yaw_lock:
             self._yaw_lock = lock
-            publish('yaw_lock', lock)
+            self._interface.publish('yaw_lock', lock)
         if event.errors != self._errors:
             log = self._log.warning if event.errors & ~self._errors else self._log.info
             self._errors = event.errors

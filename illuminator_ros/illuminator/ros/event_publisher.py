@@ -31,7 +31,7 @@ from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import NodeInterface, Publication, STREAM_QOS
 from ...ros.parameters import DeviceParameters
-from ...ros.processor import processor
+from ...ros.processor import yield_processor
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
@@ -160,11 +160,12 @@ class EventPublisher:
             if (value := read(status)) is not None:
                 publish(value)
             if publish is self._publish_enabled:
-                processor.give_way()
-        if event.temperature is not None and self._interface.is_subscribed('temperature'):
-            self._interface.publish('temperature', temperature(
-                event.temperature, self._clock.now().nanoseconds, self._frame_id))
-        processor.give_way()
+                yield_processor()
+        celsius = event.temperature
+        if celsius is not None:
+            self._interface.publish_to_subscribers('temperature', lambda: temperature(
+                celsius, self._clock.now().nanoseconds, self._frame_id))
+        yield_processor()
         condition = (status.error_flags, status.invalid, status.limits)
         if condition != self._condition:
             self._condition = condition
