@@ -16,6 +16,7 @@
 
 from typing import Any
 
+from illuminator_ros.illuminator.model import ErrorFlag
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
 from illuminator_ros.payload.faults import FaultError
@@ -43,6 +44,14 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over() -> N
     bench.run(3.5)
     assert [at for at, _ in bench.of(Heartbeat)] == [3.0, 4.0, 5.0]
     assert active(bench) == []
+
+
+def test_a_hot_light_reports_its_heat_as_soon_as_its_sensor_is_mended() -> None:
+    bench = LightBench('thermistor')
+    bench.lamp.heat_to(85.0, bench.now)
+    assert bench.status().error_status == ErrorFlag.THERMISTOR_FAILURE
+    bench.component.behave(NORMAL, bench.now)
+    assert bench.status().error_status == ErrorFlag.THERMAL_THROTTLING
 
 
 @pytest.mark.parametrize('fault', ['slow=2', 'progress=2', 'delay=3'])

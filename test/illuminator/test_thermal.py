@@ -47,6 +47,11 @@ def test_the_temperature_does_not_depend_on_the_length_of_the_steps() -> None:
     assert once.temperature == pytest.approx(often.temperature, abs=0.01)
 
 
+def test_a_light_in_too_hot_an_environment_is_throttled_from_the_start() -> None:
+    one = model(ambient=85.0)
+    assert (one.flags, one.output) == (THROTTLING, 0.5)
+
+
 def test_thresholds_have_a_hysteresis() -> None:
     one = model()
     for temperature, flags, output in (

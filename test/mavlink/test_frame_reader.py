@@ -24,7 +24,7 @@ from illuminator_ros.mavlink.frame_reader import FrameReader, MAX_DECODERS, STAL
 from illuminator_ros.mavlink.messages import Address, LAYOUTS
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
-from support.frames import heartbeat_frame, LIGHT, raw_v1
+from support.frames import frame_of, heartbeat_frame, LIGHT, raw_v1
 
 UNIX = 1.7e9
 FRAME = heartbeat_frame()
@@ -67,6 +67,13 @@ def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: FrameR
     assert receiver.next_deadline() == STALL
     assert receiver.give_up(STALL, UNIX) == []
     assert sources(receiver.take('a', FRAME[9:], STALL + 0.1, UNIX)) == [LIGHT]
+
+
+def test_signed_frames_pass_and_are_counted_where_signing_is_off() -> None:
+    frame = Signing(SigningMode.SIGN, bytes(32)).sign(frame_of(signed=True), UNIX)
+    signing = Signing()
+    frames = FrameReader(signing, LAYOUTS).take('a', FRAME + frame, 0.0, UNIX)
+    assert (sources(frames), signing.counters.unchecked) == ([LIGHT] * 2, 1)
 
 
 def test_wait_begins_anew_with_the_next_frame(receiver: FrameReader) -> None:

@@ -75,12 +75,12 @@ RANDOM = {'drop': 'heartbeat-rate', 'duplicate': 'ping-once', 'delay': 'ping',
           'corrupt': 'checksums', 'reboot': 'capture-index'}
 
 
-def run(
+def start(
     fault: str = '', *, address: Address = CAMERA, others: Iterable[int] = (), version: int = 1,
     seed: int = 0, **options: Any,
 ) -> ChecksRun:
     """
-    Check a camera.
+    Begin to check a camera.
 
     :param others: component ids of further cameras.
     """
@@ -92,7 +92,12 @@ def run(
         Description(address, camera, seed=seed),
         *(Description(one, SimulatedRedEdge(one))
           for one in (Address(255, other) for other in others))], START)
-    return ChecksRun(CHECKS, cameras, version=version, utc=UTC, **options).finish()
+    return ChecksRun(CHECKS, cameras, version=version, utc=UTC, **options)
+
+
+def run(fault: str = '', **options: Any) -> ChecksRun:
+    """Check a camera, given as for :func:`start`."""
+    return start(fault, **options).finish()
 
 
 def test_camera_without_faults_meets_every_requirement() -> None:
@@ -108,6 +113,17 @@ def test_fault_fails_exactly_its_requirements(fault: str) -> None:
     if fault in DETAILS:
         name, detail = DETAILS[fault]
         assert detail in done.result(name).detail
+
+
+def test_camera_that_stops_sending_fails_a_ping_and_later_checks_are_skipped() -> None:
+    started = start()
+    started.link.run_until(
+        lambda: 'ping-sequence' in started.names(Verdict.PASS), within=60.0)
+    component = started.component
+    component.behave(FAULTS.add(component.behaviour, 'silence=600'), started.link.now)
+    done = started.finish()
+    assert done.result('ping-target').detail == 'the camera has stopped sending'
+    assert done.names(Verdict.SKIPPED) >= {'system-id'} | INJECTED | CAPTURES
 
 
 @pytest.mark.parametrize('fault', RANDOM)
