@@ -64,6 +64,7 @@ class Switch(NamedTuple):
         return _with_flags(shown, status)
 
 
+# Made once, since each request needs one before its command is sent.
 SWITCHES = {on: Switch(on) for on in (False, True)}
 
 

@@ -171,6 +171,7 @@ class Light:
 
         :param sender: of the message.
         """
+        # As heard() does, without a call for each status.
         self.heard_at = now
         if not self.connected:
             self.heard(now)

@@ -105,7 +105,8 @@ def shortest(value: float) -> float:
     for digits in range(1, 9):
         short = float(f'{value:.{digits}g}')
         if float32(short) == value:
-            return short
+            # Equal arguments have one entry in the cache, so -0.0 becomes 0.0.
+            return short + 0.0
     return value
 
 

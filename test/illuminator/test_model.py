@@ -107,6 +107,10 @@ def test_the_shortest_number_is_the_one_that_was_sent(value: float) -> None:
     assert model.shortest(model.float32(value)) == value
 
 
+def test_the_shortest_number_of_zero_has_no_sign() -> None:
+    assert [str(model.shortest(value)) for value in (-0.0, 0.0)] == ['0.0', '0.0']
+
+
 def test_a_number_too_large_for_a_float_field_is_infinite() -> None:
     assert [model.float32(value) for value in (1e39, -1e39, 0.5)] == [INF, -INF, 0.5]
 

@@ -132,7 +132,7 @@ def test_switches_that_follow_each_other_within_a_millisecond_are_confirmed_in_f
     for on in (True, False) * 20:
         answer = pair.ask_enable(on)
         assert pair.wait_for(answer).success
-        # It is asked for again 1 ms after one that is too old, then 2 ms after the next one.
+        # After a status that is too old the bridge asks again in 1 ms, then in 2 ms.
         assert answer.seconds < 0.004
 
 
