@@ -59,7 +59,7 @@ ANSWER_TIME = 1.0
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
 # s for which a caller waits at most for the answer to what it has sent.
-PATIENCE = 0.002
+CALLER_WAIT = 0.002
 # s that a channel stays open until it is proved without a frame.
 PROOF_TIME = 1.0
 # s for which the line may still be busy when the next group of a stream is written, so that it has
@@ -227,7 +227,7 @@ class Link:
         caller must not hold a lock that is taken in a turn.
 
         :param is_done: where it is given, the caller receives what comes, in this turn, until it
-            returns True, for :data:`PATIENCE` at most.
+            returns True, for :data:`CALLER_WAIT` at most.
         """
         if self._calls or not self._turn.acquire(blocking=False):
             self.call(function)
@@ -256,7 +256,7 @@ class Link:
 
     def _receive_until(self, is_done: Callable[[], bool]) -> None:
         """Receive in the turn of a caller, which need not wait for a change of threads."""
-        until = min(self.clock() + PATIENCE, self._due)
+        until = min(self.clock() + CALLER_WAIT, self._due)
         while not is_done() and self._channel is not None and (wait := until - self.clock()) > 0:
             # Both this thread and the link's may wait for the selector.
             ready = self._selector.select(wait)

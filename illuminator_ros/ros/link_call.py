@@ -21,7 +21,7 @@ import threading
 from typing import Generic, TypeVar
 
 from .throttled_log import NodeLog
-from ..mavlink.link import Link, PATIENCE
+from ..mavlink.link import CALLER_WAIT, Link
 
 T = TypeVar('T')
 
@@ -53,7 +53,7 @@ class LinkCalls:
         self, request: Request[T], answer: Callable[[T], None], refusal: Callable[[str], T],
     ) -> None:
         """
-        Start a request, and wait for its answer for :data:`~..mavlink.link.PATIENCE` at most.
+        Start a request, and wait for its answer for :data:`~..mavlink.link.CALLER_WAIT` at most.
 
         It waits only if the last answer came so soon, and no other request waits.
 
@@ -75,7 +75,7 @@ class LinkCalls:
                 answered = True
                 with self._lock:
                     self._pending -= 1
-                    self._is_quick = self._link.clock() <= asked_at + PATIENCE
+                    self._is_quick = self._link.clock() <= asked_at + CALLER_WAIT
                 answer(value)
 
         def run(now: float) -> None:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from illuminator_ros.mavlink.link import PATIENCE
+from illuminator_ros.mavlink.link import CALLER_WAIT
 from illuminator_ros.ros.link_call import LinkCalls
 import pytest
 
@@ -72,7 +72,7 @@ def calls(link: CallerLink) -> LinkCalls:
 
 
 @pytest.mark.parametrize(('after', 'waits'), [
-    (0.0, True), (0.9 * PATIENCE, True), (1.1 * PATIENCE, False), (1.0, False)])
+    (0.0, True), (0.9 * CALLER_WAIT, True), (1.1 * CALLER_WAIT, False), (1.0, False)])
 def test_caller_waits_where_the_last_answer_came_soon(
         link: CallerLink, calls: LinkCalls, after: float, waits: bool) -> None:
     link.ask(calls)
