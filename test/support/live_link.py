@@ -48,6 +48,7 @@ class Talker(Endpoint):
     A peer that sends heartbeats and keeps received messages.
 
     :ivar heard: source and message, in order.
+    :ivar receivers: the thread that each of them came in.
     :ivar greetings: when a new peer was greeted, s.
     :ivar turns: how often the link's thread has gone round.
     """
@@ -58,6 +59,7 @@ class Talker(Endpoint):
         super().__init__()
         self.heartbeat = HeartbeatTimer(BRIDGE, 18)
         self.heard: Log[tuple[Address, Any]] = Log()
+        self.receivers: Log[threading.Thread] = Log()
         self.greetings: Log[float] = Log()
         self.turns = 0
 
@@ -69,6 +71,7 @@ class Talker(Endpoint):
         self.heartbeat.stop()
 
     def receive(self, source: Address, message: Message, now: float) -> None:
+        self.receivers.append(threading.current_thread())
         self.heard.append((source, message))
 
     def poll(self, now: float) -> None:

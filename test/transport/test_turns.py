@@ -22,7 +22,7 @@ import threading
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import MIN_TIMEOUT
-from illuminator_ros.mavlink.messages import Address, heartbeat, Message
+from illuminator_ros.mavlink.messages import heartbeat
 import pytest
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Run, Talker
@@ -105,14 +105,7 @@ def test_caller_that_waits_receives_the_answer_in_its_turn(run: Run, channel: Op
     link = run(LiveLink(URL, selector=selector))
     link.wait_open()
     callers: Log[threading.Thread] = Log()
-    receivers: Log[threading.Thread] = Log()
-    genuine = link.endpoint.receive
-
-    def receive(source: Address, message: Message, now: float) -> None:
-        receivers.append(threading.current_thread())
-        genuine(source, message, now)
-
-    link.endpoint.receive = receive  # type: ignore[method-assign]
+    receivers = link.endpoint.receivers
 
     def ask(now: float) -> None:
         callers.append(threading.current_thread())
@@ -138,14 +131,7 @@ def test_caller_receives_no_more_than_it_waits_for(
     link.wait_open()
     others = [channel(f'udpout://127.0.0.1:{port}' if is_udp else URL) for _ in range(2)]
     callers: Log[threading.Thread] = Log()
-    receivers: Log[threading.Thread] = Log()
-    genuine = link.endpoint.receive
-
-    def receive(source: Address, message: Message, now: float) -> None:
-        receivers.append(threading.current_thread())
-        genuine(source, message, now)
-
-    link.endpoint.receive = receive  # type: ignore[method-assign]
+    receivers = link.endpoint.receivers
 
     def ask(now: float) -> None:
         callers.append(threading.current_thread())
