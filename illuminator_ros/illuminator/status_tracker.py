@@ -94,9 +94,9 @@ class UptimeClock:
         if uptime_ms == last_ms:
             # The same status twice or within a millisecond, or a light that has no clock.
             return Uptime.RUNNING if elapsed < NO_CLOCK_TIME else Uptime.NO_CLOCK
-        ahead_ms = (uptime_ms - last_ms) % WRAP_MS
-        has_progressed = ahead_ms < WRAP_MS // 2
-        lag = elapsed - (ahead_ms if has_progressed else ahead_ms - WRAP_MS) / 1000
+        ahead_ms = uptime_difference(uptime_ms, last_ms)
+        has_progressed = ahead_ms >= 0
+        lag = elapsed - ahead_ms / 1000
         may_have_restarted = uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
         if has_progressed and not (may_have_restarted and lag > MAX_LAG + DRIFT * elapsed):
             return Uptime.RUNNING

@@ -279,10 +279,10 @@ class RttEstimator:
 
         :param longest: s; the wait while fewer than :data:`MIN_SAMPLES` samples are known.
         """
-        count = len(self._sorted)
-        if count < MIN_SAMPLES:
+        slow = self.quantile(0.95)
+        if slow is None or len(self._sorted) < MIN_SAMPLES:
             return longest
-        return min(max(4 * self._sorted[int(0.95 * count)], MIN_TIMEOUT), longest)
+        return min(max(4 * slow, MIN_TIMEOUT), longest)
 
 
 class RequestState(Enum):
@@ -569,7 +569,7 @@ class CommandSender:
 
     def _transmit(self, request: _Request, now: float) -> None:
         command = request.command
-        self.outgoing.append((self.address, command.message(request.tries, request.as_int)))
+        self.send(command.message(request.tries, request.as_int))
         request.tries += 1
         self.counters.sent += 1
         self.counters.resent += request.tries > 1

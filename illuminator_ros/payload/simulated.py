@@ -461,10 +461,7 @@ class SimulatedComponent(Generic[D]):
         if message is None or now < self._silent_until:
             return
         for delay, sent in self._injector.inject(message, self.device.behaviour):
-            if delay:
-                self._after(delay, functools.partial(self._transmit, sent), now)
-            else:
-                self._transmit(sent, now)
+            self._after(delay, functools.partial(self._transmit, sent), now)
 
     def _transmit(self, message: Message, now: float) -> None:
         self.outgoing.append((self.device.sender(message, self.address), message))
