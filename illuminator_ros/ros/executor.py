@@ -22,10 +22,11 @@ itself takes 0.01 ms.
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable
 import contextlib
 import functools
+import math
 import threading
 import time
 from typing import Generic, TypeVar
@@ -39,17 +40,12 @@ from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from .answer_queue import AnswerQueue
 from .processor import yield_processor
 from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1
-# Each client of a service gets the answers to all clients, and by default keeps the last 10 only.
-# Where more requests wait than this, their answers are sent this far apart, s.
-MAX_UNSPACED = 8
-ANSWER_SPACING = 0.008
-# Answers that wait for that; more would fill the memory and come too late.
-MAX_SPACED = 250
 
 Q = TypeVar('Q')
 A = TypeVar('A')
@@ -64,10 +60,12 @@ class DeferredService(Generic[Q, A]):
     The callback of a service that answers later; only a :class:`NodeExecutor` calls it.
 
     :param take: called with the request, and with the function that sends the response.
+    :ivar answers: those that were not sent yet.
     """
 
     def __init__(self, take: Take[Q, A]) -> None:
         self.take = take
+        self.answers = AnswerQueue()
 
     def __call__(self, request: Q, response: A) -> A:
         """Fail: another executor cannot wait for the answer."""
@@ -87,11 +85,8 @@ class NodeExecutor(SingleThreadedExecutor):
         self._log = log
         self._entities: _Entities | None = None
         self._calls: deque[Callable[[], None]] = deque()
-        # Requests that were not answered, by service, and answers that are sent one by one.
-        self._open: Counter[int] = Counter()
-        self._counting = threading.Lock()
-        self._spaced: deque[tuple[Service, Callable[[], None]]] = deque()
-        self._spaced_due = 0.0
+        # Those with answers that wait; only the executor's thread changes the set.
+        self._queues: set[AnswerQueue] = set()
         self._stale = threading.Event()
         self._stale.set()
         self._ended = threading.Event()
@@ -145,16 +140,18 @@ class NodeExecutor(SingleThreadedExecutor):
         if self._entities is None:
             super().spin_once(FALLBACK_PERIOD if timeout_sec is None else timeout_sec)
         else:
-            services, subscriptions = self._entities.wait(
-                ANSWER_SPACING if self._spaced else timeout_sec)
+            services, subscriptions = self._entities.wait(self._timeout(timeout_sec))
             for service in services:
                 self._serve(service)
             for subscription in subscriptions:
                 self._deliver(subscription)
-        if self._spaced:
-            self._send_spaced()
         while self._calls:
             self._calls.popleft()()
+        now = time.monotonic()
+        for queue in tuple(self._queues):
+            queue.poll(now)
+            if not queue:
+                self._queues.remove(queue)
         if not self.context.ok():
             raise ExternalShutdownException()
 
@@ -176,46 +173,52 @@ class NodeExecutor(SingleThreadedExecutor):
         request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is None:
             return
-        with self._counting:
-            self._open[id(service)] += 1
-        respond = functools.partial(self._respond, service, header)
+        callback = service.callback
+        respond = functools.partial(_send, service, header)
+        if isinstance(callback, DeferredService):
+            callback.answers.note_request()
+            respond = functools.partial(self._respond, service, header, callback.answers)
         try:
-            if isinstance(service.callback, DeferredService):
-                service.callback.take(request, respond)
+            if isinstance(callback, DeferredService):
+                callback.take(request, respond)
             else:
-                respond(service.callback(request, service.srv_type.Response()))
+                respond(callback(request, service.srv_type.Response()))
         except Exception:
             # The client gets an answer after internal errors, too.
             respond(service.srv_type.Response())
             raise
 
     def _respond(
-        self, service: Service, header: _rclpy.rmw_service_info_t, response: object,
+        self, service: Service, header: _rclpy.rmw_service_info_t, queue: AnswerQueue,
+        response: object,
     ) -> None:
-        # The middleware waits up to 0.1 s for a client that it does not know yet. Only here: it
-        # must not hold up the link.
         send = functools.partial(_send, service, header, response)
-        with self._counting:
-            spaced = self._open[id(service)] > MAX_UNSPACED
-            if spaced:
-                self._spaced.append((service, send))
-            else:
-                self._open[id(service)] -= 1
-        if spaced:
-            self._wakeup.trigger()
-        elif header.request_id.sequence_number <= 1:
-            self.call(send)
-        else:
-            send()
-
-    def _send_spaced(self) -> None:
+        # The middleware waits up to 0.1 s for a client that it does not know yet. Then the
+        # executor's thread sends the answer: it must not hold up the link.
+        if header.request_id.sequence_number <= 1:
+            send = functools.partial(self.call, send)
         now = time.monotonic()
-        while self._spaced and (now >= self._spaced_due or len(self._spaced) > MAX_SPACED):
-            self._spaced_due = now + ANSWER_SPACING
-            service, send = self._spaced.popleft()
-            with self._counting:
-                self._open[id(service)] -= 1
-            send()
+        if not queue.send_or_queue(send, now):
+            self.call(functools.partial(self._queues.add, queue))
+        queue.count_clients(functools.partial(self._count_clients, service), now)
+
+    def _count_clients(self, service: Service) -> int | None:
+        """Return how many clients a service has, None if that is unknown."""
+        for node in self.get_nodes():
+            with contextlib.suppress(InvalidHandle):
+                return node.count_clients(service.service_name)
+        return None
+
+    def _timeout(self, timeout: float | None) -> float | None:
+        """Return how long to wait for entities, s, None for ever."""
+        if self._calls:
+            # One before them has failed.
+            return 0.0
+        due = min((queue.next_deadline() for queue in self._queues), default=math.inf)
+        if due < math.inf:
+            wait = max(due - time.monotonic(), 0.0)
+            timeout = wait if timeout is None else min(wait, timeout)
+        return timeout
 
     @staticmethod
     def _deliver(subscription: Subscription) -> None:

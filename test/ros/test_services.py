@@ -14,17 +14,23 @@
 
 """``~/enable`` and ``~/refresh``: their answers, also while others wait or there is no light."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
 import re
 import socket
 import threading
 
-from illuminator_ros.ros import executor as executor_module
+from illuminator_ros.ros import answer_queue
 from illuminator_ros.ros.executor import DeferredService, NodeExecutor, Respond
 from illuminator_ros.ros.node import SERVICE_QOS
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
+from rclpy.client import Client
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.service import Service
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
 from support.light import eventually, MavCmd, MavResult, ON_OFF, ServedLight
@@ -138,39 +144,115 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
                 f'cannot listen on 127.0.0.1:{port}: Address already in use'}
 
 
-def test_spaced_answers_do_not_delay_other_services_and_are_bounded(
-    ros: Ros, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(executor_module, 'ANSWER_SPACING', 3600.0)
-    monkeypatch.setattr(executor_module, 'MAX_SPACED', 3)
-    node = PayloadNode('crowded', context=ros.context)
+EXECUTOR = 'executor'
+MakeClient = Callable[[str], 'Client[Trigger.Request, Trigger.Response]']
+
+
+@pytest.fixture
+def node(ros: Ros, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
+    """Yield a node of an executor that sends spaced answers hours apart."""
+    monkeypatch.setattr(answer_queue, 'PAUSE_PER_CLIENT', 3600.0)
+    monkeypatch.setattr(answer_queue, 'MAX_SPREAD', 36000.0)
+    monkeypatch.setattr(answer_queue, 'CLIENT_COUNT_INTERVAL', 0.0)
+    node = PayloadNode('served', context=ros.context)
     executor = NodeExecutor(ros.context, NodeLog(node.get_logger()))
+    node.create_service(Trigger, '~/fast', lambda request, response: response)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.run, name=EXECUTOR)
+    thread.start()
+    yield node
+    executor.end()
+    thread.join()
+    node.destroy_node()
+
+
+@pytest.fixture
+def clients(ros: Ros) -> Iterator[MakeClient]:
+    """Yield a function that makes a client of a service of the node, which keeps all answers."""
+    made = []
+
+    def make(name: str) -> Client[Trigger.Request, Trigger.Response]:
+        made.append(ros.node.create_client(
+            Trigger, f'/served/{name}', qos_profile=QoSProfile(depth=100)))
+        eventually(made[-1].service_is_ready)
+        return made[-1]
+
+    yield make
+    for client in made:
+        ros.node.destroy_client(client)
+
+
+def serve_later(node: Node) -> Log[Respond[Trigger.Response]]:
+    """Add the service ``~/slow``; return the functions that answer its requests."""
     waiting: Log[Respond[Trigger.Response]] = Log()
 
     def take(request: Trigger.Request, respond: Respond[Trigger.Response]) -> None:
         waiting.append(respond)
 
     node.create_service(Trigger, '~/slow', DeferredService(take), qos_profile=SERVICE_QOS)
-    node.create_service(Trigger, '~/fast', lambda request, response: response)
-    slow, fast = (ros.node.create_client(
-        Trigger, f'/crowded/{name}', qos_profile=QoSProfile(depth=100)) for name in (
-        'slow', 'fast'))
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.run)
-    thread.start()
-    try:
-        eventually(lambda: slow.service_is_ready() and fast.service_is_ready())
-        calls = [Call(slow.call_async(Trigger.Request())) for _ in range(20)]
-        waiting.wait_for(lambda one: True, count=len(calls))
+    return waiting
 
-        for respond in list(waiting):
-            respond(Trigger.Response())
 
-        Call(fast.call_async(Trigger.Request())).result()
-        eventually(lambda: sum(call.answered for call in calls) >= len(calls) - 3)
-    finally:
-        executor.end()
-        thread.join()
-        node.destroy_node()
-        ros.node.destroy_client(slow)
-        ros.node.destroy_client(fast)
+def test_spaced_answers_do_not_delay_other_services_and_are_bounded(
+    node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(answer_queue, 'MAX_WAITING', 3)
+    waiting = serve_later(node)
+    slow, fast = clients('slow'), clients('fast')
+    calls = [Call(slow.call_async(Trigger.Request())) for _ in range(20)]
+    waiting.wait_for(lambda one: True, count=len(calls))
+
+    for respond in list(waiting):
+        respond(Trigger.Response())
+
+    eventually(lambda: sum(call.answered for call in calls) == len(calls) - 3)
+    Call(fast.call_async(Trigger.Request())).result()
+    assert sum(call.answered for call in calls) == len(calls) - 3
+
+
+def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_at_once(
+    node: Node, clients: MakeClient,
+) -> None:
+    waiting = serve_later(node)
+    fast = clients('fast')
+    callers = [clients('slow') for _ in range(answer_queue.MAX_UNSPACED + 1)]
+    eventually(lambda: node.count_clients('~/slow') == len(callers))
+    calls = []
+    # One after the other: the clients are counted after the first answer, so the third one waits.
+    for count, caller in enumerate(callers[:3], 1):
+        calls.append(Call(caller.call_async(Trigger.Request())))
+        waiting.wait_for(lambda one: True, count=count)
+        list(waiting)[-1](Trigger.Response())
+
+    for call in calls[:2]:
+        call.result()
+    Call(fast.call_async(Trigger.Request())).result()
+    assert not calls[2].answered
+
+
+def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it(
+    node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(answer_queue, 'PAUSE_PER_CLIENT', 0.001)
+    waiting = serve_later(node)
+    slow, fast = clients('slow'), clients('fast')
+    calls = [Call(slow.call_async(Trigger.Request()))
+             for _ in range(answer_queue.MAX_UNSPACED + 2)]
+    waiting.wait_for(lambda one: True, count=len(calls))
+    left = list(waiting)
+    genuine = Service.send_response
+
+    def send_response(service: Service, *arguments: object) -> None:
+        genuine(service, *arguments)
+        if left and threading.current_thread().name == EXECUTOR:
+            other = threading.Thread(target=left.pop(), args=(Trigger.Response(),))
+            other.start()
+            other.join()
+
+    monkeypatch.setattr(Service, 'send_response', send_response)
+    for _ in range(3):
+        left.pop()(Trigger.Response())
+
+    for call in calls:
+        call.result()
+    Call(fast.call_async(Trigger.Request())).result()
