@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 import functools
 import re
 import struct
-from typing import cast
+from typing import cast, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
@@ -48,13 +48,10 @@ STARTS = (b'\xfd', b'\xfe')
 # STX, payload length, incompatibility and compatibility flags, sequence number, system id,
 # component id, and message id in two parts.
 _HEADER_V2 = struct.Struct('<BBBBBBBHB').unpack_from
-# Address() is a function in Python, which takes twice the time.
-_address = functools.partial(tuple.__new__, Address)
 _START = re.compile(b'[\xfd\xfe]')
 
 
-@dataclass(slots=True)
-class Frame:
+class Frame(NamedTuple):
     """
     A frame whose checksum is right.
 
@@ -71,6 +68,11 @@ class Frame:
     payload: bytes
     signature: bytes | None = None
     signed_part: bytes = b''
+
+
+# The constructors of named tuples are functions in Python, which take twice the time.
+_frame = functools.partial(tuple.__new__, Frame)
+_address = functools.partial(tuple.__new__, Address)
 
 
 @dataclass(slots=True)
@@ -245,8 +247,8 @@ class Decoder:
                     or mcrf4xx(data[start + 1:end] + crc_extra) != data[end] | data[end + 1] << 8):
                 break
             if foreign_extra is None:
-                frames.append(Frame(2, sequence, _address((system, component)), id_,
-                                    data[start + HEADER_V2:end]))
+                frames.append(_frame((2, sequence, _address((system, component)), id_,
+                                      data[start + HEADER_V2:end], None, b'')))
                 source = None
             else:
                 if source != (system, component):
@@ -290,8 +292,7 @@ class Decoder:
         if mcrf4xx(body) != int.from_bytes(data[end - CHECKSUM:end], 'little'):
             self.counters.crc_errors += 1
             return 1, None
-        frame = Frame(version, sequence, Address(system, component), message_id,
-                      data[start + header:end - CHECKSUM])
-        if flags:
-            frame.signature, frame.signed_part = data[end:start + size], data[start:end]
-        return size, frame
+        signature, signed_part = (
+            (data[end:start + size], data[start:end]) if flags else (None, b''))
+        return size, Frame(version, sequence, Address(system, component), message_id,
+                           data[start + header:end - CHECKSUM], signature, signed_part)

@@ -37,7 +37,7 @@ from .frame import Frame, MAX_ID_V1
 from .frame_reader import FrameReader
 from .frame_writer import FrameWriter
 from .link_state import LinkEvent, LinkInput, LinkSnapshot, LinkStatus
-from .messages import Address, decode_payload, Message
+from .messages import Address, Message
 from .routing_table import RoutingTable
 from .signing import Signing
 from .signing_files import TimestampStore
@@ -236,7 +236,7 @@ class Link:
         try:
             self._safe_call(function, self.clock())
             self._flush()
-            if is_done is not None:
+            if is_done is not None and not is_done():
                 self._receive_until(is_done)
             # The component that answers may wait for this processor. Where nothing was received,
             # all else is due as before.
@@ -257,17 +257,18 @@ class Link:
     def _receive_until(self, is_done: Callable[[], bool]) -> None:
         """Receive in the turn of a caller, which need not wait for a change of threads."""
         until = min(self.clock() + CALLER_WAIT, self._due)
-        while not is_done() and self._channel is not None and (wait := until - self.clock()) > 0:
+        while self._channel is not None and (wait := until - self.clock()) > 0:
             # Both this thread and the link's may wait for the selector.
             ready = self._selector.select(wait)
-            if not ready or any(key.fileobj is self._wake_out for key, _ in ready):
+            if not ready or ready[0][0].fileobj is self._wake_out:
                 break
             self._received_by_caller = True
             # One after the other: the first may close the others. Where many bytes wait, to read
             # them all may take much longer than the caller waits.
             self._serve(ready[0][0].fileobj, ready[0][1], once=True)
-            if not is_done():
-                until = min(until, self.endpoint.next_deadline())
+            if is_done():
+                break
+            until = min(until, self.endpoint.next_deadline())
 
     def _wake(self) -> None:
         # A full buffer has woken the thread already; a closed one has no thread to wake.
@@ -415,7 +416,7 @@ class Link:
                     self._accept(channel, peer, frame, now)
                 elif frame.source not in self._writer.sequences:
                     # Those from our own address are our own, returned, or an address conflict.
-                    self._traffic.count(frame.source, frame.sequences)
+                    self._traffic.count_run(frame.source, frame.sequences)
                     self._heard(channel, peer, frame.source, now)
             self._flush()
         self._traffic.bytes_received += len(data)
@@ -423,15 +424,14 @@ class Link:
     def _accept(self, channel: Channel, peer: Peer, frame: Frame, now: float) -> None:
         if frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
             return
-        sender = self._traffic.count(
-            frame.source, bytes((frame.sequence,)), hash((frame.message_id, frame.payload)))
+        sender = self._traffic.count(frame)
         self._heard(channel, peer, frame.source, now)
         cls = self._classes.get(frame.message_id)
         if cls is not None:
             self._work_pending = True
             if self.endpoint.inspect is not None:
                 self._safe_call(self.endpoint.inspect, frame, cls)
-            message = decode_payload(cls, frame.payload, sender)
+            message = cls.codec.decode(frame.payload, sender)
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('received from %s: %s', frame.source, message,
                                  extra={'address': frame.source})

@@ -71,9 +71,8 @@ class Layout(NamedTuple):
 
 class _Codec(NamedTuple):
     encode: Callable[[Message], bytes]
-    unpack: Callable[[bytes], tuple[object, ...]]
-    # Returns the message of unpacked values. Untyped: of the class that has the codec.
-    make: Callable[[tuple[object, ...]], Any]
+    # See decode_payload(). It returns Any: the class that has the codec.
+    decode: Callable[[bytes, int], Any]
     size: int
 
 
@@ -114,6 +113,8 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
     """
     Complete a dataclass whose fields are those of a message, in the order of its definition.
 
+    A received message is made without ``__init__``.
+
     :param extensions: how many of the fields, the last ones, are extension fields.
     """
     def complete(cls: type[M]) -> type[M]:
@@ -142,11 +143,20 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
             values[one] = f'values[{at}:{at + size}]' if size else f'values[{at}]'
             at += size or 1
         sent = ', '.join(f'{"*" * (":" in values[one])}message.{one}' for one in order)
-        received = ', '.join(values[one] for one in names)
         # Made from text, as dataclasses do: attrgetter and loops take twice the time.
-        cls.codec = _Codec(
-            eval(f'lambda message: pack({sent})', {'pack': layout.pack}), layout.unpack,
-            eval(f'lambda values: cls({received})', {'cls': cls}), layout.size)
+        namespace: dict[str, Any] = {
+            'cls': cls, 'new': cls.__new__, 'pack': layout.pack, 'size': layout.size,
+            'unpack': layout.unpack}
+        exec('def decode(payload, sender):\n'
+             '    if len(payload) != size:\n'
+             "        payload = payload[:size].ljust(size, b'\\0')\n"
+             '    values = unpack(payload)\n'
+             '    message = new(cls)\n'
+             '    message.sender = sender\n'
+             + ''.join(f'    message.{one} = {values[one]}\n' for one in names)
+             + '    return message\n', namespace)
+        cls.codec = _Codec(eval(f'lambda message: pack({sent})', namespace),
+                           namespace['decode'], layout.size)
         LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
         return cls
     return complete
@@ -169,12 +179,7 @@ def decode_payload(cls: type[M], payload: bytes, sender: int = 0) -> M:
     fields). Bytes beyond the known fields are ignored, as extensions must be: there is a 38-byte
     ILLUMINATOR_STATUS in the field.
     """
-    codec = cls.codec
-    size = codec.size
-    if len(payload) != size:
-        payload = payload[:size].ljust(size, b'\0')
-    message: M = codec.make(codec.unpack(payload))
-    message.sender = sender
+    message: M = cls.codec.decode(payload, sender)
     return message
 
 

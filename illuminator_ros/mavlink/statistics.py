@@ -20,6 +20,7 @@ from array import array
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from .frame import Frame
 from .messages import Address
 
 # Sources that are counted separately; frames of further ones are counted in the totals only.
@@ -271,27 +272,33 @@ class Traffic:
             self._frames_of_others + sum(counts.received for counts in sources.values()),
             self.frames_sent, self.frames_dropped, self._received.rate, self._sent.rate, sources)
 
-    def count(
-        self, source: Address, sequences: bytes | bytearray, content: int | None = None,
-    ) -> int:
-        """
-        Count frames with the right checksum by their sequence numbers.
-
-        :param sequences: at least one.
-        :param content: a hash of the only frame, None where it is not known.
-        :return: the sender of the last one, see :class:`SequenceCounter`.
-        """
-        counter = self.sources.get(source)
+    def count(self, frame: Frame) -> int:
+        """Count a frame, and return its sender; see :class:`SequenceCounter`."""
+        counter = self._counter_of(frame.source)
         if counter is None:
-            if len(self.sources) >= MAX_SOURCES:
-                self._frames_of_others += len(sequences)
-                return 0
-            counter = self.sources[source] = SequenceCounter()
-        if content is None:
-            counter.add_run(sequences)
-        else:
-            counter.add(sequences[0], content)
+            self._frames_of_others += 1
+            return 0
+        counter.add(frame.sequence, hash((frame.message_id, frame.payload)))
         return counter.sender
+
+    def count_run(self, source: Address, sequences: bytes | bytearray) -> None:
+        """
+        Count consecutive frames of one source.
+
+        :param sequences: their sequence numbers, at least one.
+        """
+        counter = self._counter_of(source)
+        if counter is None:
+            self._frames_of_others += len(sequences)
+        else:
+            counter.add_run(sequences)
+
+    def _counter_of(self, source: Address) -> SequenceCounter | None:
+        """Return the counter of a source, None if there are too many sources."""
+        counter = self.sources.get(source)
+        if counter is None and len(self.sources) < MAX_SOURCES:
+            counter = self.sources[source] = SequenceCounter()
+        return counter
 
     def restart(self) -> None:
         """Forget the sequence numbers but not the counts: the link was interrupted."""

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.mavlink import frame_writer
@@ -40,7 +39,7 @@ def test_unsigned_frame_is_ours_if_it_equals_one_sent_within_a_second(
         changes: dict[str, Any], after: float, is_ours: bool) -> None:
     loopback = frame_writer.LoopbackFilter()
     loopback.sent(OURS, 7, 0, b'\x01\x02\0\0', 100.0)
-    assert [loopback.has(replace(FRAME, **changes), 100.0 + after) for _ in range(2)] == [
+    assert [loopback.has(FRAME._replace(**changes), 100.0 + after) for _ in range(2)] == [
         is_ours, is_ours]
     for number in range(frame_writer.MAX_FRAMES):
         loopback.sent(OURS, number, 76, b'\x01', 100.0)

@@ -21,6 +21,7 @@ from collections.abc import Iterable
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink import statistics
+from illuminator_ros.mavlink.frame import Frame
 from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.frames import LIGHT
@@ -174,26 +175,34 @@ def test_snapshot_of_traffic_has_rates_and_does_not_change() -> None:
     traffic.snapshot(0.0)
     traffic.bytes_received, traffic.bytes_sent = 5000, 200
     snapshot = traffic.snapshot(2.0)
-    traffic.count(LIGHT, b'\0')
+    traffic.count_run(LIGHT, b'\0')
     assert (snapshot.received_rate, snapshot.sent_rate, snapshot.sources) == (2500.0, 100.0, {})
 
 
 def test_traffic_counts_each_source_apart_and_over_interruptions() -> None:
     traffic = statistics.Traffic()
-    traffic.count(LIGHT, bytes((10, 13)))
-    traffic.count(Address(1, 1), bytes((20, 26)))
+    traffic.count_run(LIGHT, bytes((10, 13)))
+    traffic.count_run(Address(1, 1), bytes((20, 26)))
     traffic.restart()
-    traffic.count(LIGHT, bytes((90, 92)))
+    traffic.count_run(LIGHT, bytes((90, 92)))
     assert counts(traffic.sources[LIGHT]) == (4, 3, 0, 0)
     assert counts(traffic.sources[Address(1, 1)]) == (2, 5, 0, 0)
     assert traffic.snapshot(0.0).frames_received == 6
 
 
-def test_sources_beyond_the_bound_count_in_the_total_only() -> None:
+@pytest.mark.parametrize('in_runs', [False, True])
+def test_sources_beyond_the_bound_count_in_the_total_only(in_runs: bool) -> None:
     traffic = statistics.Traffic()
+
+    def count(source: Address, sequence: int) -> None:
+        if in_runs:
+            traffic.count_run(source, bytes((sequence,)))
+        else:
+            assert traffic.count(Frame(2, sequence, source, 0, b'')) == 0
+
     for number in range(2 * statistics.MAX_SOURCES):
-        traffic.count(Address(2 + number // 256, number % 256), b'\0')
-    traffic.count(Address(2, 0), b'\1')
+        count(Address(2 + number // 256, number % 256), 0)
+    count(Address(2, 0), 1)
     assert (len(traffic.sources), traffic.snapshot(0.0).frames_received) == (
         statistics.MAX_SOURCES, 2 * statistics.MAX_SOURCES + 1)
     assert traffic.sources[Address(2, 0)].received == 2
