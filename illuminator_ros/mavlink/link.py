@@ -60,6 +60,8 @@ ANSWER_TIME = 1.0
 STORE_INTERVAL = 30.0
 # s for which a caller waits at most for the answer to what it has sent.
 CALLER_WAIT = 0.002
+# Bytes that a caller decodes at once. The worst take a microsecond each.
+CALLER_BYTES = 4096
 # s that a channel stays open until it is proved without a frame.
 PROOF_TIME = 1.0
 # s for which the line may still be busy when the next group of a stream is written, so that it has
@@ -257,15 +259,15 @@ class Link:
     def _receive_until(self, is_done: Callable[[], bool]) -> None:
         """Receive in the turn of a caller, which need not wait for a change of threads."""
         until = min(self.clock() + CALLER_WAIT, self._due)
-        while self._channel is not None and (wait := until - self.clock()) > 0:
+        while (self._channel is not None and not self._calls
+               and (wait := until - self.clock()) > 0):
             # Both this thread and the link's may wait for the selector.
             ready = self._selector.select(wait)
             if not ready or ready[0][0].fileobj is self._wake_out:
                 break
             self._received_by_caller = True
-            # One after the other: the first may close the others. Where many bytes wait, to read
-            # them all may take much longer than the caller waits.
-            self._serve(ready[0][0].fileobj, ready[0][1], once=True)
+            # One after the other: the first may close the others.
+            self._serve(ready[0][0].fileobj, ready[0][1], by_caller=True)
             if is_done():
                 break
             until = min(until, self.endpoint.next_deadline())
@@ -392,8 +394,8 @@ class Link:
             self._safe_call(
                 self._store.keep, self._signing.timestamp, self._wall_clock(), last)
 
-    def _serve(self, handle: object, events: int, *, once: bool = False) -> None:
-        """Send or receive on a handle that is ready; ``once`` leaves the rest for later."""
+    def _serve(self, handle: object, events: int, *, by_caller: bool = False) -> None:
+        """Send or receive on a handle that is ready; a caller leaves much to the thread."""
         assert self._channel is not None
         try:
             if events & selectors.EVENT_WRITE:
@@ -401,11 +403,18 @@ class Link:
                 self._work_pending |= bool(self._streams)
             if events & selectors.EVENT_READ:
                 for peer, data in self._channel.receive(handle):
-                    self._take(self._channel, peer, data)
-                    if once or self._channel is None:
+                    if by_caller and len(data) > CALLER_BYTES:
+                        self.call(functools.partial(self._take_later, self._channel, peer, data))
+                    else:
+                        self._take(self._channel, peer, data)
+                    if by_caller or self._channel is None:
                         return
         except OSError as error:
             self._lost(error)
+
+    def _take_later(self, channel: Channel, peer: Peer, data: bytes, now: float) -> None:
+        if self._channel is channel:
+            self._take(channel, peer, data)
 
     def _take(self, channel: Channel, peer: Peer, data: bytes) -> None:
         now = self.clock()

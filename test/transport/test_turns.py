@@ -22,6 +22,7 @@ import threading
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import MIN_TIMEOUT
+from illuminator_ros.mavlink.link import CALLER_BYTES
 from illuminator_ros.mavlink.messages import heartbeat
 import pytest
 from support.frames import heartbeat_frame
@@ -144,6 +145,25 @@ def test_caller_receives_no_more_than_it_waits_for(
     count = 20 * len(callers)
     link.endpoint.wait_heard(count)
     assert list(receivers).count(caller) == 1
+
+
+@pytest.mark.parametrize(('noise', 'by_caller'), [(100, True), (CALLER_BYTES, False)])
+def test_caller_leaves_the_decoding_of_many_bytes_to_the_thread(
+        run: Run, channel: Open, noise: int, by_caller: bool) -> None:
+    other, selector = channel(URL), Waiting()
+    link = run(LiveLink(URL, selector=selector))
+    link.wait_open()
+    callers: Log[threading.Thread] = Log()
+    receivers = link.endpoint.receivers
+
+    def ask(now: float) -> None:
+        callers.append(threading.current_thread())
+        other.broadcast(bytes(noise) + heartbeat_frame())
+
+    caller = threading.current_thread()
+    take_turn(link, selector, ask, callers, lambda: caller in receivers)
+    link.endpoint.wait_heard(len(callers))
+    assert (list(receivers)[-1] is caller) is by_caller
 
 
 def test_caller_that_gets_no_answer_leaves_the_link_to_its_thread(
