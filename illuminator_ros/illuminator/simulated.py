@@ -102,15 +102,14 @@ class SimulatedIlluminator(SimulatedDevice):
         super().__init__(properties.behaviour)
         self.properties = properties
         self.thermal = ThermalModel(properties.thermal)
-        self.thermal.sensor_failed = self.behaviour.thermistor_failed
+        self.thermal.set_sensor_failed(self.behaviour.thermistor_failed)
         self.restart(0.0)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """See :meth:`SimulatedDevice.behave`."""
         self.warm(now)
         super().behave(behaviour, now)
-        self.thermal.sensor_failed = self.behaviour.thermistor_failed
-        self.thermal.advance(0.0, 0.0)
+        self.thermal.set_sensor_failed(self.behaviour.thermistor_failed)
 
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; the temperature stays."""
@@ -241,8 +240,7 @@ class SimulatedIlluminator(SimulatedDevice):
     def heat_to(self, temperature: float, now: float) -> None:
         """Set the temperature, degC."""
         self.warm(now)
-        self.thermal.temperature = temperature
-        self.thermal.advance(0.0, 0.0)
+        self.thermal.set_temperature(temperature)
 
     def set_ambient(self, temperature: float, now: float) -> None:
         """Set the ambient temperature, degC."""

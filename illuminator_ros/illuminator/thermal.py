@@ -68,36 +68,37 @@ class ThermalModel:
     :ivar temperature: degC.
     :ivar ambient: degC.
     :ivar sensor_failed: whether the light cannot measure its temperature.
+    :ivar flags: the error flags of its report; THERMISTOR_FAILURE alone while the sensor has
+        failed.
+    :ivar output: the share (0..1) of the commanded brightness that the light gives.
     """
 
     def __init__(self, properties: ThermalProperties) -> None:
         self.properties = properties
         self.ambient = self.temperature = properties.ambient
         self.sensor_failed = False
-        self._flags = 0
+        self.flags = 0
+        self.output = 1.0
         self.advance(0.0, 0.0)
-
-    @property
-    def flags(self) -> int:
-        """Return the error flags of its report: without a sensor it reports no heat."""
-        return _FAILURE if self.sensor_failed else self._flags
 
     @property
     def reading(self) -> float:
         """Return the temperature as the light reports it, degC."""
         return BROKEN_READING if self.sensor_failed else self.temperature
 
-    @property
-    def output(self) -> float:
-        """Return the share (0..1) of the commanded brightness that the light gives."""
-        flags = self.flags
-        if flags & _SHUTDOWN:
-            return 0.0
-        return self.properties.throttle_to if flags & _THROTTLING else 1.0
+    def set_sensor_failed(self, failed: bool) -> None:
+        """Set whether the sensor has failed, and update the flags and the output."""
+        self.sensor_failed = failed
+        self.advance(0.0, 0.0)
+
+    def set_temperature(self, temperature: float) -> None:
+        """Set the temperature, degC, and update the flags and the output."""
+        self.temperature = temperature
+        self.advance(0.0, 0.0)
 
     def advance(self, seconds: float, power: float) -> None:
         """
-        Let time pass; call it with 0 s after a change of the temperature or of the sensor.
+        Let time pass.
 
         :param power: the commanded share of full power (0..1).
         """
@@ -113,10 +114,9 @@ class ThermalModel:
         final = self.ambient + properties.rise * power * self.output
         decay = math.exp(-seconds / properties.time_constant)
         self.temperature = temperature = final + (self.temperature - final) * decay
-        flags = self._flags
-        if self.sensor_failed:
-            flags = 0
-        else:
+        flags = _FAILURE
+        if not self.sensor_failed:
+            flags = before & ~_FAILURE
             if temperature >= properties.throttle_at:
                 flags |= _THROTTLING
             elif temperature < properties.throttle_until:
@@ -125,5 +125,7 @@ class ThermalModel:
                 flags |= _SHUTDOWN
             elif temperature < properties.shutdown_until:
                 flags &= ~_SHUTDOWN
-        self._flags = flags
-        return self.flags == before and abs(temperature - final) < 1e-9
+        self.flags = flags
+        self.output = (0.0 if flags & _SHUTDOWN else
+                       properties.throttle_to if flags & _THROTTLING else 1.0)
+        return flags == before and abs(temperature - final) < 1e-9
