@@ -21,9 +21,12 @@ from pathlib import Path
 import time
 
 from ..rig import Bench, bridge, Client, cpu, free_port, memory, PATIENCE, simulator
-from ..rows import at_most, Figures, one, quantiles, Row, times
+from ..rows import at_most, Figures, one, quantile, quantiles, Row, times
 
 CALLS = 150
+# Participants that discover the nodes, one after the other. Half of them miss the first
+# announcement of the bridge, and the row judges the longest discovery.
+PARTICIPANTS = 5
 MEASURED = 3.0
 # Limits for 100 lights and fewer: MB, threads, s.
 MEMORY, THREADS, DISCOVERY = 160.0, 20, 3.0
@@ -51,8 +54,10 @@ def measure(bench: Bench) -> Iterator[Row]:
               bridge(f'udpin://127.0.0.1:{port}', target_component=1) as program):
             with Client(bench.domain) as first:
                 seen(first, names)
-            with Client(bench.domain) as newcomer:
-                discovery = seen(newcomer, names)
+            discoveries = []
+            for _ in range(bench.amount(PARTICIPANTS, 1)):
+                with Client(bench.domain) as participant:
+                    discoveries.append(seen(participant, names))
             with Client(bench.domain) as client:
                 client.meet('/illuminator/enable')
                 time.sleep(bench.amount(2.0, 0.0))
@@ -71,5 +76,7 @@ def measure(bench: Bench) -> Iterator[Row]:
                   targets=[at_most(threads, THREADS, 'threads')])
         yield Row(f'~/enable of the first, {kind}', 'ms', calls, {'the smallest number': alone},
                   [times(calls, alone, 1.2, 'p50')] if calls is not alone else [])
-        yield Row(f'discovery of all by a new participant, {kind}', 's', one(discovery),
-                  targets=[at_most(discovery, DISCOVERY, 's')])
+        yield Row(f'discovery of all by a new participant, {kind}', 's',
+                  {'p50': quantile(discoveries, 0.5), 'max': max(discoveries)},
+                  targets=[at_most(max(discoveries), DISCOVERY, 's')],
+                  note=f'{len(discoveries)} participants, one after the other')

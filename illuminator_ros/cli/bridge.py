@@ -183,7 +183,7 @@ def _serve(
         termination.calls(lambda: None)
         if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():
             return executable.refuse(refusal)
-        _limit_memory()
+        _use_profile()
         # On a terminal rcutils colours its lines; its stderr is a pipe.
         if termination.is_terminal:
             os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
@@ -222,7 +222,7 @@ def _start_failure(error: Exception, failed: str) -> str:
     return f'{failed}: {error}'
 
 
-def _limit_memory() -> None:
+def _use_profile() -> None:
     """Use our profile of Fast DDS, unless the user has one."""
     names = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
     files = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
