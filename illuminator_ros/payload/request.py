@@ -16,8 +16,9 @@
 A request to a device: a command, its acknowledgement, and the status that shows the change.
 
 MAV_RESULT_ACCEPTED says that the command is valid and was taken on, not that it is done
-(command protocol). So a status is requested after it, and only a status that was sent after the
-command and shows the change makes the request a success.
+(command protocol). So a request waits for a status, and requests one if none follows within
+:data:`ASK_DELAY`. Only a status that was sent after the command and shows the change makes the
+request a success.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ from ..mavlink.messages import Address, MavCmd, MavResult
 
 # s from the acknowledgement to the status that shows the change.
 CONFIRMATION_TIMEOUT = 1.0
-# s between requests for the status meanwhile, where one or its answer was lost.
+# s from the acknowledgement to the first request for the status: many devices send a status by
+# themselves, in the next datagram. ASK_INTERVAL, s, separates further requests, since a request or
+# its answer may be lost.
+ASK_DELAY = 0.001
 ASK_INTERVAL = 0.25
 # s from a status that is too old to tell to the next request, doubled each time: it may have been
 # sent in the same millisecond as the command.
@@ -337,9 +341,7 @@ class Request(Generic[S]):
             self.phase = TRANSITIONS[self.phase, Step.ACKNOWLEDGED]
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
-            # On the next poll, not immediately: many devices send a status after the
-            # acknowledgement by themselves.
-            self._ask_at = now
+            self._ask_at = now + ASK_DELAY
         else:
             self._refused(now)
 

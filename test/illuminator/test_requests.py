@@ -31,6 +31,7 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.request import (
+    ASK_DELAY,
     MAX_WAITING,
     Report,
     Request,
@@ -318,21 +319,47 @@ def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> No
     assert pair.enable(True).success
 
 
-def test_the_status_that_ends_a_request_sends_the_next_one_without_a_poll() -> None:
+ON = Status.from_message(
+    IlluminatorStatus(1000, 1, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
+
+
+def acknowledged(*switches: Switch) -> tuple[CommandSender, RequestQueue[Status]]:
+    """Return a sender and a queue of requests; the first one was acknowledged at 0.1 s."""
     sender = CommandSender(BRIDGE)
     target = Target(LIGHT, sender, kind='light', status_id=STATUS_ID,
                     status_name='ILLUMINATOR_STATUS')
     queue: RequestQueue[Status] = RequestQueue(target)
-    for change in (Switch(True), Switch(False)):
+    for change in switches:
         queue.submit(Request(
             target, lambda now, change=change: change,  # type: ignore[misc]
             lambda *ended: None, now=0.0, limit=10.0), 0.0)
     sender.acknowledge(LIGHT, mav.CommandAck(ON_OFF, ACCEPTED, 0, 0, *BRIDGE), 0.1)
-    status = IlluminatorStatus(1000, 1, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0)
-    queue.take(Report(Status.from_message(status), 0.2), 0.2)
+    return sender, queue
+
+
+def commands(sender: CommandSender) -> list[tuple[int, float]]:
+    """Return the command and param1 of each command that was sent."""
     sent: list[Any] = [message for _, message in sender.outgoing]
-    assert [command.param1 for command in sent] == [1.0, 0.0]
+    return [(message.command, message.param1) for message in sent]
+
+
+def test_the_status_that_ends_a_request_sends_the_next_one_without_a_poll() -> None:
+    sender, queue = acknowledged(Switch(True), Switch(False))
+    queue.take(Report(ON, 0.2), 0.2)
+    assert commands(sender) == [(ON_OFF, 1.0), (ON_OFF, 0.0)]
     assert len(queue) == 1
+
+
+@pytest.mark.parametrize(('after', 'asked'), [
+    (0.5 * ASK_DELAY, []), (1.5 * ASK_DELAY, [(REQUEST, float(STATUS_ID))])])
+def test_a_status_is_requested_unless_it_follows_the_acknowledgement_at_once(
+    after: float, asked: list[tuple[int, float]],
+) -> None:
+    sender, queue = acknowledged(Switch(True))
+    queue.poll(0.1 + after)
+    queue.take(Report(ON, 0.1 + after), 0.1 + after)
+    assert commands(sender) == [(ON_OFF, 1.0), *asked]
+    assert len(queue) == 0
 
 
 # Cancelling
