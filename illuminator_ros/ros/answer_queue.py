@@ -23,11 +23,11 @@ import threading
 
 # Each client of a service receives the answers to all clients, and by default keeps the last 10
 # only. A service with more than MAX_UNSPACED clients or open requests pauses after each answer,
-# PAUSE_PER_CLIENT s for each of them, but not for longer than that the answers to requests that
-# came together are sent within MAX_SPREAD s.
+# PAUSE_PER_CLIENT s for each of them, or less, so that the answers to requests that came together
+# are sent within MAX_SPREAD s.
 MAX_UNSPACED = 8
-PAUSE_PER_CLIENT = 0.0004
-MAX_SPREAD = 0.8
+PAUSE_PER_CLIENT = 0.0006
+MAX_SPREAD = 2.0
 # s between two counts of the clients of a service.
 CLIENT_COUNT_INTERVAL = 0.1
 # Answers that wait; more would fill the memory and come too late.
@@ -39,9 +39,12 @@ class AnswerQueue:
     The answers of one service.
 
     Answers may come in any thread; all else is for the thread that takes the requests.
+
+    :param spread: s, the limit in place of :data:`MAX_SPREAD`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, spread: float = MAX_SPREAD) -> None:
+        self._spread = spread
         self._lock = threading.Lock()
         self._waiting: deque[Callable[[], None]] = deque()
         self._requests = self._answers = 0
@@ -76,7 +79,7 @@ class AnswerQueue:
         count = max(self._requests - self._answers, self._clients)
         self._answers += 1
         if count > MAX_UNSPACED:
-            self._pause_ends = now + min(count * PAUSE_PER_CLIENT, MAX_SPREAD / count)
+            self._pause_ends = now + min(count * PAUSE_PER_CLIENT, self._spread / count)
 
     def count_clients(self, count: Callable[[], int | None], now: float) -> None:
         """Count the clients if that is due; callable in any thread. None leaves the last count."""

@@ -40,7 +40,7 @@ from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from .answer_queue import AnswerQueue
+from .answer_queue import AnswerQueue, MAX_SPREAD
 from .processor import yield_processor
 from .throttled_log import NodeLog
 
@@ -60,12 +60,13 @@ class DeferredService(Generic[Q, A]):
     The callback of a service that answers later; only a :class:`NodeExecutor` calls it.
 
     :param take: called with the request, and with the function that sends the response.
+    :param spread: s within which the answers to requests that came together are sent.
     :ivar answers: those that were not sent yet.
     """
 
-    def __init__(self, take: Take[Q, A]) -> None:
+    def __init__(self, take: Take[Q, A], spread: float = MAX_SPREAD) -> None:
         self.take = take
-        self.answers = AnswerQueue()
+        self.answers = AnswerQueue(spread)
 
     def __call__(self, request: Q, response: A) -> A:
         """Fail: another executor cannot wait for the answer."""

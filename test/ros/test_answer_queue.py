@@ -51,7 +51,8 @@ class Answers:
 
 @pytest.mark.parametrize(('clients', 'requests', 'pause'), [
     (MAX_UNSPACED, MAX_UNSPACED, 0.0), (MAX_UNSPACED + 1, 2, MAX_UNSPACED + 1),
-    (1, MAX_UNSPACED + 1, MAX_UNSPACED + 1), (20, 30, 30), (30, 20, 30), (100, 50, 20)])
+    (1, MAX_UNSPACED + 1, MAX_UNSPACED + 1), (20, 30, 30), (30, 20, 30),
+    (100, 50, MAX_SPREAD / 100 / PAUSE_PER_CLIENT)])
 def test_a_pause_follows_an_answer_where_there_are_many_clients_or_open_requests(
     clients: int, requests: int, pause: float,
 ) -> None:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import math
 import re
 import socket
 import threading
@@ -152,7 +153,6 @@ MakeClient = Callable[[str], 'Client[Trigger.Request, Trigger.Response]']
 def node(ros: Ros, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
     """Yield a node of an executor that sends spaced answers hours apart."""
     monkeypatch.setattr(answer_queue, 'PAUSE_PER_CLIENT', 3600.0)
-    monkeypatch.setattr(answer_queue, 'MAX_SPREAD', 36000.0)
     monkeypatch.setattr(answer_queue, 'CLIENT_COUNT_INTERVAL', 0.0)
     node = PayloadNode('served', context=ros.context)
     executor = NodeExecutor(ros.context, NodeLog(node.get_logger()))
@@ -189,7 +189,8 @@ def serve_later(node: Node) -> Log[Respond[Trigger.Response]]:
     def take(request: Trigger.Request, respond: Respond[Trigger.Response]) -> None:
         waiting.append(respond)
 
-    node.create_service(Trigger, '~/slow', DeferredService(take), qos_profile=SERVICE_QOS)
+    node.create_service(
+        Trigger, '~/slow', DeferredService(take, math.inf), qos_profile=SERVICE_QOS)
     return waiting
 
 
