@@ -61,7 +61,7 @@ class DeferredService(Generic[Q, A]):
 
     :param take: called with the request, and with the function that sends the response.
     :param spread: s within which the answers to requests that came together are sent.
-    :ivar answers: those that were not sent yet.
+    :ivar answers: paces its answers.
     """
 
     def __init__(self, take: Take[Q, A], spread: float = MAX_SPREAD) -> None:

@@ -58,8 +58,7 @@ def test_thresholds_have_a_hysteresis() -> None:
             (79.9, ErrorFlag(0), 1.0), (80.0, THROTTLING, 0.5), (94.9, THROTTLING, 0.5),
             (95.0, THROTTLING | SHUTDOWN, 0.0), (70.1, THROTTLING | SHUTDOWN, 0.0),
             (69.9, SHUTDOWN, 0.0), (65.1, SHUTDOWN, 0.0), (64.9, ErrorFlag(0), 1.0)):
-        one.temperature = temperature
-        one.advance(0.0, 0.0)
+        one.set_temperature(temperature)
         assert (one.flags, one.output) == (flags, output), temperature
 
 

@@ -194,21 +194,30 @@ def serve_later(node: Node) -> Log[Respond[Trigger.Response]]:
     return waiting
 
 
+def call(
+    client: Client[Trigger.Request, Trigger.Response], waiting: Log[Respond[Trigger.Response]],
+    count: int,
+) -> list[Call]:
+    """Call a service until that many requests wait for their answers."""
+    calls = [Call(client.call_async(Trigger.Request())) for _ in range(count)]
+    waiting.wait_for(lambda one: True, count=count)
+    return calls
+
+
 def test_spaced_answers_do_not_delay_other_services_and_are_bounded(
     node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(answer_queue, 'MAX_WAITING', 3)
     waiting = serve_later(node)
     slow, fast = clients('slow'), clients('fast')
-    calls = [Call(slow.call_async(Trigger.Request())) for _ in range(20)]
-    waiting.wait_for(lambda one: True, count=len(calls))
+    calls = call(slow, waiting, 20)
 
     for respond in list(waiting):
         respond(Trigger.Response())
 
-    eventually(lambda: sum(call.answered for call in calls) == len(calls) - 3)
+    eventually(lambda: sum(one.answered for one in calls) == len(calls) - 3)
     Call(fast.call_async(Trigger.Request())).result()
-    assert sum(call.answered for call in calls) == len(calls) - 3
+    assert sum(one.answered for one in calls) == len(calls) - 3
 
 
 def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_at_once(
@@ -225,8 +234,8 @@ def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_a
         waiting.wait_for(lambda one: True, count=count)
         list(waiting)[-1](Trigger.Response())
 
-    for call in calls[:2]:
-        call.result()
+    for answered in calls[:2]:
+        answered.result()
     Call(fast.call_async(Trigger.Request())).result()
     assert not calls[2].answered
 
@@ -237,9 +246,7 @@ def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it
     monkeypatch.setattr(answer_queue, 'PAUSE_PER_CLIENT', 0.001)
     waiting = serve_later(node)
     slow, fast = clients('slow'), clients('fast')
-    calls = [Call(slow.call_async(Trigger.Request()))
-             for _ in range(answer_queue.MAX_UNSPACED + 2)]
-    waiting.wait_for(lambda one: True, count=len(calls))
+    calls = call(slow, waiting, answer_queue.MAX_UNSPACED + 2)
     left = list(waiting)
     genuine = Service.send_response
 
@@ -254,6 +261,6 @@ def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it
     for _ in range(3):
         left.pop()(Trigger.Response())
 
-    for call in calls:
-        call.result()
+    for answered in calls:
+        answered.result()
     Call(fast.call_async(Trigger.Request())).result()

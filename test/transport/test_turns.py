@@ -83,6 +83,23 @@ def take_turn(
     pytest.fail('each turn was left to the thread of the link')
 
 
+def ask(link: LiveLink, selector: Waiting, send: Callable[[], None]) -> int:
+    """
+    Have this thread send in its turn, and wait until it has received in a turn.
+
+    :return: how often it has sent.
+    """
+    callers: Log[threading.Thread] = Log()
+    caller = threading.current_thread()
+
+    def take(now: float) -> None:
+        callers.append(caller)
+        send()
+
+    take_turn(link, selector, take, callers, lambda: caller in link.endpoint.receivers)
+    return len(callers)
+
+
 def test_caller_takes_the_turn_and_sends_while_the_thread_waits(run: Run, channel: Open) -> None:
     other, selector = channel(URL), Waiting()
     link = run(LiveLink(URL, selector=selector))
@@ -105,15 +122,8 @@ def test_caller_that_waits_receives_the_answer_in_its_turn(run: Run, channel: Op
     other, selector = channel(URL), Waiting()
     link = run(LiveLink(URL, selector=selector))
     link.wait_open()
-    callers: Log[threading.Thread] = Log()
-    receivers = link.endpoint.receivers
-
-    def ask(now: float) -> None:
-        callers.append(threading.current_thread())
-        other.broadcast(heartbeat_frame())
-
-    caller = threading.current_thread()
-    take_turn(link, selector, ask, callers, lambda: caller in receivers)
+    caller, receivers = threading.current_thread(), link.endpoint.receivers
+    ask(link, selector, lambda: other.broadcast(heartbeat_frame()))
     assert list(receivers)[-1] is caller
     # The caller has received the frame that woke the thread; the next frame is another one.
     count = len(receivers) + 1
@@ -131,20 +141,15 @@ def test_caller_receives_no_more_than_it_waits_for(
     link = run(LiveLink(url, selector=selector))
     link.wait_open()
     others = [channel(f'udpout://127.0.0.1:{port}' if is_udp else URL) for _ in range(2)]
-    callers: Log[threading.Thread] = Log()
-    receivers = link.endpoint.receivers
 
-    def ask(now: float) -> None:
-        callers.append(threading.current_thread())
+    def send() -> None:
         for sequence in range(10):
             for other in others:
                 other.broadcast(heartbeat_frame(sequence=sequence))
 
-    caller = threading.current_thread()
-    take_turn(link, selector, ask, callers, lambda: caller in receivers)
-    count = 20 * len(callers)
+    count = 20 * ask(link, selector, send)
     link.endpoint.wait_heard(count)
-    assert list(receivers).count(caller) == 1
+    assert list(link.endpoint.receivers).count(threading.current_thread()) == 1
 
 
 @pytest.mark.parametrize(('noise', 'by_caller'), [(100, True), (CALLER_BYTES, False)])
@@ -153,17 +158,9 @@ def test_caller_leaves_the_decoding_of_many_bytes_to_the_thread(
     other, selector = channel(URL), Waiting()
     link = run(LiveLink(URL, selector=selector))
     link.wait_open()
-    callers: Log[threading.Thread] = Log()
-    receivers = link.endpoint.receivers
-
-    def ask(now: float) -> None:
-        callers.append(threading.current_thread())
-        other.broadcast(bytes(noise) + heartbeat_frame())
-
-    caller = threading.current_thread()
-    take_turn(link, selector, ask, callers, lambda: caller in receivers)
-    link.endpoint.wait_heard(len(callers))
-    assert (list(receivers)[-1] is caller) is by_caller
+    count = ask(link, selector, lambda: other.broadcast(bytes(noise) + heartbeat_frame()))
+    link.endpoint.wait_heard(count)
+    assert (list(link.endpoint.receivers)[-1] is threading.current_thread()) is by_caller
 
 
 def test_caller_that_gets_no_answer_leaves_the_link_to_its_thread(
