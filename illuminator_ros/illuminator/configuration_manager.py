@@ -81,12 +81,14 @@ class Pending:
 
     :param attempts: how often the light has accepted them and shown others.
     :param due: when they are sent next, s.
+    :param was_tried: whether a command with them has ended, or cannot be sent.
     """
 
     values: Changes
     origin: Origin
     due: float
     attempts: int = 0
+    was_tried: bool = False
 
 
 @dataclass
@@ -154,6 +156,18 @@ class ConfigurationManager:
     def is_confirming(self) -> bool:
         """Whether a request waits for a status."""
         return self._queue.is_confirming
+
+    @property
+    def follows_restart(self) -> bool:
+        """Whether a light that has restarted would be sent a configuration."""
+        return self._is_limited or self._restore and self.confirmed is not None
+
+    @property
+    def precedes_on(self) -> bool:
+        """Whether the light must be sent a configuration before it is switched on."""
+        pending = self._pending
+        return (pending is not None and not pending.was_tried
+                and pending.origin is not Origin.OTHER_SENDER)
 
     @property
     def sent_at(self) -> float:
@@ -326,6 +340,14 @@ class ConfigurationManager:
                       if name != 'mode' or confirmed.mode}
             # Overrides that have not been sent yet replace the values from before.
             self._pending = Pending({**values, **self._wanted}, Origin.RESTART, now)
+        # The light has forgotten that it was brought within the limits.
+        self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
+
+    def connected(self, now: float) -> None:
+        """Note that the light is heard again: what could not be sent is due."""
+        pending = self._pending
+        if pending and pending.due < math.inf:
+            self._pending = replace(pending, due=now, was_tried=False)
 
     def lost(self, message: str, now: float) -> None:
         """Note that the light is lost; a setpoint must not take effect when it is heard again."""
@@ -513,6 +535,7 @@ class ConfigurationManager:
         except InvalidValue as error:
             # They still wait for a status; but the user should know.
             pending.due = math.inf
+            pending.was_tried = True
             self.discrepancy = f'{", ".join(pending.values)} not sent: {error}'
             self._restored(False, self.discrepancy)
             return
@@ -528,6 +551,7 @@ class ConfigurationManager:
             return
 
         def finished(result: Result, now: float) -> None:
+            pending.was_tried = True
             pending.attempts += result.contradicted
             if (result.success or result.permanent
                     or pending.attempts >= MAX_CONTRADICTIONS

@@ -37,6 +37,9 @@ from ..payload.request import Change, Done, Report, Request, RequestQueue, Resul
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
+# s for which an ON waits for the status that shows whether the light has restarted: the requests
+# for that status end within 1.6 s, and an unlit light is a hazard, too.
+RESTART_CHECK_TIME = 2.0
 # s; a light that reports progress for longer is not waited for.
 PROGRESS_LIMIT = 30.0
 # s; two commands one after the other, each with its tries, and the messages after them.
@@ -135,6 +138,8 @@ class Light:
         # s of silence after which the light is asked for a status; its answer takes time, too.
         self._longest_silence = min(STATUS_TIMEOUT, settings.heartbeat_timeout / 1.2)
         self._was_lost = False
+        # Until when an ON waits, s, since the light may have restarted.
+        self._check_until = -math.inf
         self._enabled: bool | None = None
         self._last_switch: tuple[bool, float] = False, -math.inf
         # Until when a switch that was not confirmed may still take effect, s.
@@ -162,6 +167,10 @@ class Light:
         if not self.connected:
             self.connected = True
             self.lost_at = math.inf
+            self._check_until = now + RESTART_CHECK_TIME
+            self._configuration.connected(now)
+            # It was sent to a silent light, and its next try may be half a second away.
+            self._target.end_status_request(now)
             self._set_up(now)
             self._emit(events.LightConnected(self.address))
 
@@ -193,6 +202,8 @@ class Light:
             self._was_lost = was_lost
             if self._tracker.is_suspecting:
                 self._status_due = min(self._status_due, now + RESTART_PROOF_TIME)
+                if self._check_until == -math.inf:
+                    self._check_until = now + RESTART_CHECK_TIME
             return
         if not is_first:
             self._note(status, now)
@@ -205,6 +216,7 @@ class Light:
             self._is_shared = report.shared_address
             self._emit(events.AddressShared(self.address, self._is_shared))
         self._take_report(report, now, restarted=restarted)
+        self._check_until = -math.inf
         if is_awaited:
             self._publish(status, now)
 
@@ -469,13 +481,24 @@ class Light:
             if result.success and was_on is not on and detail is not None:
                 self._emit(events.LightSwitched(self.address, on, events.Origin.REQUEST, detail))
 
-        request = Request(
-            self._target, prepare, finished, now=now, limit=now + PROGRESS_LIMIT,
-            overtakes=not on)
+        limit = now + PROGRESS_LIMIT
         if on:
-            self._switching.submit(request, now)
+            self._switching.submit(Request(
+                self._target, prepare, finished, now=now, limit=limit,
+                held_until=self._on_held_until), now)
         else:
-            self._switching.overtake(request, now)
+            self._switching.overtake(Request(
+                self._target, prepare, finished, now=now, limit=limit, overtakes=True), now)
+
+    def _on_held_until(self) -> float:
+        """
+        Return until when an ON must wait, s; infinity while a configuration is sent before it.
+
+        A light that has restarted has the brightness of its firmware until it is configured.
+        """
+        if self._configuration.precedes_on:
+            return math.inf
+        return self._check_until if self._configuration.follows_restart else -math.inf
 
     def configure(
         self, changes: Changes, now: float, done: Done, *, source: str = DEFAULT,

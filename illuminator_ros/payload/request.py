@@ -83,28 +83,29 @@ class Target:
         self._ended = ended
         self._status_id = status_id
         self._status_requested = False
+        self._status_request: command_sender.Command | None = None
         self._delays: list[float] = []
 
     def send(
         self, command: int, params: tuple[float, ...], now: float,
         done: CommandDone = lambda result, now: None, *, limit: float = math.inf,
         overtake: bool = False, to: Address | None = None,
-    ) -> None:
+    ) -> command_sender.Command:
         """Send a command, to the device or to another component; see :class:`CommandSender`."""
         def ended(result: command_sender.CommandResult, now: float) -> None:
             done(result, now)
             self._ended(result, now)
 
-        self._commands.start(
-            command_sender.Command(to or self.address, command, params), now, ended, limit=limit,
-            overtake=overtake)
+        started = command_sender.Command(to or self.address, command, params)
+        self._commands.start(started, now, ended, limit=limit, overtake=overtake)
+        return started
 
     def request_message(
         self, message_id: int, now: float, done: CommandDone = lambda result, now: None, *,
         to: Address | None = None,
-    ) -> None:
+    ) -> command_sender.Command:
         """Request one message of the device or of another component."""
-        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
+        return self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
 
     def request_status(self, now: float, done: CommandDone | None = None) -> None:
         """Request the status; without ``done`` only where no such request is under way."""
@@ -112,8 +113,13 @@ class Target:
             self.request_message(self._status_id, now, done, to=self._status_sender)
         elif not self._status_requested:
             self._status_requested = True
-            self.request_message(
+            self._status_request = self.request_message(
                 self._status_id, now, self._status_answered, to=self._status_sender)
+
+    def end_status_request(self, now: float) -> None:
+        """End a request for the status that is under way, so that a new one is sent at once."""
+        if self._status_request is not None:
+            self._commands.cancel(self._status_request, now)
 
     def _status_answered(self, result: command_sender.CommandResult, now: float) -> None:
         self._status_requested = False
@@ -251,17 +257,20 @@ class Request(Generic[S]):
     :param limit: the time by which it ends, s.
     :param is_stream: whether it is one of a stream of setpoints, which a newer one replaces.
     :param overtakes: whether its command is sent beside one of its kind that is in progress.
+    :param held_until: returns until when it must not be sent, s.
     """
 
     def __init__(
         self, target: Target, prepare: Callable[[float], Change[S]],
         done: Callable[[Result, Change[S] | None, S | None, float], None], *, now: float,
         limit: float, is_stream: bool = False, overtakes: bool = False,
+        held_until: Callable[[], float] = lambda: -math.inf,
     ) -> None:
         self.phase = Phase.WAITING
         self.limit = limit
         self.is_stream = is_stream
         self.overtakes = overtakes
+        self.held_until = held_until
         self.change: Change[S] | None = None
         self._target = target
         self._prepare = prepare
@@ -495,7 +504,9 @@ class RequestQueue(Generic[S]):
     @property
     def current(self) -> Request[S] | None:
         """Return the request that is on its way."""
-        return self._requests[0] if self._requests else None
+        if not self._requests or self._requests[0].phase is Phase.WAITING:
+            return None
+        return self._requests[0]
 
     @property
     def is_confirming(self) -> bool:
@@ -528,8 +539,8 @@ class RequestQueue(Generic[S]):
 
     def cancel(self, message: str, now: float, *, only_waiting: bool = False) -> None:
         """End all requests, or only those that wait."""
-        kept = [self._requests.pop(0)] if only_waiting and self._requests else []
-        ended, self._requests = self._requests, kept
+        kept = [self.current] if only_waiting and self.current else []
+        ended, self._requests = self._requests[len(kept):], kept
         for request in ended:
             request.fail(message, now)
 
@@ -544,9 +555,8 @@ class RequestQueue(Generic[S]):
 
     def poll(self, now: float) -> None:
         """Do what is due, and start the request that has waited."""
-        while len(self._requests) > 1 and now >= self._requests[1].limit:
-            late = self._requests[1]
-            del self._requests[1]
+        while (late := self._first_waiting) and now >= late.limit:
+            self._requests.remove(late)
             late.fail('not sent: earlier requests took too long', now)
         if self._requests:
             self._requests[0].poll(now)
@@ -557,7 +567,7 @@ class RequestQueue(Generic[S]):
             first = self._requests[0]
             if first.phase is Phase.FINISHED:
                 del self._requests[0]
-            elif first.phase is Phase.WAITING:
+            elif first.phase is Phase.WAITING and now >= first.held_until():
                 first.start(self._status, now)
             else:
                 break
@@ -569,5 +579,13 @@ class RequestQueue(Generic[S]):
         first = self._requests[0]
         if first.phase is Phase.FINISHED:
             return -math.inf
-        waiting = self._requests[1].limit if len(self._requests) > 1 else math.inf
-        return min(first.next_deadline(), waiting)
+        waiting = self._first_waiting
+        limit = waiting.limit if waiting else math.inf
+        return min(first.held_until() if waiting is first else first.next_deadline(), limit)
+
+    @property
+    def _first_waiting(self) -> Request[S] | None:
+        requests = self._requests
+        if requests and requests[0].phase is Phase.WAITING:
+            return requests[0]
+        return requests[1] if len(requests) > 1 else None

@@ -1,0 +1,305 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An ON waits until a light that may have restarted has its configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from illuminator_ros.illuminator.light import Light, RESTART_CHECK_TIME, Settings
+from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.mavlink.messages import MavCmd, MavResult
+import pytest
+from support.back_to_back import Pair, START
+from support.fake_light import FakeLight, status_message
+from support.faulty_wire import Faults
+from support.records import Answer
+
+CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
+LIMITED = Settings(limits=SafetyLimits(max_brightness=60.0))
+COMPLETE = {'mode': 'internal_control', 'brightness': 30, 'strobe_period': 0,
+            'strobe_duty_cycle': 0}
+
+
+class ShiningLight(FakeLight):
+    """A light whose firmware starts at 100 %; ``shone`` has the brightness at each ON, %."""
+
+    def __init__(self, **how: Any) -> None:
+        super().__init__(**how)
+        self.shone: list[float] = []
+
+    def _apply(self, message: Any, now: float) -> None:
+        super()._apply(message, now)
+        if message.command == ON_OFF and message.param1:
+            self.shone.append(self.fields['brightness'])
+
+
+def agreed(light: FakeLight, settings: Settings | None = None, **how: Any) -> Pair:
+    """Return a client and a light that have agreed on 30 %."""
+    pair = Pair(light, settings=settings, **how).settle()
+    assert pair.configure(brightness=30).success
+    return pair
+
+
+def lose(pair: Pair, light: FakeLight) -> None:
+    light.silent = True
+    pair.run_until(lambda: not pair.light.connected)
+    light.silent = False
+
+
+def on_at_connection(pair: Pair) -> Answer:
+    """Ask for an ON as soon as the light is connected."""
+    pair.run_until(lambda: pair.controller.lights and pair.light.connected)
+    return pair.ask_enable(True)
+
+
+def hide_status(light: FakeLight) -> None:
+    light.stream = 0.0
+    light.answers.clear()
+
+
+def status_first(light: FakeLight, now: float) -> None:
+    light.heartbeat.due = now + 0.7
+
+
+def heartbeat_first(light: FakeLight, now: float) -> None:
+    light.delay_status(0.7)
+
+
+@pytest.mark.parametrize('first', [status_first, heartbeat_first])
+@pytest.mark.parametrize('seconds_lost', [0.0, 10.0, 100.0])
+@pytest.mark.parametrize('has_clock', [True, False])
+@pytest.mark.parametrize(('settings', 'brightness'), [
+    (Settings(), 30.0), (LIMITED, 30.0),
+    (replace(LIMITED, restore_configuration=False), 60.0),
+], ids=['restored', 'limited', 'limited only'])
+def test_a_restarted_light_is_switched_on_after_it_has_its_configuration(
+    settings: Settings, brightness: float, has_clock: bool, seconds_lost: float,
+    first: Callable[[FakeLight, float], None],
+) -> None:
+    light = ShiningLight()
+    if not has_clock:
+        light.boot = None
+    pair = agreed(light, settings)
+    lose(pair, light)
+    light.silent = True
+    pair.run(seconds_lost)
+    light.silent = False
+    light.restart(pair.now)
+    first(light, pair.now)
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert light.shone == [brightness]
+    assert answer.seconds < 0.5
+
+
+def test_a_light_that_restarts_without_a_loss_is_switched_on_when_its_status_is_proved() -> None:
+    light = ShiningLight()
+    light.boot = START
+    pair = agreed(light)
+    light.restart(pair.now)
+    pair.run(0.01)
+    assert pair.light.restarts == 0
+
+    assert pair.enable(True).success
+    assert light.shone == [30.0]
+
+
+@pytest.mark.parametrize(('settings', 'overrides'), [
+    (Settings(), {'brightness': 30}), (Settings(), COMPLETE), (LIMITED, {})])
+@pytest.mark.parametrize('sends_status', [True, False])
+def test_a_found_light_is_switched_on_after_it_has_its_overrides_and_limits(
+    sends_status: bool, settings: Settings, overrides: dict[str, Any],
+) -> None:
+    light = ShiningLight()
+    if not sends_status:
+        hide_status(light)
+
+    def override(found: Light) -> None:
+        if overrides:
+            found.set_desired(overrides, START)
+
+    pair = Pair(light, settings=settings, on_light=override)
+
+    assert pair.wait_for(on_at_connection(pair)).success
+    # A configuration that lacks a value cannot be sent to a light that does not report it.
+    reachable = sends_status or overrides is COMPLETE
+    assert light.shone == [(30.0 if overrides else 60.0) if reachable else 100.0]
+
+
+def test_a_light_that_runs_on_is_switched_on_with_its_first_status() -> None:
+    light = ShiningLight()
+    pair = agreed(light)
+    lose(pair, light)
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert answer.seconds < 0.1
+
+
+def test_a_light_without_anything_agreed_is_switched_on_at_once() -> None:
+    light = FakeLight()
+    pair = Pair(light, settings=Settings(restore_configuration=False)).settle()
+    lose(pair, light)
+    hide_status(light)
+
+    on_at_connection(pair)
+
+    assert pair.commands(ON_OFF, since=pair.now)
+
+
+def test_an_on_does_not_wait_until_a_change_by_another_sender_is_undone() -> None:
+    light = FakeLight()
+    pair = agreed(light, Settings(reassert=True))
+    for _ in range(2):
+        light.fields['brightness'] = 80.0
+        pair.run(1.1)
+    assert light.fields['brightness'] == 80.0
+
+    pair.ask_enable(True)
+
+    assert pair.commands(ON_OFF, since=pair.now)
+
+
+def test_an_off_is_sent_at_once_and_cancels_the_on_that_waits() -> None:
+    light = ShiningLight()
+    pair = agreed(light)
+    lose(pair, light)
+    light.restart(pair.now)
+    on = on_at_connection(pair)
+
+    off = pair.ask_enable(False)
+
+    assert [one.param1 for one in pair.commands(ON_OFF, since=pair.now)] == [0.0]
+    assert pair.wait_for(off).success
+    pair.run(10.0)
+    assert on.result.message == 'cancelled by a later request'
+    assert light.shone == []
+
+
+def test_an_on_that_waits_fails_at_once_when_the_light_is_lost() -> None:
+    light = ShiningLight()
+    pair = agreed(light)
+    lose(pair, light)
+    hide_status(light)
+    on = on_at_connection(pair)
+    assert not on.results
+    pair.close()
+
+    assert 'is lost' in on.result.message
+    pair.open()
+    pair.run(10.0)
+    assert light.shone == []
+
+
+@pytest.mark.parametrize('result', [MavResult.DENIED, None])
+def test_a_light_that_cannot_be_configured_is_switched_on_after_one_attempt(
+    result: int | None,
+) -> None:
+    light = ShiningLight()
+    pair = agreed(light)
+    lose(pair, light)
+    light.results[CONFIGURE] = result
+    light.restart(pair.now)
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert light.shone == [100.0]
+    assert answer.seconds < 1.1
+
+
+def test_a_light_that_shows_no_status_any_more_is_sent_the_on_after_the_restart_check_time() -> (
+        None):
+    light = ShiningLight()
+    pair = agreed(light)
+    lose(pair, light)
+    hide_status(light)
+    answer = on_at_connection(pair)
+
+    pair.run_until(lambda: pair.commands(ON_OFF, since=answer.asked_at))
+
+    assert pair.now == pytest.approx(answer.asked_at + RESTART_CHECK_TIME)
+
+
+def test_late_statuses_hold_an_on_no_longer_than_the_restart_check_time() -> None:
+    light = ShiningLight()
+    light.boot = START
+    pair = agreed(light)
+    hide_status(light)
+
+    def send_late() -> None:
+        light.send(status_message(uptime_ms=1, **light.fields))
+        pair.turn()
+        pair.run(0.3)
+
+    send_late()
+    answer = pair.ask_enable(True)
+    assert not pair.commands(ON_OFF)
+    while pair.now < answer.asked_at + RESTART_CHECK_TIME:
+        assert pair.light.restarts == 0
+        send_late()
+
+    assert pair.commands(ON_OFF)
+
+
+def test_a_light_that_is_lost_before_it_has_its_configuration_is_configured_before_an_on() -> None:
+    light = ShiningLight()
+    pair = agreed(light)
+    lose(pair, light)
+    light.results[CONFIGURE] = None
+    light.restart(pair.now)
+    pair.run(1.2)
+    pair.close()
+    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    pair.open()
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert light.shone == [30.0]
+    assert answer.seconds < 0.8
+
+
+def test_overrides_that_cannot_be_sent_are_reported_once_though_the_light_is_lost_again() -> None:
+    light = FakeLight()
+    hide_status(light)
+    pair = Pair(
+        light, on_light=lambda light: light.set_desired({'brightness': 30}, START)).settle()
+
+    lose(pair, light)
+    pair.run(5.0)
+
+    assert len(pair.recorder.restorations) == 1
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_a_restarted_light_is_switched_on_once_configured_over_a_lossy_line(seed: int) -> None:
+    light = ShiningLight()
+    pair = agreed(light, seed=seed)
+    lose(pair, light)
+    light.restart(pair.now)
+    for end in (pair.near, pair.far):
+        end.wire.faults = Faults(drop=0.1, duplicate=0.2, delay=0.05)
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert set(light.shone) == {30.0}
