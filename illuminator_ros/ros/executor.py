@@ -175,15 +175,17 @@ class NodeExecutor(SingleThreadedExecutor):
         if header is None:
             return
         callback = service.callback
-        respond = functools.partial(_send, service, header)
         if isinstance(callback, DeferredService):
             callback.answers.note_request()
+            take = callback.take
             respond = functools.partial(self._respond, service, header, callback.answers)
-        try:
-            if isinstance(callback, DeferredService):
-                callback.take(request, respond)
-            else:
+        else:
+            def take(request: object, respond: Callable[[object], None]) -> None:
                 respond(callback(request, service.srv_type.Response()))
+
+            respond = functools.partial(_send, service, header)
+        try:
+            take(request, respond)
         except Exception:
             # The client gets an answer after internal errors, too.
             respond(service.srv_type.Response())
