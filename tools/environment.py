@@ -198,7 +198,7 @@ def main() -> None:
         return
     if reason:
         python = find_interpreter()
-        ros = f'ROS {ROS_DISTRO} is sourced' if ROS_DISTRO else 'with ROS 2 Jazzy, 750 MB on disk'
+        ros = f'ROS {ROS_DISTRO} is sourced' if ROS_DISTRO else 'with ROS 2 Jazzy, 810 MB on disk'
         print(f'making .venv ({reason}) with {python}; {ros}; about a minute', flush=True)
         make_venv(python)
     else:
