@@ -37,9 +37,9 @@ from ..payload.request import Change, Done, Report, Request, RequestQueue, Resul
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
-# s for which an ON waits for the status that shows whether the light has restarted: the requests
-# for that status end within 1.6 s, and an unlit light is a hazard, too.
-RESTART_CHECK_TIME = 2.0
+# s for which an ON waits for the statuses that show whether the light has restarted: long enough
+# for two of a light that sends one each second and none on request.
+RESTART_CHECK_TIME = 2.5
 # s; a light that reports progress for longer is not waited for.
 PROGRESS_LIMIT = 30.0
 # s; two commands one after the other, each with its tries, and the messages after them.

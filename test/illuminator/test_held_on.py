@@ -109,6 +109,22 @@ def test_a_restarted_light_is_switched_on_after_it_has_its_configuration(
     assert answer.seconds < 0.5
 
 
+@pytest.mark.parametrize('seconds_to_status', [0.0, 0.6, 1.19])
+def test_a_restarted_light_without_statuses_on_request_is_switched_on_after_its_configuration(
+    seconds_to_status: float,
+) -> None:
+    light = ShiningLight(stream=1.2)
+    light.boot = START
+    light.answers.clear()
+    pair = agreed(light)
+    lose(pair, light)
+    light.restart(pair.now)
+    light.delay_status(seconds_to_status)
+
+    assert pair.wait_for(on_at_connection(pair)).success
+    assert light.shone == [30.0]
+
+
 def test_a_light_that_restarts_without_a_loss_is_switched_on_when_its_status_is_proved() -> None:
     light = ShiningLight()
     light.boot = START
