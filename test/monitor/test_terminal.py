@@ -17,10 +17,33 @@
 from collections.abc import Iterator
 import os
 import pty
+import signal
+import subprocess
+import sys
 import termios
 
 from illuminator_ros.cli.monitor.terminal import Keyboard, unbuffered
 import pytest
+from support.fork_server import prepare_child
+from support.processes import environment, ROOT
+from support.waiting import PATIENCE
+
+# The rest of the job stops in os.kill(), which returns after the job has been continued.
+STOPS_ITS_JOB = """
+import os, sys
+from illuminator_ros.cli.monitor import terminal
+kill = os.kill
+os.kill = lambda *arguments: (kill(*arguments), sys.stdin.read())
+terminal.suspend(job=True)
+"""
+GETS_SIGNALS = """
+import os, signal
+from illuminator_ros.cli.monitor import terminal
+with terminal.suspended_by(lambda: None):
+    os.kill(os.getpid(), signal.SIGTSTP)
+    os.kill(os.getpid(), signal.SIGCONT)
+terminal.suspend(job=False)
+"""
 
 
 class Ended(Exception):
@@ -91,3 +114,41 @@ def test_ctrl_c_alone_is_still_a_signal(line: tuple[int, int]) -> None:
     assert modes & termios.ISIG
     assert [characters[key] for key in (termios.VINTR, termios.VQUIT, termios.VSUSP)] == [
         b'\x03', b'\0', b'\0']
+
+
+def start(*command: str, group: int = 0) -> subprocess.Popen[bytes]:
+    """Start a process in a process group, as a shell does; 0 is a new group."""
+    def prepare() -> None:
+        prepare_child()
+        os.setpgid(0, group)
+
+    return subprocess.Popen(command, stdin=subprocess.PIPE, cwd=ROOT, env=environment(),
+                            preexec_fn=prepare)
+
+
+def runs_to_its_end(process: subprocess.Popen[bytes]) -> bool:
+    """Wait until a process ends or stops, and return whether it ends without an error."""
+    _, status = os.waitpid(process.pid, os.WUNTRACED)
+    return os.WIFEXITED(status) and os.WEXITSTATUS(status) == 0
+
+
+def test_job_continued_before_its_last_process_stops_goes_on() -> None:
+    with (start(sys.executable, '-c', STOPS_ITS_JOB) as process,
+          start('sleep', str(PATIENCE), group=process.pid) as rest):
+        try:
+            os.waitpid(rest.pid, os.WUNTRACED)
+            os.killpg(process.pid, signal.SIGCONT)
+            assert process.stdin is not None
+            process.stdin.close()
+
+            assert runs_to_its_end(process)
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def test_process_continued_before_it_restores_the_terminal_goes_on() -> None:
+    with start(sys.executable, '-c', GETS_SIGNALS) as process:
+        try:
+            assert runs_to_its_end(process)
+        finally:
+            process.kill()

@@ -74,26 +74,43 @@ def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
 
 @contextlib.contextmanager
 def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
-    """Call ``on_stop()`` on SIGTSTP instead of stopping."""
-    before = signal.signal(signal.SIGTSTP, lambda *_: on_stop())
+    """Call ``on_stop()`` on SIGTSTP; the process stops only in :func:`suspend`."""
+    def handle(*_: object) -> None:
+        _request_stop()
+        on_stop()
+
+    before = signal.signal(signal.SIGTSTP, handle)
     try:
         yield
     finally:
         signal.signal(signal.SIGTSTP, before)
 
 
+def _request_stop() -> None:
+    """
+    Make this thread stop when it unblocks SIGTSTP, unless a SIGCONT comes before.
+
+    The kernel discards a pending SIGTSTP when a SIGCONT comes. A process that stops itself after
+    that SIGCONT waits for one that nobody sends.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTSTP])
+    # To this thread: another one would stop later, and this one would use the terminal meanwhile.
+    signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
+
+
 def suspend(job: bool) -> None:
     """
     Stop until a shell continues the process; without such a shell nothing happens.
 
+    Nothing happens either if the shell has already continued it.
+
     :param job: stop the whole job, including "ros2 run", as ctrl-z does.
     """
     if job:
-        before = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+        # Before the rest of the job stops: the shell can continue the job from then on.
+        _request_stop()
         os.kill(0, signal.SIGTSTP)
-        signal.signal(signal.SIGTSTP, before)
-    # To this thread: another one would stop later, and this one would use the terminal meanwhile.
-    signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTSTP])
 
 
 @contextlib.contextmanager
