@@ -30,9 +30,9 @@ test: check
 	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 unit: environment
-	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/illuminator test/simulator \
-		test/monitor test/conformance test/docs/test_links.py test/docs/test_tool_pages.py \
-		test/docs/test_design_page.py test/cli test/rededge
+	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/payload \
+		test/illuminator test/rededge test/simulator test/monitor test/conformance test/cli \
+		test/docs/test_links.py test/docs/test_tool_pages.py
 
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .

@@ -22,8 +22,10 @@ import graphlib
 from pathlib import Path
 import re
 import subprocess
+import sys
 
 import pytest
+from support.processes import environment
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = 'illuminator_ros'
@@ -118,6 +120,17 @@ def test_modules_outside_the_ros_folders_do_not_import_ros() -> None:
     assert {module: found for module in without_ros if (found := [
         *roots(imports(module)) & ROS,
         *(name for name in own_imports(module) if folder(name)[-1:] == ('ros',))])} == {}
+
+
+def test_tests_of_make_unit_are_collected_without_ros() -> None:
+    recipe = re.search(r'-m pytest (-p support\.no_ros.*(?:\n\t\t.*)*)',
+                       (ROOT / 'Makefile').read_text())
+    assert recipe is not None
+    arguments = recipe[1].replace('\\', '').split()
+    collected = subprocess.run(
+        [sys.executable, '-m', 'pytest', '--collect-only', '-q', *arguments], cwd=ROOT, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment())
+    assert collected.returncode == 0, collected.stdout[-2000:]
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:

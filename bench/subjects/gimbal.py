@@ -148,8 +148,8 @@ def measure(bench: Bench) -> Iterator[Row]:
             for name in TOPICS:
                 block(name, 10)
             if time.monotonic() > until:
-                raise RuntimeError(f'not all rates arrive: '
-                                   f'{ {name: len(values) for name, values in took.items()} }')
+                arrived = {name: len(values) for name, values in took.items()}
+                raise RuntimeError(f'not all rates arrive: {arrived}')
         for values in took.values():
             values.clear()
         size, rounds = bench.amount(BLOCK, 5), bench.amount(12, 1)

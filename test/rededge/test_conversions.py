@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 import math
 from typing import Any
 
@@ -218,8 +218,12 @@ def feedback(**changes: Any) -> CameraFeedback:
 
 
 def test_position_of_an_image_is_above_the_ellipsoid() -> None:
-    assert conversions.image_position(feedback(), 48.25) == Position(
-        0, 47.3977421, 8.5455939, 535.5)
+    position = conversions.image_position(feedback(), 48.25)
+    assert position is not None
+    assert replace(position, horizontal=0.0, vertical=0.0) == Position(
+        0, 47.3977421, 8.5455939, 535.5, 0.0, 0.0)
+    assert math.isnan(position.horizontal)
+    assert math.isnan(position.vertical)
     for nothing in ({'lat': 0, 'lng': 0}, {'lat': 900000001}, {'alt_msl': math.nan}):
         assert conversions.image_position(feedback(**nothing), 0.0) is None
 
