@@ -18,6 +18,8 @@ from collections.abc import Iterator
 import contextlib
 import fcntl
 import os
+from pathlib import Path
+import re
 import signal
 import subprocess
 import sys
@@ -27,7 +29,7 @@ import pytest
 from std_srvs.srv import SetBool
 from support.fork_server import prepare_child
 from support.light import MavResult, ON_OFF, ServedLight
-from support.processes import environment
+from support.processes import ended, environment, python
 from support.recording import Call
 from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until
@@ -95,3 +97,17 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
         light.fake.results[ON_OFF] = MavResult.FAILED
         pass_time_until(lambda: all(call.answered for call in calls), step=0.1)
         assert all(call.result().message for call in calls)
+
+
+def test_bridge_opens_no_port_in_shared_memory(own_ros: Ros, port: int) -> None:
+    # Other processes may keep writing to the old port of a bridge that was killed and restarted.
+    own_profile = dict.fromkeys(
+        ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'), '')
+
+    with ended(python('illuminator_ros.bridge', *bridge_arguments(port),
+                      env={'ROS_DOMAIN_ID': str(own_ros.domain), **own_profile})) as bridge:
+        bridge.wait_for('link open')
+
+        # Each reader of a port keeps the port's lock file open.
+        opened = [os.readlink(link) for link in Path(f'/proc/{bridge.pid}/fd').iterdir()]
+        assert not [name for name in opened if re.match('/dev/shm/fast.*_port.*_el', name)]
