@@ -141,7 +141,8 @@ class ExtendedCameraFeedback(rededge.CameraFeedback):
     base_size = rededge.CameraFeedback.codec.size
 
 
-class Injected(NamedTuple, Generic[M]):
+@dataclass(frozen=True, slots=True)
+class Injected(Generic[M]):
     """A message of the host, and when it was received, s."""
 
     message: M
@@ -415,7 +416,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         image = Image(**{
             **dict.fromkeys(COLUMNS),
             **(_position(position.message) if position else _own_position(self.own_gps)),
-            **_orientation(attitude and attitude.message, mount and mount.message),
+            **_orientation(attitude.message if attitude else None,
+                           mount.message if mount else None),
             'camera': self._component, 'image': self._count, 'shot': shot.name.lower(),
             'trigger': trigger, 'img_idx': self._index if trigger == 'mavlink' else None,
             'time_utc_s': time_utc, 'time_source': time_source,

@@ -118,7 +118,7 @@ def test_directory_for_log_files_that_cannot_be_written_is_named(module: str) ->
     assert 'log files cannot be written to /proc/none: ' in program.log
 
 
-@pytest.mark.parametrize('descriptors', [8, 14, 20, 22])
+@pytest.mark.parametrize('descriptors', [8, 14, 18, 20])
 def test_too_few_descriptors_end_the_start_without_a_traceback(descriptors: int) -> None:
     bridge = Program(
         'sh', '-c', f'ulimit -n {descriptors}; exec {sys.executable} -m {BRIDGE}')
