@@ -64,7 +64,8 @@ def test_camera_answers_in_mavlink_1_only_and_writes_each_image_at_once_re_1_re_
 def test_console_and_view_show_the_images() -> None:
     with ended(python('illuminator_ros.simulator', '--payload', 'rededge', 'pty://',
                       '--interval', '0.2', '--own-gps', 'none')) as simulator:
-        simulator.wait_for('255/100          2 images  time none  position none')
+        # A line for each number that the view meets: a busy machine leaves some out.
+        simulator.wait_for(' images  time none  position none', count=3)
 
 
 def test_file_that_cannot_be_written_is_named_at_the_start(tmp_path: Path) -> None:
