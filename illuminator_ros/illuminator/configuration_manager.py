@@ -81,14 +81,14 @@ class Pending:
 
     :param attempts: how often the light has accepted them and shown others.
     :param due: when they are sent next, s.
-    :param was_tried: whether a command with them has ended, or cannot be sent.
+    :param has_ended: whether a command with them has ended, or none can be sent.
     """
 
     values: Changes
     origin: Origin
     due: float
     attempts: int = 0
-    was_tried: bool = False
+    has_ended: bool = False
 
 
 @dataclass
@@ -158,15 +158,15 @@ class ConfigurationManager:
         return self._queue.is_confirming
 
     @property
-    def follows_restart(self) -> bool:
-        """Whether a light that has restarted would be sent a configuration."""
+    def may_send_after_restart(self) -> bool:
+        """Whether a light that has restarted may be sent a configuration."""
         return self._is_limited or self._restore and self.confirmed is not None
 
     @property
-    def precedes_on(self) -> bool:
+    def must_send_before_on(self) -> bool:
         """Whether the light must be sent a configuration before it is switched on."""
         pending = self._pending
-        return (pending is not None and not pending.was_tried
+        return (pending is not None and not pending.has_ended
                 and pending.origin is not Origin.OTHER_SENDER)
 
     @property
@@ -220,8 +220,10 @@ class ConfigurationManager:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._want({**self._wanted, **values}, Origin.OVERRIDE,
-                   now if self.confirmed else now + STATUS_TIMEOUT)
+        self._want({**self._wanted, **values}, Origin.OVERRIDE, self._first_due(now))
+
+    def _first_due(self, now: float) -> float:
+        return now if self.confirmed else now + STATUS_TIMEOUT
 
     def _want(self, values: Changes, origin: Origin, due: float) -> None:
         """Have values sent; those that already wait keep their origin."""
@@ -240,6 +242,7 @@ class ConfigurationManager:
         """End all changes, except the values that must be sent in any case."""
         self._setpoint = None
         self._queue.cancel(message, now)
+        self.retry_pending(now)
 
     def _drop_pending(self, names: Container[str]) -> None:
         """Note that fields have another value by now, or must not be sent."""
@@ -343,11 +346,11 @@ class ConfigurationManager:
         # The light has forgotten that it was brought within the limits.
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
 
-    def connected(self, now: float) -> None:
-        """Note that the light is heard again: what could not be sent is due."""
+    def retry_pending(self, now: float) -> None:
+        """Make values that were not sent due: the light is heard, or a command was cancelled."""
         pending = self._pending
         if pending and pending.due < math.inf:
-            self._pending = replace(pending, due=now, was_tried=False)
+            pending.due, pending.has_ended = self._first_due(now), False
 
     def lost(self, message: str, now: float) -> None:
         """Note that the light is lost; a setpoint must not take effect when it is heard again."""
@@ -535,7 +538,7 @@ class ConfigurationManager:
         except InvalidValue as error:
             # They still wait for a status; but the user should know.
             pending.due = math.inf
-            pending.was_tried = True
+            pending.has_ended = True
             self.discrepancy = f'{", ".join(pending.values)} not sent: {error}'
             self._restored(False, self.discrepancy)
             return
@@ -551,7 +554,7 @@ class ConfigurationManager:
             return
 
         def finished(result: Result, now: float) -> None:
-            pending.was_tried = True
+            pending.has_ended = True
             pending.attempts += result.contradicted
             if (result.success or result.permanent
                     or pending.attempts >= MAX_CONTRADICTIONS

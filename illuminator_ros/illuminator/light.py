@@ -139,7 +139,7 @@ class Light:
         self._longest_silence = min(STATUS_TIMEOUT, settings.heartbeat_timeout / 1.2)
         self._was_lost = False
         # Until when an ON waits, s, since the light may have restarted.
-        self._check_until = -math.inf
+        self._restart_check_until = -math.inf
         self._enabled: bool | None = None
         self._last_switch: tuple[bool, float] = False, -math.inf
         # Until when a switch that was not confirmed may still take effect, s.
@@ -167,10 +167,10 @@ class Light:
         if not self.connected:
             self.connected = True
             self.lost_at = math.inf
-            self._check_until = now + RESTART_CHECK_TIME
-            self._configuration.connected(now)
-            # It was sent to a silent light, and its next try may be half a second away.
-            self._target.end_status_request(now)
+            self._restart_check_until = now + RESTART_CHECK_TIME
+            self._configuration.retry_pending(now)
+            # A request that was sent to the silent light may be resent only half a second later.
+            self._target.cancel_status_request(now)
             self._set_up(now)
             self._emit(events.LightConnected(self.address))
 
@@ -202,8 +202,8 @@ class Light:
             self._was_lost = was_lost
             if self._tracker.is_suspecting:
                 self._status_due = min(self._status_due, now + RESTART_PROOF_TIME)
-                if self._check_until == -math.inf:
-                    self._check_until = now + RESTART_CHECK_TIME
+                if self._restart_check_until == -math.inf:
+                    self._restart_check_until = now + RESTART_CHECK_TIME
             return
         if not is_first:
             self._note(status, now)
@@ -216,7 +216,7 @@ class Light:
             self._is_shared = report.shared_address
             self._emit(events.AddressShared(self.address, self._is_shared))
         self._take_report(report, now, restarted=restarted)
-        self._check_until = -math.inf
+        self._restart_check_until = -math.inf
         if is_awaited:
             self._publish(status, now)
 
@@ -485,20 +485,22 @@ class Light:
         if on:
             self._switching.submit(Request(
                 self._target, prepare, finished, now=now, limit=limit,
-                held_until=self._on_held_until), now)
+                earliest_start=self._earliest_on), now)
         else:
             self._switching.overtake(Request(
                 self._target, prepare, finished, now=now, limit=limit, overtakes=True), now)
 
-    def _on_held_until(self) -> float:
+    def _earliest_on(self) -> float:
         """
-        Return until when an ON must wait, s; infinity while a configuration is sent before it.
+        Return the earliest time for an ON, s; infinity until a configuration was sent.
 
         A light that has restarted has the brightness of its firmware until it is configured.
         """
-        if self._configuration.precedes_on:
+        if self._configuration.must_send_before_on:
             return math.inf
-        return self._check_until if self._configuration.follows_restart else -math.inf
+        if self._configuration.may_send_after_restart:
+            return self._restart_check_until
+        return -math.inf
 
     def configure(
         self, changes: Changes, now: float, done: Done, *, source: str = DEFAULT,

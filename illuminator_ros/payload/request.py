@@ -82,7 +82,6 @@ class Target:
         self._commands = commands
         self._ended = ended
         self._status_id = status_id
-        self._status_requested = False
         self._status_request: command_sender.Command | None = None
         self._delays: list[float] = []
 
@@ -90,39 +89,44 @@ class Target:
         self, command: int, params: tuple[float, ...], now: float,
         done: CommandDone = lambda result, now: None, *, limit: float = math.inf,
         overtake: bool = False, to: Address | None = None,
-    ) -> command_sender.Command:
+    ) -> None:
         """Send a command, to the device or to another component; see :class:`CommandSender`."""
+        self._start(command_sender.Command(to or self.address, command, params), now, done,
+                    limit=limit, overtake=overtake)
+
+    def _start(
+        self, command: command_sender.Command, now: float, done: CommandDone, *,
+        limit: float = math.inf, overtake: bool = False,
+    ) -> None:
         def ended(result: command_sender.CommandResult, now: float) -> None:
             done(result, now)
             self._ended(result, now)
 
-        started = command_sender.Command(to or self.address, command, params)
-        self._commands.start(started, now, ended, limit=limit, overtake=overtake)
-        return started
+        self._commands.start(command, now, ended, limit=limit, overtake=overtake)
 
     def request_message(
         self, message_id: int, now: float, done: CommandDone = lambda result, now: None, *,
         to: Address | None = None,
-    ) -> command_sender.Command:
+    ) -> None:
         """Request one message of the device or of another component."""
-        return self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
+        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
 
     def request_status(self, now: float, done: CommandDone | None = None) -> None:
         """Request the status; without ``done`` only where no such request is under way."""
         if done is not None:
             self.request_message(self._status_id, now, done, to=self._status_sender)
-        elif not self._status_requested:
-            self._status_requested = True
-            self._status_request = self.request_message(
-                self._status_id, now, self._status_answered, to=self._status_sender)
+        elif self._status_request is None:
+            self._status_request = command_sender.Command(
+                self._status_sender, MavCmd.REQUEST_MESSAGE, (float(self._status_id),))
+            self._start(self._status_request, now, self._status_answered)
 
-    def end_status_request(self, now: float) -> None:
-        """End a request for the status that is under way, so that a new one is sent at once."""
+    def cancel_status_request(self, now: float) -> None:
+        """Cancel a request for the status, so that a new one is sent at once."""
         if self._status_request is not None:
             self._commands.cancel(self._status_request, now)
 
     def _status_answered(self, result: command_sender.CommandResult, now: float) -> None:
-        self._status_requested = False
+        self._status_request = None
 
     def shortest_round_trip(self, now: float) -> float:
         """See :meth:`~..mavlink.command_sender.RttEstimator.shortest`."""
@@ -257,20 +261,21 @@ class Request(Generic[S]):
     :param limit: the time by which it ends, s.
     :param is_stream: whether it is one of a stream of setpoints, which a newer one replaces.
     :param overtakes: whether its command is sent beside one of its kind that is in progress.
-    :param held_until: returns until when it must not be sent, s.
+    :param earliest_start: returns the time before which it must not be sent, s; called at each
+        poll.
     """
 
     def __init__(
         self, target: Target, prepare: Callable[[float], Change[S]],
         done: Callable[[Result, Change[S] | None, S | None, float], None], *, now: float,
         limit: float, is_stream: bool = False, overtakes: bool = False,
-        held_until: Callable[[], float] = lambda: -math.inf,
+        earliest_start: Callable[[], float] = lambda: -math.inf,
     ) -> None:
         self.phase = Phase.WAITING
         self.limit = limit
         self.is_stream = is_stream
         self.overtakes = overtakes
-        self.held_until = held_until
+        self.earliest_start = earliest_start
         self.change: Change[S] | None = None
         self._target = target
         self._prepare = prepare
@@ -518,7 +523,7 @@ class RequestQueue(Generic[S]):
         return len(self._requests)
 
     def submit(self, request: Request[S], now: float) -> None:
-        """Send a request, or put it behind the others."""
+        """Send a request, or let it wait: behind the others, or until its earliest start."""
         if len(self._requests) >= MAX_WAITING:
             request.fail(f'{MAX_WAITING} requests are waiting for {self._target.kind} '
                          f'{self._target.address} already', now)
@@ -567,7 +572,7 @@ class RequestQueue(Generic[S]):
             first = self._requests[0]
             if first.phase is Phase.FINISHED:
                 del self._requests[0]
-            elif first.phase is Phase.WAITING and now >= first.held_until():
+            elif first.phase is Phase.WAITING and now >= first.earliest_start():
                 first.start(self._status, now)
             else:
                 break
@@ -581,7 +586,7 @@ class RequestQueue(Generic[S]):
             return -math.inf
         waiting = self._first_waiting
         limit = waiting.limit if waiting else math.inf
-        return min(first.held_until() if waiting is first else first.next_deadline(), limit)
+        return min(first.earliest_start() if waiting is first else first.next_deadline(), limit)
 
     @property
     def _first_waiting(self) -> Request[S] | None:

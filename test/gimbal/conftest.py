@@ -14,7 +14,7 @@
 
 """Fixtures of the tests of nodes, where ROS is installed."""
 
-from importlib.util import find_spec
+import contextlib
 
-if find_spec('rclpy'):
+with contextlib.suppress(ModuleNotFoundError):
     from support.fixtures import domain, own_ros, private_home, ros  # noqa: F401

@@ -52,6 +52,7 @@ class FakeLight(Endpoint):
     :ivar targeted: whether acknowledgements carry their target.
     :ivar boot: when it was started; None if its uptime is always 0.
     :ivar fields: what it reports.
+    :ivar shone: the brightness at each ON, %.
     """
 
     messages = (mav.CommandLong, mav.CommandInt)
@@ -75,6 +76,7 @@ class FakeLight(Endpoint):
         self.identity = Identity('maker', 'torch', '1.2', '3', 'T-1')
         self.fields = {**DEFAULT_STATUS, **fields}
         self.silent = False
+        self.shone: list[float] = []
         self._status_due = 0.0
         self._to_apply: list[tuple[float, Any]] = []
 
@@ -125,6 +127,8 @@ class FakeLight(Endpoint):
     def _apply(self, message: Any, now: float) -> None:
         if message.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
             self.fields['enable'] = int(message.param1)
+            if message.param1:
+                self.shone.append(self.fields['brightness'])
         elif message.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
             self.fields |= {
                 'mode': int(message.param1), 'brightness': message.param2,

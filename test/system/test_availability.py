@@ -99,7 +99,7 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
         assert all(call.result().message for call in calls)
 
 
-def test_bridge_opens_no_port_in_shared_memory(own_ros: Ros, port: int) -> None:
+def test_bridge_receives_through_no_port_in_shared_memory(own_ros: Ros, port: int) -> None:
     # Other processes may keep writing to the old port of a bridge that was killed and restarted.
     own_profile = dict.fromkeys(
         ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'), '')

@@ -90,8 +90,8 @@ def _request_stop() -> None:
     """
     Make this thread stop when it unblocks SIGTSTP, unless a SIGCONT comes before.
 
-    The kernel discards a pending SIGTSTP when a SIGCONT comes. A process that stops itself after
-    that SIGCONT waits for one that nobody sends.
+    The kernel discards a pending SIGTSTP when a SIGCONT comes. If the process stopped itself after
+    that SIGCONT, the shell would not send another one.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTSTP])
     # To this thread: another one would stop later, and this one would use the terminal meanwhile.

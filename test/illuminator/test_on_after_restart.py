@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An ON waits until a light that may have restarted has its configuration."""
+"""The bridge delays an ON until a light that may have restarted has its configuration."""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.illuminator.light import Light, RESTART_CHECK_TIME, Settings
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
+from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight, status_message
@@ -33,19 +35,6 @@ CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
 LIMITED = Settings(limits=SafetyLimits(max_brightness=60.0))
 COMPLETE = {'mode': 'internal_control', 'brightness': 30, 'strobe_period': 0,
             'strobe_duty_cycle': 0}
-
-
-class ShiningLight(FakeLight):
-    """A light whose firmware starts at 100 %; ``shone`` has the brightness at each ON, %."""
-
-    def __init__(self, **how: Any) -> None:
-        super().__init__(**how)
-        self.shone: list[float] = []
-
-    def _apply(self, message: Any, now: float) -> None:
-        super()._apply(message, now)
-        if message.command == ON_OFF and message.param1:
-            self.shone.append(self.fields['brightness'])
 
 
 def agreed(light: FakeLight, settings: Settings | None = None, **how: Any) -> Pair:
@@ -91,7 +80,7 @@ def test_a_restarted_light_is_switched_on_after_it_has_its_configuration(
     settings: Settings, brightness: float, has_clock: bool, seconds_lost: float,
     first: Callable[[FakeLight, float], None],
 ) -> None:
-    light = ShiningLight()
+    light = FakeLight()
     if not has_clock:
         light.boot = None
     pair = agreed(light, settings)
@@ -113,7 +102,7 @@ def test_a_restarted_light_is_switched_on_after_it_has_its_configuration(
 def test_a_restarted_light_without_statuses_on_request_is_switched_on_after_its_configuration(
     seconds_to_status: float,
 ) -> None:
-    light = ShiningLight(stream=1.2)
+    light = FakeLight(stream=1.2)
     light.boot = START
     light.answers.clear()
     pair = agreed(light)
@@ -126,7 +115,7 @@ def test_a_restarted_light_without_statuses_on_request_is_switched_on_after_its_
 
 
 def test_a_light_that_restarts_without_a_loss_is_switched_on_when_its_status_is_proved() -> None:
-    light = ShiningLight()
+    light = FakeLight()
     light.boot = START
     pair = agreed(light)
     light.restart(pair.now)
@@ -137,13 +126,19 @@ def test_a_light_that_restarts_without_a_loss_is_switched_on_when_its_status_is_
     assert light.shone == [30.0]
 
 
-@pytest.mark.parametrize(('settings', 'overrides'), [
-    (Settings(), {'brightness': 30}), (Settings(), COMPLETE), (LIMITED, {})])
-@pytest.mark.parametrize('sends_status', [True, False])
+@pytest.mark.parametrize(('settings', 'overrides', 'sends_status', 'seconds', 'brightness'), [
+    (Settings(), {'brightness': 30}, True, 0.0, 30.0),
+    (Settings(), COMPLETE, True, 0.0, 30.0),
+    (LIMITED, {}, True, 0.0, 60.0),
+    # An incomplete configuration cannot be sent to a light that does not report it.
+    (Settings(), {'brightness': 30}, False, 3.0, 100.0),
+    (Settings(), COMPLETE, False, 3.78, 30.0),
+    (LIMITED, {}, False, RESTART_CHECK_TIME, 100.0)])
 def test_a_found_light_is_switched_on_after_it_has_its_overrides_and_limits(
-    sends_status: bool, settings: Settings, overrides: dict[str, Any],
+    settings: Settings, overrides: dict[str, Any], sends_status: bool, seconds: float,
+    brightness: float,
 ) -> None:
-    light = ShiningLight()
+    light = FakeLight()
     if not sends_status:
         hide_status(light)
 
@@ -154,13 +149,13 @@ def test_a_found_light_is_switched_on_after_it_has_its_overrides_and_limits(
     pair = Pair(light, settings=settings, on_light=override)
 
     assert pair.wait_for(on_at_connection(pair)).success
-    # A configuration that lacks a value cannot be sent to a light that does not report it.
-    reachable = sends_status or overrides is COMPLETE
-    assert light.shone == [(30.0 if overrides else 60.0) if reachable else 100.0]
+    assert light.shone == [brightness]
+    (at, _), = pair.commands_at(ON_OFF)
+    assert at == pytest.approx(START + seconds, abs=0.02)
 
 
 def test_a_light_that_runs_on_is_switched_on_with_its_first_status() -> None:
-    light = ShiningLight()
+    light = FakeLight()
     pair = agreed(light)
     lose(pair, light)
 
@@ -195,7 +190,7 @@ def test_an_on_does_not_wait_until_a_change_by_another_sender_is_undone() -> Non
 
 
 def test_an_off_is_sent_at_once_and_cancels_the_on_that_waits() -> None:
-    light = ShiningLight()
+    light = FakeLight()
     pair = agreed(light)
     lose(pair, light)
     light.restart(pair.now)
@@ -211,7 +206,7 @@ def test_an_off_is_sent_at_once_and_cancels_the_on_that_waits() -> None:
 
 
 def test_an_on_that_waits_fails_at_once_when_the_light_is_lost() -> None:
-    light = ShiningLight()
+    light = FakeLight()
     pair = agreed(light)
     lose(pair, light)
     hide_status(light)
@@ -229,7 +224,7 @@ def test_an_on_that_waits_fails_at_once_when_the_light_is_lost() -> None:
 def test_a_light_that_cannot_be_configured_is_switched_on_after_one_attempt(
     result: int | None,
 ) -> None:
-    light = ShiningLight()
+    light = FakeLight()
     pair = agreed(light)
     lose(pair, light)
     light.results[CONFIGURE] = result
@@ -242,9 +237,8 @@ def test_a_light_that_cannot_be_configured_is_switched_on_after_one_attempt(
     assert answer.seconds < 1.1
 
 
-def test_a_light_that_shows_no_status_any_more_is_sent_the_on_after_the_restart_check_time() -> (
-        None):
-    light = ShiningLight()
+def test_an_on_is_sent_after_the_restart_check_time_if_no_status_comes() -> None:
+    light = FakeLight()
     pair = agreed(light)
     lose(pair, light)
     hide_status(light)
@@ -256,7 +250,7 @@ def test_a_light_that_shows_no_status_any_more_is_sent_the_on_after_the_restart_
 
 
 def test_late_statuses_hold_an_on_no_longer_than_the_restart_check_time() -> None:
-    light = ShiningLight()
+    light = FakeLight()
     light.boot = START
     pair = agreed(light)
     hide_status(light)
@@ -277,7 +271,7 @@ def test_late_statuses_hold_an_on_no_longer_than_the_restart_check_time() -> Non
 
 
 def test_a_light_that_is_lost_before_it_has_its_configuration_is_configured_before_an_on() -> None:
-    light = ShiningLight()
+    light = FakeLight()
     pair = agreed(light)
     lose(pair, light)
     light.results[CONFIGURE] = None
@@ -308,7 +302,7 @@ def test_overrides_that_cannot_be_sent_are_reported_once_though_the_light_is_los
 
 @pytest.mark.parametrize('seed', range(20))
 def test_a_restarted_light_is_switched_on_once_configured_over_a_lossy_line(seed: int) -> None:
-    light = ShiningLight()
+    light = FakeLight()
     pair = agreed(light, seed=seed)
     lose(pair, light)
     light.restart(pair.now)
@@ -319,3 +313,37 @@ def test_a_restarted_light_is_switched_on_once_configured_over_a_lossy_line(seed
 
     assert pair.wait_for(answer).success
     assert set(light.shone) == {30.0}
+
+
+def test_an_on_of_the_next_holder_waits_for_the_configuration_that_the_last_one_interrupted(
+) -> None:
+    light = FakeLight()
+    pair = agreed(light, Settings(sources=SourceSettings(('safety', 'default'))))
+    lose(pair, light)
+    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    light.restart(pair.now)
+    restarted_at = pair.now
+    pair.run_until(lambda: pair.commands(CONFIGURE, since=restarted_at))
+    answer = Answer(pair.now)
+
+    pair.light.enable(True, pair.now, answer, source='safety')
+
+    assert pair.wait_for(answer).success
+    assert light.shone == [30.0]
+
+
+def test_overrides_of_a_light_that_is_lost_before_its_first_status_are_sent_before_an_on() -> None:
+    light = FakeLight()
+    light.answers.clear()
+    light.delay_status(START + 1.0)
+    pair = Pair(light, on_light=lambda light: light.set_desired({'brightness': 30}, START))
+    pair.run_until(lambda: pair.controller.lights)
+    pair.close()
+    light.answers.add(STATUS_ID)
+    pair.open()
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert light.shone == [30.0]
+    assert [success for success, _ in pair.recorder.restorations] == [True]
