@@ -160,7 +160,8 @@ class ConfigurationManager:
     @property
     def may_send_after_restart(self) -> bool:
         """Whether a light that has restarted may be sent a configuration."""
-        return self._is_limited or self._restore and self.confirmed is not None
+        return (self._is_limited or self._pending is not None
+                or self._restore and self.confirmed is not None)
 
     @property
     def must_send_before_on(self) -> bool:
@@ -323,6 +324,10 @@ class ConfigurationManager:
                     self._sent.accepted = result.success or result.contradicted
                 if result.success:
                     self._drop_pending(values)
+                    if status and self._pending:
+                        # The command carries all fields, and the light shows them.
+                        self._drop_pending([name for name, value in self._pending.values.items()
+                                            if value == getattr(change.configuration, name)])
                     self._accept(change.configuration, status)
                 elif result.contradicted:
                     self._unapplied = change.configuration
@@ -343,6 +348,9 @@ class ConfigurationManager:
                       if name != 'mode' or confirmed.mode}
             # Overrides that have not been sent yet replace the values from before.
             self._pending = Pending({**values, **self._wanted}, Origin.RESTART, now)
+        elif self._pending and self._pending.origin in _SENT_ONCE:
+            # The light has other values now.
+            self._pending = None
         # The light has forgotten that it was brought within the limits.
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
 
@@ -353,8 +361,10 @@ class ConfigurationManager:
             pending.due, pending.has_ended = self._first_due(now), False
 
     def lost(self, message: str, now: float) -> None:
-        """Note that the light is lost; a setpoint must not take effect when it is heard again."""
-        self._queue.cancel(message, now, only_waiting=True)
+        """Note that the light is lost: no request must take effect when it is heard again."""
+        self._queue.cancel(message, now)
+        # It may restart before, which cannot be noticed where several lights share the address.
+        self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
         if self._setpoint is not None:
             self._setpoint = None
             self._setpoint_failed(message)
@@ -372,11 +382,12 @@ class ConfigurationManager:
         self._shared_address = report.shared_address
         was_changing = self.is_changing
         self._queue.take(report, now)
-        if was_changing or self.confirmed is None and not status.complete:
+        if self.confirmed is None and (was_changing or not status.complete):
             return
         reported = status.configuration(self.confirmed or NOTHING)
-        self._take_configuration(
-            report, reported, now, can_follow=can_follow, switched_at=switched_at)
+        if not was_changing:
+            self._take_configuration(
+                report, reported, now, can_follow=can_follow, switched_at=switched_at)
         if self._is_limited:
             self._keep_limits(reported, now)
 
@@ -391,7 +402,7 @@ class ConfigurationManager:
         if self.confirmed is None:
             self._adopt(reported, events.Cause.FIRST_STATUS, now)
             if self._pending:
-                self._pending.due = min(self._pending.due, now)
+                self._pending.due, self._pending.has_ended = min(self._pending.due, now), False
         elif self._pending and self._pending.origin is not Origin.OVERRIDE:
             wanted = replace(self.confirmed, **self._pending.values)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
@@ -472,11 +483,12 @@ class ConfigurationManager:
         if exceeded != self.limit_exceeded:
             self.limit_exceeded = exceeded
             self._emit(exceeded)
-        if exceeded.excess and self._pending is None and (
-                due := self._limiting.take(now)) is not None:
+        # Values that another sender has changed may be put back only later.
+        is_free = self._pending is None or self._pending.origin is Origin.OTHER_SENDER
+        if exceeded.excess and is_free and (due := self._limiting.take(now)) is not None:
             limited = self._safety.clipped(reported, self._limits)
-            self._want({name: getattr(limited, name) for name in reported.differences(limited)},
-                       Origin.LIMIT, due)
+            values = {name: getattr(limited, name) for name in reported.differences(limited)}
+            self._pending = Pending({**values, **self._wanted}, Origin.LIMIT, due)
 
     def _is_own(
         self, name: str, reported: Configuration, switched_at: float, now: float,

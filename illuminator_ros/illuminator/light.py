@@ -185,7 +185,7 @@ class Light:
         if not self.connected:
             self.heard(now)
         was_lost, self._was_lost = self._was_lost, False
-        uptime = self._tracker.take_uptime(status, now)
+        uptime = self._tracker.take_uptime(status, now, was_lost=was_lost)
         # A request that waits for the status is answered before the status is published. Otherwise
         # it is published first: the comparison with earlier ones would delay it by a quarter.
         is_confirming = self._switching.is_confirming or self._configuration.is_confirming
@@ -202,7 +202,7 @@ class Light:
             self._was_lost = was_lost
             if self._tracker.is_suspecting:
                 self._status_due = min(self._status_due, now + RESTART_PROOF_TIME)
-                if self._restart_check_until == -math.inf:
+                if now > self._restart_check_until:
                     self._restart_check_until = now + RESTART_CHECK_TIME
             return
         if not is_first:
@@ -295,6 +295,12 @@ class Light:
             self._tracker.lost()
             self._emit(events.LightLost(self.address, reason))
             message = self.unreachable(now)
+            # Another try may reach the light after a restart. An OFF may reach it at any time.
+            self._commands.end_all(
+                now, CommandStatus.NO_ANSWER, self.address, lambda command: (
+                    command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE
+                    or command.command == MavCmd.ILLUMINATOR_ON_OFF
+                    and command.params == SWITCHES[True].params))
             self._switching.cancel(message, now, only_waiting=True)
             self._configuration.lost(message, now)
 
@@ -634,9 +640,11 @@ class Light:
     def _automatic_due(self) -> float:
         if self._automatic is None or not self.connected:
             return math.inf
-        # Off overtakes a request; on waits for it.
-        is_free = not self._automatic.on or self._switching.current is None
-        return self._automatic.due if is_free else math.inf
+        # Off overtakes a request; on waits for it. It does not wait in the queue, since a restart
+        # of the light ends it.
+        if not self._automatic.on:
+            return self._automatic.due
+        return math.inf if self._switching else max(self._automatic.due, self._earliest_on())
 
     def _send_automatic(self, switch: _AutomaticSwitch, now: float) -> None:
         def done(result: Result, now: float) -> None:

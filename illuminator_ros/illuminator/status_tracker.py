@@ -75,30 +75,41 @@ class UptimeClock:
 
     def __init__(self) -> None:
         self.is_suspecting = False
+        self._has_clock = False
         self._last: tuple[int, float] | None = None
         self._suspect: tuple[int, float] | None = None
 
-    def take(self, uptime_ms: int, now: float) -> Uptime:
-        """Return the meaning of an uptime; times are s."""
+    def take(self, uptime_ms: int, now: float, *, was_lost: bool = False) -> Uptime:
+        """
+        Return the meaning of an uptime; times are s.
+
+        :param was_lost: whether the light was lost since the newest status.
+        """
         meaning = Uptime.RUNNING
         if self._last is not None:
-            meaning = self._compare(uptime_ms, now, *self._last)
+            self._has_clock |= uptime_ms != self._last[0]
+            meaning = self._compare(uptime_ms, now, *self._last, was_lost)
         if meaning is not Uptime.LATE:
             self._last = uptime_ms, now
             self._suspect = None
             self.is_suspecting = False
         return meaning
 
-    def _compare(self, uptime_ms: int, now: float, last_ms: int, last_at: float) -> Uptime:
+    def _compare(
+        self, uptime_ms: int, now: float, last_ms: int, last_at: float, was_lost: bool,
+    ) -> Uptime:
         elapsed = now - last_at
         if uptime_ms == last_ms:
             # The same status twice or within a millisecond, or a light that has no clock.
-            return Uptime.RUNNING if elapsed < NO_CLOCK_TIME else Uptime.NO_CLOCK
+            is_same = elapsed < NO_CLOCK_TIME and (self._has_clock or not was_lost)
+            return Uptime.RUNNING if is_same else Uptime.NO_CLOCK
         ahead_ms = uptime_difference(uptime_ms, last_ms)
         has_progressed = ahead_ms >= 0
         lag = elapsed - ahead_ms / 1000
         may_have_restarted = uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
-        if has_progressed and not (may_have_restarted and lag > MAX_LAG + DRIFT * elapsed):
+        # A light that was lost may have restarted long before it is heard again.
+        allowed = BOOT_SLACK if was_lost else MAX_LAG + DRIFT * elapsed
+        if has_progressed and not (may_have_restarted and lag > allowed):
             return Uptime.RUNNING
         if not has_progressed and may_have_restarted and lag > MAX_DELAY:
             return Uptime.RESTARTED
@@ -371,9 +382,13 @@ class StatusTracker:
         """Whether another status is needed soon to tell whether the light has restarted."""
         return self._clock.is_suspecting
 
-    def take_uptime(self, status: Status, now: float) -> Uptime:
-        """Return the meaning of the uptime of a status, which must be passed to :meth:`take`."""
-        return self._clock.take(status.uptime_ms, now)
+    def take_uptime(self, status: Status, now: float, *, was_lost: bool) -> Uptime:
+        """
+        Return the meaning of the uptime of a status, which must be passed to :meth:`take`.
+
+        :param was_lost: whether the light was lost since the newest status.
+        """
+        return self._clock.take(status.uptime_ms, now, was_lost=was_lost)
 
     def take(
         self, status: Status, uptime: Uptime, now: float, *, was_lost: bool, commanded: bool,

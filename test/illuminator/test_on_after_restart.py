@@ -30,6 +30,7 @@ from support.back_to_back import Pair, START
 from support.fake_light import FakeLight, status_message
 from support.faulty_wire import Faults
 from support.records import Answer
+from support.shared_address import SharedAddress
 
 CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
 LIMITED = Settings(limits=SafetyLimits(max_brightness=60.0))
@@ -347,3 +348,189 @@ def test_overrides_of_a_light_that_is_lost_before_its_first_status_are_sent_befo
     assert pair.wait_for(answer).success
     assert light.shone == [30.0]
     assert [success for success, _ in pair.recorder.restorations] == [True]
+
+
+def test_an_on_is_not_resent_to_a_light_that_was_lost() -> None:
+    light = FakeLight()
+    light.boot = START
+    pair = agreed(light)
+    light.silent = True
+    pair.run(2.4)
+    answer = pair.ask_enable(True)
+    pair.run_until(lambda: not pair.light.connected)
+    pair.run(0.45)
+    light.restart(pair.now)
+    light.silent = False
+    pair.run(5.0)
+
+    assert light.shone == []
+    assert answer.result.message.startswith('no acknowledgement (3 tries')
+
+
+def test_a_restoration_from_before_a_loss_does_not_end_the_one_after_it() -> None:
+    light = FakeLight()
+    pair = agreed(light, replace(LIMITED, restore_configuration=False))
+    lose(pair, light)
+    light.restart(pair.now)
+    light.applies = False
+    pair.run_until(lambda: pair.light.restarts)
+    pair.run(0.05)
+    pair.close()
+    light.applies = True
+    pair.run(0.1)
+    light.restart(pair.now)
+    pair.open()
+
+    answer = on_at_connection(pair)
+
+    assert pair.wait_for(answer).success
+    assert light.shone == [60.0]
+
+
+def test_an_on_that_undoes_an_off_and_waits_is_not_sent_to_a_light_that_has_restarted() -> None:
+    light = FakeLight()
+    pair = agreed(light, Settings(reassert=True))
+    assert pair.enable(True).success
+    pair.run(3.0)
+    light.fields['enable'] = 0
+    light.results[ON_OFF] = None
+    pair.run(1.1)
+    assert pair.commands(ON_OFF, since=pair.now - 1.1)
+    lose(pair, light)
+    light.results.clear()
+    light.shone.clear()
+    light.restart(pair.now)
+    heartbeat_first(light, pair.now)
+    pair.run(20.0)
+
+    assert pair.light.restarts == 1
+    assert light.shone == []
+
+
+@pytest.mark.parametrize('first', [MavResult.TEMPORARILY_REJECTED, None])
+def test_an_on_waits_for_the_limits_though_a_parameter_is_being_set(first: int | None) -> None:
+    light = FakeLight()
+    pair = agreed(light, replace(LIMITED, restore_configuration=False))
+    lose(pair, light)
+    light.results[CONFIGURE] = [first, first, MavResult.ACCEPTED]
+    light.restart(pair.now)
+    heartbeat_first(light, pair.now)
+    pair.run_until(lambda: pair.light.connected)
+    pair.ask_configure(brightness=20)
+
+    assert pair.wait_for(pair.ask_enable(True)).success
+    assert light.shone == [20.0]
+
+
+def test_an_on_waits_for_the_limits_though_a_change_was_to_be_undone() -> None:
+    light = FakeLight()
+    pair = agreed(light, replace(LIMITED, restore_configuration=False, reassert=True))
+    for _ in range(2):
+        light.fields['brightness'] = 50.0
+        pair.run(1.1)
+    light.results[CONFIGURE] = [MavResult.TEMPORARILY_REJECTED, MavResult.ACCEPTED]
+    pair.close()
+    light.restart(pair.now)
+    pair.open()
+
+    assert pair.wait_for(on_at_connection(pair)).success
+    assert light.shone == [30.0]
+
+
+@pytest.mark.parametrize('seconds_lost', [0.3, 1.5])
+def test_a_light_without_a_clock_may_have_restarted_in_a_short_loss(seconds_lost: float) -> None:
+    light = FakeLight()
+    light.boot = None
+    pair = agreed(light)
+    pair.close()
+    pair.run(seconds_lost)
+    light.restart(pair.now)
+    pair.open()
+
+    assert pair.wait_for(on_at_connection(pair)).success
+    assert light.shone == [30.0]
+
+
+def test_a_light_may_have_restarted_soon_after_its_start_and_a_long_loss_began() -> None:
+    light = FakeLight()
+    light.boot = START - 55.0
+    pair = agreed(light)
+    lose(pair, light)
+    light.silent = True
+    pair.run(20.0)
+    light.restart(pair.now)
+    pair.run(1800.0)
+    light.silent = False
+    light.heartbeat.due = pair.now
+
+    assert pair.wait_for(on_at_connection(pair)).success
+    assert light.shone == [30.0]
+
+
+def test_an_on_waits_for_overrides_that_could_not_be_sent_before_the_first_status() -> None:
+    light = FakeLight()
+    answers, light.answers = light.answers, set()
+    light.stream = 0.0
+    pair = Pair(
+        light, on_light=lambda light: light.set_desired({'brightness': 30}, START)).settle(5.0)
+    lose(pair, light)
+    light.answers, light.stream = answers, 1.0
+    light.restart(pair.now)
+    heartbeat_first(light, pair.now)
+
+    assert pair.wait_for(on_at_connection(pair)).success
+    assert light.shone == [30.0]
+
+
+def test_a_first_status_that_comes_late_after_a_loss_holds_an_on_until_it_is_proved() -> None:
+    light = FakeLight(stream=2.0)
+    light.boot = START
+    light.answers.clear()
+    pair = agreed(light)
+    lose(pair, light)
+    light.restart(pair.now)
+    light.delay_status(3.0)
+    pair.run_until(lambda: pair.light.connected)
+    pair.run(3.01)
+
+    pair.wait_for(pair.ask_enable(True))
+
+    assert light.shone == [30.0]
+
+
+def test_an_on_does_not_wait_for_ever_where_parameters_are_set_without_a_pause() -> None:
+    light = FakeLight()
+    pair = agreed(light)
+    lose(pair, light)
+    light.restart(pair.now)
+    heartbeat_first(light, pair.now)
+    light.answers.clear()
+    answer = on_at_connection(pair)
+    sets: list[Answer] = []
+    while not answer.results:
+        while sum(not one.results for one in sets) < 2:
+            sets.append(pair.ask_configure(brightness=10 + len(sets) % 20))
+            light.answers = {STATUS_ID} if pair.now > answer.asked_at + 0.5 else set()
+        pair.run(0.001)
+
+    assert answer.result.success
+    assert answer.seconds < 3.0
+    assert max(light.shone) < 30.0
+
+
+def test_an_on_waits_until_lights_that_share_an_address_are_within_the_limits() -> None:
+    lights = FakeLight(), FakeLight()
+    pair = Pair(SharedAddress(*lights, offset=0.3),
+                settings=replace(LIMITED, restore_configuration=False)).settle()
+    lights[1].fields['enable'] = 1
+    pair.run(8.0)
+    assert pair.snapshot.shared_address
+    pair.close()
+    for light in lights:
+        light.restart(pair.now)
+    pair.open()
+
+    on_at_connection(pair)
+    pair.run(5.0)
+
+    assert [light.shone for light in lights] == [[60.0], [60.0]]
