@@ -16,7 +16,7 @@
 
 from typing import Any, cast
 
-from illuminator_ros.cli.monitor.key_bindings import dim, strobe, switch
+from illuminator_ros.cli.monitor.key_bindings import dim, Request, Service, strobe, switch
 from illuminator_ros.cli.monitor.model import Fleet, Outcome
 from illuminator_ros.cli.monitor.ros_graph import ANSWER_LIMIT, Requests
 import pytest
@@ -99,6 +99,10 @@ class Bench:
         self.enable.calls[-1][1].set_result(SetBool.Response(success=success, message='done'))
 
 
+def turn_off(light: Any) -> Request:
+    return Request(Service.ENABLE, 'off', False)
+
+
 def darker(light: Any) -> Any:
     return dim(light, -10.0)
 
@@ -149,12 +153,29 @@ def test_refused_set_drops_those_behind_it_and_keeps_its_reason(bench: Bench) ->
 def test_newest_switch_is_sent_after_the_one_before_whatever_its_outcome(
     bench: Bench, asks: int, success: bool,
 ) -> None:
+    bench.fleet.take('/bow', 'enabled', True, 0.0)
     bench.ask(*[switch] * asks)
-    assert bench.switches == [True]
+    assert bench.switches == [False]
 
     bench.answer_switch(success)
 
+    assert bench.switches == [False, True]
+
+
+def test_off_does_not_wait_for_an_on(bench: Bench) -> None:
+    bench.ask(switch, switch)
+
     assert bench.switches == [True, False]
+    bench.enable.calls[0][1].set_result(SetBool.Response(success=True, message='on'))
+    assert bench.light.action.outcome is Outcome.PENDING
+
+
+def test_off_is_sent_again_at_an_interval_while_it_is_unanswered(bench: Bench) -> None:
+    for tenths in range(11):
+        bench.now = 0.1 * tenths
+        bench.ask(turn_off)
+
+    assert bench.switches == [False] * 3
 
 
 def test_switch_does_not_wait_for_a_set(bench: Bench) -> None:
@@ -165,14 +186,15 @@ def test_switch_does_not_wait_for_a_set(bench: Bench) -> None:
 
 
 def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Bench) -> None:
+    bench.fleet.take('/bow', 'enabled', True, 0.0)
     bench.ask(switch, switch)
 
     bench.poll(ANSWER_LIMIT - 0.1)
-    assert bench.switches == [True]
+    assert bench.switches == [False]
     bench.poll(ANSWER_LIMIT)
 
-    assert bench.switches == [True, False]
-    assert bench.light.wanted == {'enabled': False}
+    assert bench.switches == [False, True]
+    assert bench.light.wanted == {'enabled': True}
     bench.enable.calls[0][1].set_result(SetBool.Response(success=True, message='late'))
     assert bench.light.action.outcome is Outcome.PENDING
 

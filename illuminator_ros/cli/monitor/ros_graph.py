@@ -55,6 +55,8 @@ EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 QUERY_INTERVAL = 0.5
 # s for an answer: longer than a bridge takes, whatever its light does.
 ANSWER_LIMIT = 8.0
+# s after an OFF without an answer after which another one is sent.
+OFF_INTERVAL = 0.5
 # The type of each service, and its request from the value of a request of the monitor,
 # untyped: they differ in both.
 SERVICES: dict[Service, tuple[type[Any], Callable[[Any], Any]]] = {
@@ -101,7 +103,8 @@ class Requests:
     The requests to one light, in the thread of the node's executor.
 
     Each service has one request at a time. Later ones wait: parameters are merged, so that a key
-    held down is not a hundred commands; of others the newest is kept.
+    held down is not a hundred commands; of others the newest is kept. An OFF does not wait for an
+    ON, and for an OFF only :data:`OFF_INTERVAL`: its bridge may have been restarted.
     """
 
     def __init__(
@@ -119,7 +122,13 @@ class Requests:
     def submit(self, request: Request) -> None:
         """Send a request, or let it wait for the pending one."""
         service = request.service
-        if service not in self._pending:
+        pending = self._pending.get(service)
+        if pending is not None and self._overtakes(request, pending):
+            self._clients[service].remove_pending_request(pending.future)
+            del self._pending[service]
+            self._waiting.pop(service, None)
+            pending = None
+        if pending is None:
             self._send(request)
             return
         waiting = self._waiting.get(service)
@@ -127,6 +136,11 @@ class Requests:
             request = Request(service, request.text, waiting.value | request.value)
         self._waiting[service] = request
         self._show_wanted()
+
+    def _overtakes(self, request: Request, pending: _Pending) -> bool:
+        is_off = request.service is Service.ENABLE and not request.value
+        sent_at = pending.deadline - ANSWER_LIMIT
+        return is_off and (pending.request.value or self._clock() >= sent_at + OFF_INTERVAL)
 
     def poll(self) -> None:
         """Give up requests without an answer, and request the brightness if it is unknown."""
