@@ -43,8 +43,11 @@ STATE_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# Matches reliable and best-effort publishers.
+# Matches reliable and best-effort publishers. Messages may be lost, the first after a start of the
+# publisher most of all; the next one of a stream replaces them.
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Of commands that nothing repeats. Matches reliable publishers only.
+SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Requests that the middleware queues while others are taken, so that each gets an answer.
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -101,6 +104,7 @@ class CommandTopic(Generic[T]):
         faster than the link takes them only the newest.
     :param read: returns the value of a message, in any thread; a ValueError is logged. The message
         has the fields of ``type`` only, and tuples for arrays.
+    :param qos: :data:`SWITCH_QOS` for single messages; :data:`COMMAND_QOS` where it is None.
     """
 
     name: str
@@ -108,6 +112,7 @@ class CommandTopic(Generic[T]):
     take: Callable[[T, float], None]
     # Untyped: of the class that ``type`` names.
     read: Callable[[Any], T] = finite_data
+    qos: QoSProfile | None = None
 
 
 # Of any type of request, and of any type of value.
@@ -131,8 +136,8 @@ class NodeInterface:
                 qos_profile=SERVICE_QOS)
         for command in commands:
             node.create_subscription(
-                command.type, f'~/{command.name}', _Newest(link, log, command).offer, COMMAND_QOS,
-                raw=True)
+                command.type, f'~/{command.name}', _Newest(link, log, command).offer,
+                command.qos or COMMAND_QOS, raw=True)
 
     def publish(self, name: str, value: object) -> None:
         """

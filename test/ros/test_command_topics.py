@@ -69,6 +69,29 @@ def test_brightness_message_keeps_the_other_fields_and_moves_the_parameter(
     parameters.wait(brightness=41.0)
 
 
+@pytest.mark.parametrize('name', ['enable', 'enable_all'])
+def test_subscriptions_to_switches_are_reliable(
+    ros: Ros, parameters: Parameters, name: str,
+) -> None:
+    (subscription,) = ros.node.get_subscriptions_info_by_topic(f'/illuminator/cmd/{name}')
+
+    assert subscription.qos_profile.reliability is ReliabilityPolicy.RELIABLE
+
+
+@pytest.mark.parametrize('name', ['enable', 'enable_all'])
+def test_off_message_is_sent_while_the_light_has_not_acknowledged_an_on(
+    ros: Ros, light: ServedLight, name: str,
+) -> None:
+    light.fake.held[ON_OFF] = []
+    topic = f'/illuminator/cmd/{name}'
+    ros.publish(Bool, topic, True)
+    light.wait_for(ON_OFF)
+
+    ros.publish(Bool, topic, False)
+
+    eventually(lambda: not light.commands(ON_OFF)[-1].param1)
+
+
 def test_best_effort_publisher_is_heard(
     ros: Ros, light: ServedLight, parameters: Parameters,
 ) -> None:

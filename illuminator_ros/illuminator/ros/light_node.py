@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import functools
 import itertools
+import operator
 
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float32, String
@@ -178,7 +179,8 @@ class LightNode:
     def _command_topics(
         self, source: str, prefix: str,
     ) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
-        switching = LatestOnly(functools.partial(self._switch, source, prefix))
+        switching = LatestOnly(
+            functools.partial(self._switch, source, prefix), overtakes=operator.not_)
 
         def enable(on: bool, now: float) -> None:
             if light := self._light():
@@ -187,7 +189,8 @@ class LightNode:
             switching.offer(on, now)
 
         return (
-            ros_node.CommandTopic(f'{prefix}cmd/enable', Bool, enable),
+            ros_node.CommandTopic(
+                f'{prefix}cmd/enable', Bool, enable, qos=ros_node.SWITCH_QOS),
             ros_node.CommandTopic(
                 f'{prefix}cmd/brightness', Float32,
                 functools.partial(self._set_brightness, source, prefix),

@@ -20,6 +20,7 @@ from collections.abc import Callable, Hashable, Mapping
 import functools
 import logging
 import math
+import operator
 
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -34,7 +35,7 @@ from ...mavlink.messages import Address
 from ...payload.request import Result
 from ...ros.device_nodes import DeviceNodes
 from ...ros.link_call import LatestOnly
-from ...ros.node import Answer, CommandTopic, RequestService
+from ...ros.node import Answer, CommandTopic, RequestService, SWITCH_QOS
 from ...ros.parameters import Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
@@ -54,12 +55,13 @@ class Lights(ServedPayload):
         self._host = host
         self._selection = parameters.Selection(host.values, host.node.get_name())
         geometry = parameters.BeamGeometry.of(host.values)
-        self._switching = LatestOnly(self._switch_all)
+        self._switching = LatestOnly(self._switch_all, overtakes=operator.not_)
         self._nodes = DeviceNodes[Address, LightNode](
             host, 'light', LightNode(
                 host.node, host, host.log, client, geometry,
                 services=(RequestService('enable_all', SetBool, self._enable_all),),
-                commands=(CommandTopic('cmd/enable_all', Bool, self._switching.offer),)),
+                commands=(CommandTopic(
+                    'cmd/enable_all', Bool, self._switching.offer, qos=SWITCH_QOS),)),
             lambda node, log: LightNode(node, host, log, client, geometry.declare(node)),
             LightNode.bind)
         self._second_reported = False
