@@ -159,6 +159,7 @@ ARDUSUB = properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.addr
     (HEALTHY, 'lie', 'mode-external', FAIL, LIE + 'mode and brightness: off', ''),
     (HEALTHY, 'lie', 'brightness', FAIL, LIE + 'brightness: off', ''),
     (HEALTHY, 'lie', 'off', SKIPPED, 'could not be switched on before', ''),
+    (HEALTHY, 'lie', 'thermal-flags', SKIPPED, 'never reported that it was on', ''),
     (HEALTHY, 'anything', 'brightness-values', FAIL,
      'MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101 0 0: MAV_RESULT_ACCEPTED',
      '< COMMAND_ACK MAV_CMD_DO_ILLUMINATOR_CONFIGURE: MAV_RESULT_ACCEPTED'),

@@ -78,12 +78,19 @@ def test_first_node_serves_the_target_or_else_the_first_light_heard(
     own_ros: Ros, start: Start, target: dict[str, int], sources: tuple[Address, ...],
     chosen: Address,
 ) -> None:
-    _, lights = start(sources=sources, **target)
+    bridge, lights = start(sources=sources, **target)
 
     assert light_of(own_ros, '/illuminator', lights) == chosen
     for source in set(sources) - {chosen}:
         node = f'/illuminator_{source.system}_{source.component}'
         assert light_of(own_ros, node, lights) == source
+    # Several lights that the target selects are a warning.
+    ambiguous = sum(target.get('target_component', one.component) == one.component
+                    and target.get('target_system', one.system) == one.system
+                    for one in sources) > 1
+    warnings = [line for line in bridge.lines
+                if '[WARN]' in line and ', was found; /illuminator serves ' in line]
+    assert len(warnings) == ambiguous
 
 
 def test_only_target_leaves_other_lights_alone_and_unused_names_are_logged(

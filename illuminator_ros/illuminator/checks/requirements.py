@@ -432,6 +432,8 @@ def _judge(seen: list[Status], seconds: float) -> str:
             raise Failed(f'{name} at {min(flagged):.1f} degC; it was not set at '
                          f'{start:.1f} degC before')
         ranges.append(f'{name} from {min(flagged):.1f} to {max(flagged):.1f} degC')
+    if not ranges and not any(one.enabled for one in seen):
+        raise Skipped('it acknowledged ON and never reported that it was on')
     if not ranges:
         raise Skipped(f'{seconds:g} s at 100 % heated it from {start:.1f} to {hottest:.1f} degC '
                       'and set no flag; try a longer --heat')

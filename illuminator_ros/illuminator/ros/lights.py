@@ -98,9 +98,10 @@ class Lights(ServedPayload):
         elif (nodes.serve(address, self._selection.node_name(address)) and selected
                 and not self._second_reported):
             self._second_reported = True
-            self._host.log.info(
+            self._host.log.warning(
                 f'a second light, {address}, was found; {nodes.first.source.node} serves '
-                f'{nodes.first.address}. Set target_system and target_component to choose')
+                f'{nodes.first.address}. After a restart the order may differ: set '
+                'target_system and target_component')
 
     # Requests to all lights
 
