@@ -181,6 +181,12 @@ def test_a_result_has_its_reason_and_the_messages_that_show_it(
     assert line in result.exchange[-1]
 
 
+def test_a_status_that_contradicts_is_reported_with_its_request() -> None:
+    exchange = Run(faults=('lie',), only=('on',)).finish().result('on').exchange
+
+    assert '> COMMAND_LONG to 1/243: MAV_CMD_REQUEST_MESSAGE' in exchange[-3]
+
+
 def test_a_light_that_stays_in_external_sync_fails_mode_internal() -> None:
     run = Run(only=('mode-internal', 'mode-external'))
     apply = run.light.apply

@@ -85,6 +85,13 @@ def test_the_table_has_reason_section_and_messages_of_a_failed_requirement(run: 
     assert 'set no flag; try a longer --heat' in lines(run.result('thermal-flags'))[1]
 
 
+def test_the_table_has_the_last_messages_of_a_long_exchange() -> None:
+    text = lines(Run(faults=('toggle',), only=('repeated',)).finish().result('repeated'))
+
+    assert text[3].endswith('earlier lines with --json')
+    assert any(line.endswith('ON_OFF 1, confirmation 1') for line in text[4:])
+
+
 def test_requirements_that_were_not_reached_share_one_line() -> None:
     absent = shown(Run(target=Address(9, 9)).finish())
     assert len(absent) == 4

@@ -143,7 +143,7 @@ class LightTester:
         self.disagreements.append(Failed(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
-            one.lines + session.log.since(mark)[-2:]))
+            one.lines + session.log.since(mark)[-3:]))
         return Change(one, tuple(not_shown), self.disagreements[-1])
 
     async def rejected(self, command: int, *params: float) -> Failed | None:

@@ -77,9 +77,10 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
         text.append(f'{"":8}see {one.place}: {one.specification.url}')
         shown = [line for line in result.exchange
                  if one.specification is HEARTBEAT or ' HEARTBEAT ' not in line]
-        text += [f'{"":8}  {line}' for line in shown[:SHOWN_LINES]]
+        # The last lines show the failure.
         if len(shown) > SHOWN_LINES:
-            text.append(f'{"":8}  ... {len(shown) - SHOWN_LINES} more lines with --json')
+            text.append(f'{"":8}  ... {len(shown) - SHOWN_LINES} earlier lines with --json')
+        text += [f'{"":8}  {line}' for line in shown[-SHOWN_LINES:]]
     return text
 
 
