@@ -51,10 +51,24 @@ def lose(pair: Pair, light: FakeLight) -> None:
     light.silent = False
 
 
+def lost(light: FakeLight, settings: Settings | None = None, **how: Any) -> Pair:
+    """Return a client and a light that have agreed on 30 % and lost each other."""
+    pair = agreed(light, settings, **how)
+    lose(pair, light)
+    return pair
+
+
 def on_at_connection(pair: Pair) -> Answer:
     """Ask for an ON as soon as the light is connected."""
     pair.run_until(lambda: pair.controller.lights and pair.light.connected)
     return pair.ask_enable(True)
+
+
+def switch_on_at_connection(pair: Pair) -> Answer:
+    """Switch the light on as soon as it is connected, and return the answer."""
+    answer = on_at_connection(pair)
+    assert pair.wait_for(answer).success
+    return answer
 
 
 def hide_status(light: FakeLight) -> None:
@@ -84,17 +98,15 @@ def test_a_restarted_light_is_switched_on_after_it_has_its_configuration(
     light = FakeLight()
     if not has_clock:
         light.boot = None
-    pair = agreed(light, settings)
-    lose(pair, light)
+    pair = lost(light, settings)
     light.silent = True
     pair.run(seconds_lost)
     light.silent = False
     light.restart(pair.now)
     first(light, pair.now)
 
-    answer = on_at_connection(pair)
+    answer = switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert light.shone == [brightness]
     assert answer.seconds < 0.5
 
@@ -106,12 +118,12 @@ def test_a_restarted_light_without_statuses_on_request_is_switched_on_after_its_
     light = FakeLight(stream=1.2)
     light.boot = START
     light.answers.clear()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.restart(pair.now)
     light.delay_status(seconds_to_status)
 
-    assert pair.wait_for(on_at_connection(pair)).success
+    switch_on_at_connection(pair)
+
     assert light.shone == [30.0]
 
 
@@ -149,7 +161,8 @@ def test_a_found_light_is_switched_on_after_it_has_its_overrides_and_limits(
 
     pair = Pair(light, settings=settings, on_light=override)
 
-    assert pair.wait_for(on_at_connection(pair)).success
+    switch_on_at_connection(pair)
+
     assert light.shone == [brightness]
     (at, _), = pair.commands_at(ON_OFF)
     assert at == pytest.approx(START + seconds, abs=0.02)
@@ -157,12 +170,10 @@ def test_a_found_light_is_switched_on_after_it_has_its_overrides_and_limits(
 
 def test_a_light_that_runs_on_is_switched_on_with_its_first_status() -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
 
-    answer = on_at_connection(pair)
+    answer = switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert answer.seconds < 0.1
 
 
@@ -192,8 +203,7 @@ def test_an_on_does_not_wait_until_a_change_by_another_sender_is_undone() -> Non
 
 def test_an_off_is_sent_at_once_and_cancels_the_on_that_waits() -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.restart(pair.now)
     on = on_at_connection(pair)
 
@@ -208,8 +218,7 @@ def test_an_off_is_sent_at_once_and_cancels_the_on_that_waits() -> None:
 
 def test_an_on_that_waits_fails_at_once_when_the_light_is_lost() -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     hide_status(light)
     on = on_at_connection(pair)
     assert not on.results
@@ -226,22 +235,19 @@ def test_a_light_that_cannot_be_configured_is_switched_on_after_one_attempt(
     result: int | None,
 ) -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.results[CONFIGURE] = result
     light.restart(pair.now)
 
-    answer = on_at_connection(pair)
+    answer = switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert light.shone == [100.0]
     assert answer.seconds < 1.1
 
 
 def test_an_on_is_sent_after_the_restart_check_time_if_no_status_comes() -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     hide_status(light)
     answer = on_at_connection(pair)
 
@@ -273,8 +279,7 @@ def test_late_statuses_hold_an_on_no_longer_than_the_restart_check_time() -> Non
 
 def test_a_light_that_is_lost_before_it_has_its_configuration_is_configured_before_an_on() -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.results[CONFIGURE] = None
     light.restart(pair.now)
     pair.run(1.2)
@@ -282,9 +287,8 @@ def test_a_light_that_is_lost_before_it_has_its_configuration_is_configured_befo
     light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
     pair.open()
 
-    answer = on_at_connection(pair)
+    answer = switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert light.shone == [30.0]
     assert answer.seconds < 0.8
 
@@ -304,23 +308,19 @@ def test_overrides_that_cannot_be_sent_are_reported_once_though_the_light_is_los
 @pytest.mark.parametrize('seed', range(20))
 def test_a_restarted_light_is_switched_on_once_configured_over_a_lossy_line(seed: int) -> None:
     light = FakeLight()
-    pair = agreed(light, seed=seed)
-    lose(pair, light)
+    pair = lost(light, seed=seed)
     light.restart(pair.now)
     for end in (pair.near, pair.far):
         end.wire.faults = Faults(drop=0.1, duplicate=0.2, delay=0.05)
 
-    answer = on_at_connection(pair)
+    switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert set(light.shone) == {30.0}
 
 
-def test_an_on_of_the_next_holder_waits_for_the_configuration_that_the_last_one_interrupted(
-) -> None:
+def test_an_on_of_the_next_holder_waits_for_an_interrupted_configuration() -> None:
     light = FakeLight()
-    pair = agreed(light, Settings(sources=SourceSettings(('safety', 'default'))))
-    lose(pair, light)
+    pair = lost(light, Settings(sources=SourceSettings(('safety', 'default'))))
     light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
     light.restart(pair.now)
     restarted_at = pair.now
@@ -343,9 +343,8 @@ def test_overrides_of_a_light_that_is_lost_before_its_first_status_are_sent_befo
     light.answers.add(STATUS_ID)
     pair.open()
 
-    answer = on_at_connection(pair)
+    switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert light.shone == [30.0]
     assert [success for success, _ in pair.recorder.restorations] == [True]
 
@@ -367,10 +366,76 @@ def test_an_on_is_not_resent_to_a_light_that_was_lost() -> None:
     assert answer.result.message.startswith('no acknowledgement (3 tries')
 
 
-def test_a_restoration_from_before_a_loss_does_not_end_the_one_after_it() -> None:
+def test_a_set_is_not_resent_to_a_light_that_was_lost() -> None:
+    light = FakeLight()
+    pair = agreed(light)
+    light.silent = True
+    pair.run(2.9)
+    answer = pair.ask_configure(brightness=50)
+    pair.run_until(lambda: not pair.light.connected)
+    light.silent = False
+    pair.run(5.0)
+
+    assert not answer.result.success
+    assert light.fields['brightness'] == 30.0
+
+
+def test_an_off_is_resent_to_a_light_that_was_lost() -> None:
+    light = FakeLight()
+    pair = agreed(light)
+    assert pair.enable(True).success
+    light.silent = True
+    pair.run(2.9)
+    pair.ask_enable(False)
+    pair.run_until(lambda: not pair.light.connected)
+    light.silent = False
+    pair.run(2.0)
+
+    assert light.fields['enable'] == 0
+
+
+def test_a_light_that_restarts_without_a_loss_is_brought_within_the_limits_again() -> None:
     light = FakeLight()
     pair = agreed(light, replace(LIMITED, restore_configuration=False))
-    lose(pair, light)
+    light.restart(pair.now)
+    pair.run(5.0)
+
+    assert light.fields['brightness'] == 60.0
+
+
+def test_an_on_after_a_second_restart_waits_for_another_attempt_at_the_limits() -> None:
+    light = FakeLight()
+    pair = agreed(light, replace(LIMITED, restore_configuration=False))
+    light.results[CONFIGURE] = None
+    light.restart(pair.now)
+    pair.run(1.5)
+    light.results.clear()
+    light.restart(pair.now)
+    pair.run_until(lambda: pair.light.restarts == 2)
+
+    assert pair.enable(True).success
+    assert light.shone == [60.0]
+
+
+def test_a_copy_of_the_last_status_after_a_short_loss_shows_no_restart() -> None:
+    light = FakeLight()
+    pair = agreed(light)
+    last = light.status(pair.now)
+    light.send(last)
+    pair.turn()
+    pair.run(0.01)
+    pair.close()
+    pair.open()
+    light.send(last)
+    pair.turn()
+    pair.run(5.0)
+
+    assert pair.light.restarts == 0
+
+
+def test_a_restoration_from_before_a_loss_does_not_end_the_one_after_it() -> None:
+    light = FakeLight()
+    pair = lost(light, replace(LIMITED, restore_configuration=False))
     light.restart(pair.now)
     light.applies = False
     pair.run_until(lambda: pair.light.restarts)
@@ -381,9 +446,8 @@ def test_a_restoration_from_before_a_loss_does_not_end_the_one_after_it() -> Non
     light.restart(pair.now)
     pair.open()
 
-    answer = on_at_connection(pair)
+    switch_on_at_connection(pair)
 
-    assert pair.wait_for(answer).success
     assert light.shone == [60.0]
 
 
@@ -397,6 +461,9 @@ def test_an_on_that_undoes_an_off_and_waits_is_not_sent_to_a_light_that_has_rest
     pair.run(1.1)
     assert pair.commands(ON_OFF, since=pair.now - 1.1)
     lose(pair, light)
+    light.silent = True
+    pair.run(20.0)
+    light.silent = False
     light.results.clear()
     light.shone.clear()
     light.restart(pair.now)
@@ -410,8 +477,7 @@ def test_an_on_that_undoes_an_off_and_waits_is_not_sent_to_a_light_that_has_rest
 @pytest.mark.parametrize('first', [MavResult.TEMPORARILY_REJECTED, None])
 def test_an_on_waits_for_the_limits_though_a_parameter_is_being_set(first: int | None) -> None:
     light = FakeLight()
-    pair = agreed(light, replace(LIMITED, restore_configuration=False))
-    lose(pair, light)
+    pair = lost(light, replace(LIMITED, restore_configuration=False))
     light.results[CONFIGURE] = [first, first, MavResult.ACCEPTED]
     light.restart(pair.now)
     heartbeat_first(light, pair.now)
@@ -433,7 +499,8 @@ def test_an_on_waits_for_the_limits_though_a_change_was_to_be_undone() -> None:
     light.restart(pair.now)
     pair.open()
 
-    assert pair.wait_for(on_at_connection(pair)).success
+    switch_on_at_connection(pair)
+
     assert light.shone == [30.0]
 
 
@@ -447,15 +514,15 @@ def test_a_light_without_a_clock_may_have_restarted_in_a_short_loss(seconds_lost
     light.restart(pair.now)
     pair.open()
 
-    assert pair.wait_for(on_at_connection(pair)).success
+    switch_on_at_connection(pair)
+
     assert light.shone == [30.0]
 
 
 def test_a_light_may_have_restarted_soon_after_its_start_and_a_long_loss_began() -> None:
     light = FakeLight()
     light.boot = START - 55.0
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.silent = True
     pair.run(20.0)
     light.restart(pair.now)
@@ -463,7 +530,8 @@ def test_a_light_may_have_restarted_soon_after_its_start_and_a_long_loss_began()
     light.silent = False
     light.heartbeat.due = pair.now
 
-    assert pair.wait_for(on_at_connection(pair)).success
+    switch_on_at_connection(pair)
+
     assert light.shone == [30.0]
 
 
@@ -478,7 +546,8 @@ def test_an_on_waits_for_overrides_that_could_not_be_sent_before_the_first_statu
     light.restart(pair.now)
     heartbeat_first(light, pair.now)
 
-    assert pair.wait_for(on_at_connection(pair)).success
+    switch_on_at_connection(pair)
+
     assert light.shone == [30.0]
 
 
@@ -486,8 +555,7 @@ def test_a_first_status_that_comes_late_after_a_loss_holds_an_on_until_it_is_pro
     light = FakeLight(stream=2.0)
     light.boot = START
     light.answers.clear()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.restart(pair.now)
     light.delay_status(3.0)
     pair.run_until(lambda: pair.light.connected)
@@ -500,8 +568,7 @@ def test_a_first_status_that_comes_late_after_a_loss_holds_an_on_until_it_is_pro
 
 def test_an_on_does_not_wait_for_ever_where_parameters_are_set_without_a_pause() -> None:
     light = FakeLight()
-    pair = agreed(light)
-    lose(pair, light)
+    pair = lost(light)
     light.restart(pair.now)
     heartbeat_first(light, pair.now)
     light.answers.clear()

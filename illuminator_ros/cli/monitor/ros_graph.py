@@ -123,19 +123,18 @@ class Requests:
         """Send a request, or let it wait for the pending one."""
         service = request.service
         pending = self._pending.get(service)
-        if pending is not None and self._overtakes(request, pending):
+        if pending is not None and not self._overtakes(request, pending):
+            waiting = self._waiting.get(service)
+            if service is Service.SET and waiting is not None:
+                request = Request(service, request.text, waiting.value | request.value)
+            self._waiting[service] = request
+            self._show_wanted()
+            return
+        if pending is not None:
             self._clients[service].remove_pending_request(pending.future)
             del self._pending[service]
             self._waiting.pop(service, None)
-            pending = None
-        if pending is None:
-            self._send(request)
-            return
-        waiting = self._waiting.get(service)
-        if service is Service.SET and waiting is not None:
-            request = Request(service, request.text, waiting.value | request.value)
-        self._waiting[service] = request
-        self._show_wanted()
+        self._send(request)
 
     def _overtakes(self, request: Request, pending: _Pending) -> bool:
         is_off = request.service is Service.ENABLE and not request.value
