@@ -109,17 +109,21 @@ class UptimeClock:
         may_have_restarted = uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
         # A light that was lost may have restarted long before it is heard again.
         allowed = BOOT_SLACK if was_lost else MAX_LAG + DRIFT * elapsed
-        if has_progressed and not (may_have_restarted and lag > allowed):
+        # A line that stalled until the light was lost may deliver statuses from before a restart.
+        may_be_old = was_lost and lag > MAX_LAG + DRIFT * elapsed
+        if has_progressed and not (may_have_restarted and lag > allowed or may_be_old):
             return Uptime.RUNNING
         if not has_progressed and may_have_restarted and lag > MAX_DELAY:
             return Uptime.RESTARTED
         may_have_restarted = uptime_ms <= 1000 * (elapsed + PROVED_BOOT_SLACK)
-        self.is_suspecting = may_have_restarted or lag > MAX_DELAY
+        self.is_suspecting = may_have_restarted or may_be_old or lag > MAX_DELAY
         if self._suspect is not None:
             suspect_ms, suspect_at = self._suspect
             waited = now - suspect_at
             error = abs(uptime_difference(uptime_ms, suspect_ms) / 1000 - waited)
             if error <= RESTART_PROOF_ERROR + DRIFT * waited:
+                if has_progressed and not may_have_restarted and waited >= RESTART_PROOF_TIME:
+                    return Uptime.RUNNING
                 is_proof = (waited >= RESTART_PROOF_TIME if may_have_restarted
                             else lag > MAX_DELAY and waited >= CLOCK_JUMP_PROOF_TIME)
                 return Uptime.RESTARTED if is_proof else Uptime.LATE

@@ -566,6 +566,22 @@ def test_a_first_status_that_comes_late_after_a_loss_holds_an_on_until_it_is_pro
     assert light.shone == [30.0]
 
 
+def test_a_status_that_a_stalled_line_held_back_does_not_release_an_on() -> None:
+    light = FakeLight()
+    pair = agreed(light)
+    held_back = light.status(pair.now + 1.0)
+    light.silent = True
+    pair.run(10.0)
+    light.silent = False
+    light.restart(pair.now)
+    light.delay_status(0.7)
+    light.send(held_back)
+
+    switch_on_at_connection(pair)
+
+    assert light.shone == [30.0]
+
+
 def test_an_on_does_not_wait_for_ever_where_parameters_are_set_without_a_pause() -> None:
     light = FakeLight()
     pair = lost(light)

@@ -111,6 +111,24 @@ def test_several_uptimes_show_what_one_cannot(
     assert meanings(*statuses)[-1] is meaning
 
 
+@pytest.mark.parametrize(('uptimes', 'meaning'), [
+    # The line delivers in a burst what it held back, and then the present status.
+    ([(91_000, 110.0), (92_000, 110.001), (93_000, 110.002)], LATE),
+    ([(91_000, 110.0), (92_000, 110.001), (100_100, 110.1)], RUNNING),
+    ([(91_000, 110.0), (92_000, 110.001), (3_000, 110.1)], RESTARTED),
+    # The clock of the light stood still while it was lost.
+    ([(91_000, 110.0), (91_150, 110.15)], RUNNING),
+])
+def test_a_status_that_a_stalled_line_held_back_does_not_show_that_a_lost_light_runs_on(
+    uptimes: list[tuple[int, float]], meaning: Uptime,
+) -> None:
+    clock = UptimeClock()
+    clock.take(90_000, 100.0)
+
+    assert [clock.take(uptime_ms, now, was_lost=True)
+            for uptime_ms, now in uptimes][-1] is meaning
+
+
 @pytest.mark.parametrize('drift', [0.96, 1.0, 1.04])
 @pytest.mark.parametrize('interval', [0.02, 1.0, 10.0, 3600.0])
 def test_a_clock_that_is_a_little_wrong_shows_no_restart(drift: float, interval: float) -> None:
