@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 import contextlib
+import itertools
 import logging
 import math
 import queue
@@ -37,6 +38,7 @@ from .parameters import (
     declare_read_only,
     given_parameters,
     ignored_sections,
+    LINK_PARAMETERS,
     LinkParameters,
     ParameterError,
     unknown_parameters,
@@ -72,7 +74,7 @@ class Bridge:
     :param types: the kinds of payloads that the parameter ``payloads`` may name.
     :param payload: the default of that parameter.
     :param url: the connection URL if the command line has one outside of the parameters, else ''.
-    :raises ParameterError: if a parameter is wrong.
+    :raises ParameterError: if a parameter is wrong, or one that restricts something misspelt.
     """
 
     def __init__(
@@ -125,7 +127,9 @@ class Bridge:
             if own is not node:
                 self._executor.add_node(own)
         names = [one.get_fully_qualified_name() for one in self._own_nodes]
-        for warning in (*unknown_parameters(self._own_nodes, arguments),
+        specs = itertools.chain(LINK_PARAMETERS, *(kind.parameters for kind in kinds))
+        restrictions = {spec.name for spec in specs if spec.restricts}
+        for warning in (*unknown_parameters(self._own_nodes, arguments, restrictions),
                         *ignored_sections(arguments, names, self._may_name)):
             self.log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.

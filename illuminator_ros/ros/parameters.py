@@ -59,6 +59,7 @@ class ParameterSpec(NamedTuple):
     :param low: and ``high``, the range of a number, both ends included.
     :param choices: the permitted values of a string.
     :param constraints: other conditions on the value, for people.
+    :param restricts: whether it limits or protects something, so that a misspelt name is an error.
     """
 
     name: str
@@ -69,6 +70,7 @@ class ParameterSpec(NamedTuple):
     high: float | None = None
     choices: tuple[str, ...] = ()
     constraints: str = ''
+    restricts: bool = False
 
     @property
     def type(self) -> Parameter.Type:  # noqa: A003
@@ -154,7 +156,7 @@ LINK_PARAMETERS = (
     ParameterSpec('command_retries', 3, 'resends of an unacknowledged command', low=0, high=20),
     ParameterSpec('diagnostics_period', 1.0, 'period of /diagnostics', 's', 0.1, 60.0),
     ParameterSpec('signing_mode', 'off', 'MAVLink 2 message signing',
-                  choices=tuple(mode.value for mode in SigningMode)),
+                  choices=tuple(mode.value for mode in SigningMode), restricts=True),
     ParameterSpec('signing_key_file', '', 'path of the signing key, readable by its owner only'),
 )
 
@@ -263,7 +265,9 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
             'holds the parameters given on the command line') from None
 
 
-def unknown_parameters(nodes: Sequence[Node], arguments: Sequence[str]) -> list[str]:
+def unknown_parameters(
+    nodes: Sequence[Node], arguments: Sequence[str], restrictions: Set[str],
+) -> list[str]:
     """
     Return a warning for each parameter that is given and unknown.
 
@@ -271,15 +275,25 @@ def unknown_parameters(nodes: Sequence[Node], arguments: Sequence[str]) -> list[
     parameters are unknown only if they resemble one of ours.
 
     :param nodes: those that exist at the start.
+    :param restrictions: names of parameters that must not be missed because they are misspelt.
+    :raises ParameterError: if one of them is misspelt.
     """
     known = {name for node in nodes for name in node.list_parameters([], 0).names}
     given = dict.fromkeys(name for node in nodes for name in given_parameters(node))
     others = {name.partition('.')[0] for _, section, values in _files(arguments)
               if not _WILDCARDS.keys().isdisjoint(section) and known.isdisjoint(values - _OF_RCLPY)
               for name in values}
-    return [_unknown(name, close) for name in given if name not in known
-            if (close := difflib.get_close_matches(name, known, 1, 0.75))
-            or name.partition('.')[0] not in {*others, 'qos_overrides'}]
+    warnings = []
+    for name in given:
+        if name in known:
+            continue
+        close = difflib.get_close_matches(name, known, 1, 0.75)
+        is_ours = name.partition('.')[0] not in {*others, 'qos_overrides'}
+        if is_ours and not restrictions.isdisjoint(close):
+            raise ParameterError(f'{name} is unknown; did you mean {close[0]!r}?')
+        if is_ours or close:
+            warnings.append(_unknown(name, close))
+    return warnings
 
 
 def ignored_parameters(node: Node, first: Node) -> list[str]:

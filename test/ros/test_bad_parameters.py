@@ -57,6 +57,10 @@ NUMBER, INTEGER, STRING, BOOLEAN = (
     ({'on_release': 'dim'}, "on_release: 'dim' is not one of keep, off"),
     ({'external_changes': 'fight'}, "external_changes: 'fight' is not one of follow, reassert"),
     ({'max_brightness': 60, 'brightness': 80}, 'brightness 80 % is above max_brightness 60 %'),
+    *(({wrong: 1}, f"{wrong} is unknown; did you mean '{right}'\\?") for wrong, right in [
+        ('max_brightnes', 'max_brightness'), ('min_strobe_peroid', 'min_strobe_period'),
+        ('of_after_silence', 'off_after_silence'), ('off_on_shut_down', 'off_on_shutdown'),
+        ('signing-mode', 'signing_mode')]),
 ])
 def test_invalid_parameter_is_refused_with_its_name_value_and_range(
     ros: Ros, given: dict[str, Any], reason: str,
