@@ -45,7 +45,7 @@ RATE = 800
 # Frames before the measurement, until no light is asked for its identity any more, and in each
 # part of it: those of 1 s, so that each part has the work that is due once a second.
 WARM_UP, PART = 10 * RATE, RATE
-ROUNDS = 25
+ROUNDS = 75
 FLAT = 1.2
 PEER = '127.0.0.1', 14550
 
