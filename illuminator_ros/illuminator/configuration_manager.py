@@ -324,8 +324,8 @@ class ConfigurationManager:
                     self._sent.accepted = result.success or result.contradicted
                 if result.success:
                     self._drop_pending(values)
-                    if status and self._pending:
-                        # The command carries all fields, and the light shows them.
+                    if self._pending:
+                        # The command carries all fields.
                         self._drop_pending([name for name, value in self._pending.values.items()
                                             if value == getattr(change.configuration, name)])
                     self._accept(change.configuration, status)
