@@ -420,7 +420,9 @@ class Light:
             return ''
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.claim(source, now), now)
-        self._sources.remember(source, enabled=enabled, brightness=brightness)
+        # A request to a lost light has no effect later, but an OFF replaces the ON before it.
+        if self.connected or enabled is False:
+            self._sources.remember(source, enabled=enabled, brightness=brightness)
         return self._sources.refusal(source)
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:

@@ -111,6 +111,31 @@ def test_the_state_that_the_next_source_requested_is_sent_once_when_the_hold_of_
     assert (held.before, held.after, held.cause) == ('safety', 'autonomy', cause)
 
 
+@pytest.mark.parametrize(('before', 'while_lost', 'sent'), [
+    (None, True, []), (True, True, [1.0]), (True, False, [0.0]), (False, True, [0.0])])
+def test_of_the_requests_to_a_lost_light_only_an_off_has_an_effect_later(
+    before: bool | None, while_lost: bool, sent: list[float],
+) -> None:
+    shared = Shared(timeout=60.0)
+    if before is not None:
+        shared.enable('autonomy', before)
+        shared.pair.run(1.0)
+    shared.light.silent = True
+    shared.pair.run_until(lambda: not shared.pair.light.connected)
+    assert not shared.enable('autonomy', while_lost).result.success
+    shared.dim('autonomy', 20.0)
+    shared.light.silent = False
+    shared.pair.run(2.0)
+    shared.enable('safety', False)
+    shared.pair.run(1.0)
+    released_at = shared.pair.now
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert shared.sent(ON_OFF, released_at) == sent
+    assert shared.sent(CONFIGURE) == []
+
+
 @pytest.mark.parametrize(('off', 'enabled'), [(False, 1), (True, 0)])
 def test_a_light_that_no_source_holds_stays_or_goes_off_as_configured(
         off: bool, enabled: int) -> None:
