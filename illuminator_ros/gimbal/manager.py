@@ -82,7 +82,6 @@ from ..payload.mount_attitude import (
     UNSET_VECTOR,
     YawFrame,
 )
-from ..payload.rate_limit import RateLimit
 from ..payload.rotation import Quaternion
 
 # s between GIMBAL_MANAGER_STATUS; between repetitions of a setpoint that stays as it is, at most
@@ -102,9 +101,6 @@ AUTOPILOT_INTERVAL = 0.02
 ATTITUDE_AGE = 1.0
 # s within which two different heartbeats of one address show two senders.
 IDENTITY_TIME = 3.0
-# s between two reports of one kind, and kinds that have a limit of their own.
-REPORT_INTERVAL = 1.0
-MAX_REPORTS = 256
 
 
 @dataclass(frozen=True)
@@ -126,11 +122,10 @@ class ManagerSettings:
 
 @dataclass(frozen=True)
 class DemandRefused:
-    """A player's setpoint was refused; others of it were too, but are not reported."""
+    """A player's setpoint was refused."""
 
     player: Address
     reason: str
-    unreported: int
 
 
 @dataclass(frozen=True)
@@ -217,7 +212,6 @@ class GimbalManager(Payload):
         self._roi: GeoPoint | None = None
         self._send_due = self._status_due = self._information_due = math.inf
         self._autopilot_at = self._state_sent_at = -math.inf
-        self._limits: dict[object, RateLimit] = {}
         self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
         self._handlers: dict[int, Callable[[Address, AnyCommand, float], MavResult]] = {
             GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
@@ -401,17 +395,12 @@ class GimbalManager(Payload):
         else:
             refusal = self._demand(source, demand, now)
         if refusal:
-            self._report_refusal(source, refusal, now)
-
-    def _report_refusal(self, source: Address, reason: str, now: float) -> None:
-        unreported = self._limit((source, reason)).take(now)
-        if unreported is not None:
-            self.events.emit(DemandRefused(source, reason, unreported))
+            self.events.emit(DemandRefused(source, refusal))
 
     def _answer(self, source: Address, refusal: str, now: float) -> MavResult:
         """Return the result of a command; a refusal is reported, since no result has a reason."""
         if refusal:
-            self._report_refusal(source, refusal, now)
+            self.events.emit(DemandRefused(source, refusal))
         return MavResult.DENIED if refusal else MavResult.ACCEPTED
 
     def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> MavResult:
@@ -522,13 +511,14 @@ class GimbalManager(Payload):
                 attitude, self.model.ranges, ahead,
                 setpoint.angles if attitude is setpoint.attitude else UNSET_VECTOR)
             if clipped:
-                self._report_clipped(clipped, now)
+                self._limits_reached = sum(AT_LIMIT[AXES.index(one.axis)] for one in clipped)
+                self.events.emit(SetpointClipped(tuple(clipped)))
         sent = setpoint
         if attitude is not setpoint.attitude:
             sent = setpoint._replace(attitude=attitude, turning=STILL)
         if converts:
             if ahead is None:
-                self._lose('heading', now)
+                self.events.emit(ReferenceLost('heading'))
                 return
             sent = in_vehicle_frame(sent, ahead)
         self._sent = sent
@@ -538,15 +528,6 @@ class GimbalManager(Payload):
             self._commands.send(GimbalDeviceSetAttitude(
                 *self.tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
                 *sent.rates))
-
-    def _report_clipped(self, clipped: list[Clipped], now: float) -> None:
-        self._limits_reached = sum(AT_LIMIT[AXES.index(one.axis)] for one in clipped)
-        if self._limit('clipped').take(now) is not None:
-            self.events.emit(SetpointClipped(tuple(clipped)))
-
-    def _lose(self, reference: str, now: float) -> None:
-        if self._limit(reference).take(now) is not None:
-            self.events.emit(ReferenceLost(reference))
 
     # A region of interest
 
@@ -561,8 +542,8 @@ class GimbalManager(Payload):
         if above is None or self.vehicle.position(now) is None or (
                 self._heading(now) is None
                 and not self._accepts_earth_frame(now)):
-            self._report_refusal(
-                source, 'the position or the heading of the vehicle is unknown', now)
+            self.events.emit(DemandRefused(
+                source, 'the position or the heading of the vehicle is unknown'))
             return MavResult.TEMPORARILY_REJECTED
         self._roi = place._replace(altitude=place.altitude + above)
         self._follow(now)
@@ -583,7 +564,7 @@ class GimbalManager(Payload):
         if self._roi is not None:
             position = self.vehicle.position(now)
             if position is None:
-                self._lose('position', now)
+                self.events.emit(ReferenceLost('position'))
             elif (angles := direction(position, self._roi)) is not None:
                 self._setpoint = Setpoint(
                     self._roi_flags(), YawFrame.EARTH, Quaternion.from_euler(0.0, *angles),
@@ -661,11 +642,5 @@ class GimbalManager(Payload):
         identity = message.type, message.autopilot
         before, at = self._identities.get(source, (identity, now))
         self._identities[source] = identity, now
-        if (before != identity and now < at + IDENTITY_TIME
-                and self._limit(source).take(now) is not None):
+        if before != identity and now < at + IDENTITY_TIME:
             self.events.emit(AddressShared(source))
-
-    def _limit(self, kind: object) -> RateLimit:
-        if kind not in self._limits and len(self._limits) >= MAX_REPORTS:
-            del self._limits[next(iter(self._limits))]
-        return self._limits.setdefault(kind, RateLimit(REPORT_INTERVAL))

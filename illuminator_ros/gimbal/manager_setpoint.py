@@ -350,8 +350,6 @@ def nudge(demand: Demand, limit: float) -> Vector:
 
 def mix(attitude: Quaternion, offsets: Vector) -> Quaternion:
     """Return an attitude with offsets added to its angles."""
-    if offsets == STILL:
-        return attitude
     return _from_angles(_each(lambda angle, offset: angle + offset, attitude.euler(), offsets))
 
 

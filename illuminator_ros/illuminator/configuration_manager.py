@@ -35,7 +35,7 @@ from .model import (
     Status,
     unexpected_differences,
 )
-from ..payload.rate_limit import RateLimit, RepeatLimit
+from ..payload.rate_limit import RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
 # s; rqt_reconfigure gives up after 1.0 s, and the answer must have come by then. The middleware
@@ -55,10 +55,6 @@ IMPLIED_TIME = 2.0
 # How often in a row a change by another sender is undone, and s between two of these commands.
 REPEATS = 3
 REPEAT_INTERVAL = 2.0
-# s between two log lines on setpoints beyond a limit.
-CLIP_INTERVAL = 5.0
-# s between two log lines on changes by other senders.
-REPORT_INTERVAL = 1.0
 
 
 class Origin(Enum):
@@ -131,7 +127,6 @@ class ConfigurationManager:
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
         self._reassert = reassert
         self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
-        self._clipping = RateLimit(CLIP_INTERVAL)
         self._queue: RequestQueue[Status] = RequestQueue(target)
         self._status: Status | None = None
         self._shared_address = False
@@ -145,7 +140,6 @@ class ConfigurationManager:
         # The last configuration that was requested or reported as changed: small steps away
         # from it add up to a change.
         self._reference: Configuration | None = None
-        self._rate = RateLimit(REPORT_INTERVAL)
 
     @property
     def is_changing(self) -> bool:
@@ -203,8 +197,7 @@ class ConfigurationManager:
             self._safety.check('brightness', brightness)
         except InvalidValue as error:
             brightness = self._safety.max_brightness
-            if (left_out := self._clipping.take(now)) is not None:
-                self._emit(events.SetpointClipped(self._address, str(error), left_out))
+            self._emit(events.SetpointClipped(self._address, str(error)))
         current = self._queue.current
         if (current is not None and current.is_stream and not current.is_finished
                 and isinstance(current.change, Configure)
@@ -434,9 +427,7 @@ class ConfigurationManager:
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
-            left_out = self._rate.take(now) if cause is events.Cause.LIGHT else 0
-            self._emit(events.ConfigurationChanged(
-                self._address, configuration, names, cause, left_out))
+            self._emit(events.ConfigurationChanged(self._address, configuration, names, cause))
 
     def _follow(
         self, status: Status, confirmed: Configuration, reported: Configuration,
@@ -471,9 +462,8 @@ class ConfigurationManager:
         if due is not None:
             self._want({**{name: getattr(confirmed, name) for name in names}, **self._wanted},
                        Origin.OTHER_SENDER, due)
-        left_out = self._rate.take(now) if due is not None else 0
         self._emit(events.ChangedByOther(
-            self._address, reported.describe(names), due is not None, left_out))
+            self._address, reported.describe(names), due is not None))
         return due is not None
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:

@@ -128,14 +128,11 @@ class ConfigurationChanged(LightEvent):
     The confirmed configuration of a light has changed.
 
     :param names: the fields that differ from before.
-    :param left_out: how many changes by other senders were not worth a log line since the last
-        that was, None if this one is not worth a line either: there are too many.
     """
 
     configuration: Configuration
     names: list[str]
     cause: Cause
-    left_out: int | None = 0
 
 
 @dataclass(frozen=True)
@@ -158,7 +155,6 @@ class SetpointClipped(LightEvent):
     """A setpoint of a stream was beyond a limit, and is sent as that limit."""
 
     message: str
-    left_out: int
 
 
 @dataclass(frozen=True)
@@ -196,12 +192,10 @@ class ChangedByOther(LightEvent):
 
     :param change: the new values, for people.
     :param undone: whether it is undone; otherwise that was done often enough.
-    :param left_out: as for :class:`ConfigurationChanged`.
     """
 
     change: str
     undone: bool
-    left_out: int | None = 0
 
 
 @dataclass(frozen=True)
@@ -224,13 +218,11 @@ class LightSwitched(LightEvent):
     A light was switched on or off, which it was not before.
 
     :param detail: how it was asked for, such as ``service``; '' for another sender.
-    :param left_out: as for :class:`ConfigurationChanged`.
     """
 
     on: bool
     origin: Origin
     detail: str = ''
-    left_out: int | None = 0
 
 
 AnyLightEvent = LightEvent | StatusReceived

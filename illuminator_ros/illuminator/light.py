@@ -32,7 +32,7 @@ from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.identity import Identity, IdentityQuery
-from ..payload.rate_limit import RateLimit, RepeatLimit
+from ..payload.rate_limit import RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
 # s without a status after which the light is asked for one, and between the requests.
@@ -146,7 +146,6 @@ class Light:
         self._late_until = -math.inf
         # The brightness that the light reports while it is off: 0 where that is the switch, too.
         self._off_brightness: float | None = None
-        self._rate = RateLimit(configuration_manager.REPORT_INTERVAL)
         # When the last request came, or the light was seen to be switched on, s.
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
@@ -262,8 +261,7 @@ class Light:
                   or self._off_brightness == 0.0
                   and now <= self._configuration.sent_at + configuration_manager.IMPLIED_TIME)
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
-        self._emit(events.LightSwitched(
-            self.address, status.enabled, origin, left_out=self._rate.take(now)))
+        self._emit(events.LightSwitched(self.address, status.enabled, origin))
         # A light is switched on again only where a request has switched it on.
         if not self.settings.reassert or is_own or not on and before:
             return

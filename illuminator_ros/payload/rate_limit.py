@@ -46,25 +46,3 @@ class RepeatLimit:
         self._count += 1
         self._last = max(now, self._last + self._interval)
         return self._last
-
-
-class RateLimit:
-    """
-    Limits how often something that a peer can trigger is reported.
-
-    :param interval: s between two reports.
-    """
-
-    def __init__(self, interval: float) -> None:
-        self._interval = interval
-        self._due = -math.inf
-        self._left_out = 0
-
-    def take(self, now: float) -> int | None:
-        """Return None to leave a report out, else how many were left out since the last one."""
-        if now < self._due:
-            self._left_out += 1
-            return None
-        self._due = now + self._interval
-        left_out, self._left_out = self._left_out, 0
-        return left_out

@@ -165,18 +165,7 @@ def test_gm_14_a_player_that_is_not_in_control_is_refused(
         [] if isinstance(message, GimbalManagerSetPitchyaw) else [mav.MavResult.DENIED])
     assert rig.messages(GimbalDeviceSetAttitude) == []
     assert of(gimbal_manager.DemandRefused, rig.events) == [gimbal_manager.DemandRefused(
-        GUEST, f'{holder} has control' if holder else 'it must take control first', 0)]
-
-
-def test_refusals_are_reported_once_a_second() -> None:
-    rig = in_control()
-    for _ in range(100):
-        rig.points(GUEST)
-
-    rig.run(1.0, each=rig.heartbeats(PILOT))
-    rig.points(GUEST)
-
-    assert [one.unreported for one in of(gimbal_manager.DemandRefused, rig.events)] == [0, 99]
+        GUEST, f'{holder} has control' if holder else 'it must take control first')]
 
 
 @pytest.mark.parametrize(('policy', 'overrules', 'result'), [
@@ -364,8 +353,8 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_without_north(
     rig.report()
     rig.run(0.2)
     assert len(rig.messages(GimbalDeviceSetAttitude)) == count
-    assert of(gimbal_manager.ReferenceLost, rig.events) == [
-        gimbal_manager.ReferenceLost('heading')]
+    assert set(of(gimbal_manager.ReferenceLost, rig.events)) == {
+        gimbal_manager.ReferenceLost('heading')}
 
 
 def test_gm_2_an_axis_without_an_angle_keeps_its_direction_in_another_yaw_frame() -> None:

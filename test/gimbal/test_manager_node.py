@@ -276,7 +276,7 @@ def test_no_player_floods_the_log_or_holds_back_the_error_about_another_manager(
         _manager=GimbalManager(CommandSender(OURS), ManagerSettings()))
     for number in range(2 * MAX_KINDS):
         player = Address(1 + number // 100, 1 + number % 100)
-        ManagerNode._take(node, DemandRefused(player, 'reason', 0))
+        ManagerNode._take(node, DemandRefused(player, 'reason'))
         ManagerNode._take(node, RoleHolderChanged(Role.PRIMARY, None, player, Cause.CLAIM, player))
 
     ManagerNode._state_changed(node, StateChanged(

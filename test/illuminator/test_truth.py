@@ -22,7 +22,6 @@ from typing import Any
 from illuminator_ros.illuminator.events import (
     AnyLightEvent,
     Cause,
-    ConfigurationChanged,
     LightSwitched,
     Origin,
     StatusReceived,
@@ -240,21 +239,6 @@ def test_a_field_that_a_command_of_ours_implies_is_ours(
     fake.fields['brightness'] = 70.0
     faked.run(1.5)
     assert Cause.LIGHT not in [cause for cause, _ in faked.recorder.changes]
-
-
-def test_changes_by_another_sender_are_limited_in_rate_and_counted(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    events = events_of(faked)
-    fake.stream = 0.005
-    for number in range(400):
-        fake.fields['brightness'] = 10.0 + number % 80
-        faked.run(0.005)
-    changes = [event.left_out for event in events if isinstance(event, ConfigurationChanged)]
-    logged = [left_out for left_out in changes if left_out is not None]
-    assert len(changes) > 100
-    assert len(logged) <= 4
-    assert sum(logged) + len(logged) <= len(changes)
 
 
 def test_a_strobe_period_alone_also_sets_a_duty_cycle_that_is_0(

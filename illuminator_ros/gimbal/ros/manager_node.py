@@ -177,8 +177,7 @@ class ManagerNode(ServedPayload):
         elif isinstance(event, RoleHolderChanged):
             self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
         elif isinstance(event, gimbal_manager.DemandRefused):
-            more = f' ({event.unreported} more)' if event.unreported else ''
-            self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}{more}',
+            self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}',
                               'refused')
         elif isinstance(event, gimbal_manager.SetpointClipped):
             for one in event.clipped:

@@ -112,10 +112,9 @@ class EventPublisher:
                 known = ' '.join(filter(None, (identity.vendor, identity.model)))
                 serial = identity.serial_number and f', serial number {identity.serial_number}'
                 log.info(f'{light} is {known or "nameless"}{serial}', 'identity')
-            case events.LightSwitched(on=on, origin=origin, left_out=int(left_out)):
+            case events.LightSwitched(on=on, origin=origin):
                 way = event.detail if origin is events.Origin.REQUEST else origin.value
-                log.info(f'{light} was switched {_state(on)} by {way or "a request"}'
-                         f'{_left_out(left_out)}', 'switched')
+                log.info(f'{light} was switched {_state(on)} by {way or "a request"}', 'switched')
             case events.LightHeld(change=change):
                 log.info(f'{light} {describe(change)}', 'holder')
                 self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
@@ -131,9 +130,9 @@ class EventPublisher:
             case events.ChangedByOther(change=new, undone=False):
                 log.error(f'{light}: another sender keeps sending {new}, which stays from now on: '
                           'only one of the two programs must control the light', 'insists')
-            case events.ChangedByOther(change=new, left_out=int(left_out)):
-                log.warning(f'{light} was changed by another sender, which is undone: '
-                            f'{new}{_left_out(left_out)}', 'changed')
+            case events.ChangedByOther(change=new):
+                log.warning(f'{light} was changed by another sender, which is undone: {new}',
+                            'changed')
             case events.ConfigurationChanged():
                 self._configuration_changed(event)
             case events.ConfigurationRestored(success=True, message=message):
@@ -142,9 +141,9 @@ class EventPublisher:
                 log.error(f'{light} not configured: {message}', 'not configured')
             case events.SetpointFailed(message=message):
                 log.warning(f'~/{self._source}cmd/brightness: {message}', 'setpoint')
-            case events.SetpointClipped(message=message, left_out=left_out):
-                log.warning(f'~/{self._source}cmd/brightness: {message}: the limit is sent'
-                            f'{_left_out(left_out)}', 'clipped')
+            case events.SetpointClipped(message=message):
+                log.warning(f'~/{self._source}cmd/brightness: {message}: the limit is sent',
+                            'clipped')
             case events.LimitExceeded(excess=excess, impossible=impossible):
                 if impossible:
                     log.error(f'{light}: {impossible}', 'impossible limit')
@@ -182,9 +181,8 @@ class EventPublisher:
 
     def _configuration_changed(self, event: events.ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names
-        if event.cause is events.Cause.LIGHT and event.left_out is not None:
-            self._log.info(f'light {event.address} was changed: '
-                           f'{configuration.describe(names)}{_left_out(event.left_out)}',
+        if event.cause is events.Cause.LIGHT:
+            self._log.info(f'light {event.address} was changed: {configuration.describe(names)}',
                            'changed')
         if 'strobe_period' in names:
             self._fit(configuration.strobe_period)
@@ -221,7 +219,3 @@ def _value(configuration: model.Configuration, name: str) -> object:
 
 def _state(on: bool) -> str:
     return 'on' if on else 'off'
-
-
-def _left_out(changes: int) -> str:
-    return f' ({changes} changes before were not logged)' if changes else ''
