@@ -143,9 +143,11 @@ def measure(bench: Bench) -> Iterator[Row]:
 
 def _setpoints(bench: Bench) -> Row:
     took: dict[str, list[float]] = {'manager': [], 'forwarder': []}
-    with managed() as (port, device, players), Listener() as far:
+    far = Line().socket
+    far.settimeout(5.0)
+    with far, managed() as (port, device, players):
         forward = free_port()
-        with peer('forwarder', str(forward), str(far.port)):
+        with peer('forwarder', str(forward), str(far.getsockname()[1])):
             beat = 0.0
             for number in range(bench.amount(400, 20)):
                 if time.monotonic() >= beat:
@@ -164,25 +166,11 @@ def _setpoints(bench: Bench) -> Row:
                 time.sleep(PERIOD)
                 began = time.perf_counter()
                 players.socket.sendto(data, ('127.0.0.1', forward))
-                far.socket.recv(2048)
+                far.recv(2048)
                 took['forwarder'].append((time.perf_counter() - began) * 1e3)
     ours, theirs = (quantiles(values[bench.amount(WARM_UP, 0):]) for values in took.values())
     return Row('setpoint of a MAVLink player through the manager to the device', 'ms', ours,
                {'bare UDP forwarder': theirs}, [times(ours, theirs, 3.0, 'p50')])
-
-
-class Listener:
-    """A UDP socket for the forwarder."""
-
-    def __enter__(self) -> Listener:
-        self.socket = socket.socket(type=socket.SOCK_DGRAM)
-        self.socket.bind(('127.0.0.1', 0))
-        self.socket.settimeout(5.0)
-        self.port: int = self.socket.getsockname()[1]
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.socket.close()
 
 
 def _competition(bench: Bench) -> Iterator[Row]:

@@ -238,7 +238,3 @@ def _long_name_refusal(arguments: list[str], limit: int) -> str:
     length = sum(len(value) + 1 for value in given.values())
     return (f'node name and namespace have {length} characters together: the limit is {limit}'
             if length > limit else '')
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -194,7 +194,7 @@ class Light:
             self._note(status, now)
             self._publish(status, now)
         report, restarted = self._tracker.take(
-            status, uptime, now, sender=sender, was_lost=was_lost,
+            status, uptime, now, sender=sender,
             commanded=is_confirming or bool(
                 self._switching.current or self._configuration.is_changing))
         if report is None:

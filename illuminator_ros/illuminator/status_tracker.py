@@ -102,7 +102,9 @@ class UptimeClock:
         if uptime_ms == last_ms:
             # The same status twice or within a millisecond, or a light that has no clock.
             is_same = elapsed < NO_CLOCK_TIME and (self._has_clock or not was_lost)
-            return Uptime.RUNNING if is_same else Uptime.NO_CLOCK
+            if is_same:
+                return Uptime.RUNNING
+            return Uptime.RESTARTED if was_lost else Uptime.NO_CLOCK
         ahead_ms = uptime_difference(uptime_ms, last_ms)
         has_progressed = ahead_ms >= 0
         lag = elapsed - ahead_ms / 1000
@@ -395,14 +397,12 @@ class StatusTracker:
         return self._clock.take(status.uptime_ms, now, was_lost=was_lost)
 
     def take(
-        self, status: Status, uptime: Uptime, now: float, *, was_lost: bool, commanded: bool,
-        sender: int = 0,
+        self, status: Status, uptime: Uptime, now: float, *, commanded: bool, sender: int = 0,
     ) -> tuple[Report[Status] | None, bool]:
         """
         Return the report of a status, None if it is late, and whether the light has restarted.
 
         :param sender: of the message.
-        :param was_lost: whether the light was lost since the newest status.
         :param commanded: whether a command of ours may have changed the light.
         """
         conflict = self.conflict
@@ -414,7 +414,7 @@ class StatusTracker:
                           conflict.span), False
         if uptime is Uptime.LATE:
             return None, False
-        restarted = uptime is Uptime.RESTARTED or uptime is Uptime.NO_CLOCK and was_lost
+        restarted = uptime is Uptime.RESTARTED
         if restarted:
             self._sending_times = SendingTimes()
         sent_by, has_clock = self._sending_times.take(status, now)

@@ -178,7 +178,6 @@ class CommandResult(NamedTuple):
     tries: int = 0
     elapsed: float = 0.0
     progress: int | None = None
-    result_param2: int = 0
     earlier: EarlierCommand | None = None
 
     @property
@@ -352,7 +351,6 @@ class CommandCounters:
     sent: int = 0
     resent: int = 0
     unanswered: int = 0
-    unexpected_acks: int = 0
 
 
 @dataclass
@@ -469,11 +467,9 @@ class CommandSender:
                 if not request.answers_another_try(ack.result):
                     self._answered(request, ack, now)
                     return
-        if not is_expected:
-            self.counters.unexpected_acks += 1
-            if source in self._round_trips:
-                self._estimator(source).expect_ambiguous(now)
-                self._measure_resent(source, ack.command, now)
+        if not is_expected and source in self._round_trips:
+            self._estimator(source).expect_ambiguous(now)
+            self._measure_resent(source, ack.command, now)
 
     def _measure_resent(self, source: Address, command: int, now: float) -> None:
         """
@@ -512,7 +508,7 @@ class CommandSender:
             request.rejected += 1
             self._transmit(request, now)
         else:
-            self._end(request, CommandStatus.ANSWERED, now, ack.result_param2)
+            self._end(request, CommandStatus.ANSWERED, now)
             return
         request.state = state
 
@@ -580,9 +576,7 @@ class CommandSender:
             timeout = min(timeout * 2 ** min(lost, 16), self.timeout)
         request.due = now + timeout
 
-    def _end(
-        self, request: _Request, status: CommandStatus, now: float, result_param2: int = 0,
-    ) -> None:
+    def _end(self, request: _Request, status: CommandStatus, now: float) -> None:
         command, key = request.command, request.key
         requests = self._requests.get(command.target, [])
         if request not in requests:
@@ -595,7 +589,7 @@ class CommandSender:
             return
         result = CommandResult(
             status, request.result, request.tries, now - request.first_sent, request.progress,
-            result_param2, self._earlier.pop(key, None))
+            self._earlier.pop(key, None))
         answered = status is CommandStatus.ANSWERED
         while self._earlier and now > (
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:

@@ -94,7 +94,6 @@ class DecoderCounters:
     frames: int = 0
     foreign: int = 0
     crc_errors: int = 0
-    unknown_ids: int = 0
     skipped_bytes: int = 0
 
 
@@ -282,7 +281,6 @@ class Decoder:
         # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting
         # for the rest of it would hold back the good frames behind.
         if layout is None or flags & ~FLAG_SIGNED or version == 1 and length > layout.size:
-            self.counters.unknown_ids += layout is None
             return 1, None
         end = start + header + length + CHECKSUM
         size = end - start + (SIGNATURE if flags else 0)

@@ -336,8 +336,7 @@ class Request(Generic[S]):
         self.phase = TRANSITIONS[self.phase, step]
         # A status from between two repeats may show what an earlier command still undoes.
         self._sent_at = now
-        change = self.change
-        assert change is not None
+        change = self._sent
         self._target.send(
             change.command, change.params, now, self._answered, limit=self.limit,
             overtake=self.overtakes)
@@ -389,8 +388,7 @@ class Request(Generic[S]):
             return
         delay = (self._target.shortest_round_trip(now) if report.has_clock
                  else self._target.status_delay)
-        change = self.change
-        assert change is not None
+        change = self._sent
         shown = change.shown_by(report.status)
         if (shown and not self._was_repeated and self._before is not None
                 and not change.shown_by(self._before)):
@@ -477,10 +475,8 @@ class Request(Generic[S]):
     def _succeed(
         self, how: str, now: float, status: S | None = None, *, superseded: bool = False,
     ) -> None:
-        change, answer = self.change, self._outcome
-        assert change is not None and answer is not None
-        self._end(f'{change.goal}, {how}: {answer.describe()}', now, status,
-                  success=True, superseded=superseded, note=change.note)
+        self._end(f'{self._sent.goal}, {how}: {self._answer.describe()}', now, status,
+                  success=True, superseded=superseded, note=self._sent.note)
 
     def _end(
         self, text: str, now: float, status: S | None = None, *, success: bool = False,

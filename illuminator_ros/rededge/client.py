@@ -72,14 +72,11 @@ class RedEdgeClient(Payload):
         self.settings = settings
         self.events: Listeners[CameraEvent | InputChanged] = Listeners()
 
-        def send(message: Message) -> None:
-            commands.outgoing.append((commands.address, message))
-
         self.camera = Camera(
-            commands.address, settings.heartbeat_timeout, send, self.events.emit,
+            commands.address, settings.heartbeat_timeout, commands.send, self.events.emit,
             sequence=random.getrandbits(32) if sequence is None else sequence)
         self.feeder = Feeder(
-            settings.feeder, send, lambda: self.camera.target, self.events.emit)
+            settings.feeder, commands.send, lambda: self.camera.target, self.events.emit)
 
     def snapshot(self, now: float) -> ClientSnapshot:
         """Return camera and inputs at this moment; call it in a turn of the link."""

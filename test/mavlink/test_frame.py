@@ -125,7 +125,7 @@ def test_counters_distinguish_frames_and_faults() -> None:
     assert 255 not in LAYOUTS
     decoder.feed(b'noise' + frame_of() + spoilt(frame_of()) + foreign
                  + frame_of() + raw_v1(255, b'\1', crc_extra=0) + frame_of())
-    assert decoder.counters == DecoderCounters(3, 0, 1, 2, 5 + len(frame_of()) + 13 + 9)
+    assert decoder.counters == DecoderCounters(3, 0, 1, 5 + len(frame_of()) + 13 + 9)
 
 
 def _frames() -> list[bytes]:

@@ -131,7 +131,7 @@ class Rig:
             target: Address = OURS, result_param2: int = 0) -> None:
         """Acknowledge a command at once."""
         self.sender.acknowledge(
-            source, CommandAck(command, result, progress, result_param2, *target), self.now)
+            source, CommandAck(command, result, progress, 0, *target), self.now)
         self.flush()
 
     def flush(self) -> None:
