@@ -29,10 +29,10 @@ from .model import (
     Configuration,
     FIELDS,
     InvalidValue,
-    Limits,
     NOTHING,
     SafetyLimits,
     Status,
+    StrobeRange,
     unexpected_differences,
 )
 from ..payload.rate_limit import RepeatLimit
@@ -121,7 +121,7 @@ class ConfigurationManager:
         self._address = target.address
         self._emit = emit
         self._restore = restore
-        self._safety = limits
+        self._limits = limits
         self._is_limited = limits != SafetyLimits()
         self.limit_exceeded = events.LimitExceeded(target.address, (), '')
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
@@ -170,8 +170,8 @@ class ConfigurationManager:
         return self._sent.at if self._sent else -math.inf
 
     @property
-    def _limits(self) -> Limits:
-        return self._status.limits if self._status else Limits()
+    def _strobe_range(self) -> StrobeRange:
+        return self._status.strobe_range if self._status else StrobeRange()
 
     # Requests
 
@@ -185,7 +185,7 @@ class ConfigurationManager:
         try:
             values = self._checked(changes)
             for name, value in values.items():
-                self._safety.check(name, value)
+                self._limits.check(name, value)
         except InvalidValue as error:
             done(Result(False, str(error), permanent=True), now)
             return
@@ -194,9 +194,9 @@ class ConfigurationManager:
     def set_brightness(self, brightness: float, now: float) -> None:
         """Take a setpoint of a stream, %, checked; the light is connected."""
         try:
-            self._safety.check('brightness', brightness)
+            self._limits.check('brightness', brightness)
         except InvalidValue as error:
-            brightness = self._safety.max_brightness
+            brightness = self._limits.max_brightness
             self._emit(events.SetpointClipped(self._address, str(error)))
         current = self._queue.current
         if (current is not None and current.is_stream and not current.is_finished
@@ -247,7 +247,7 @@ class ConfigurationManager:
                 self._pending = None
 
     def _checked(self, changes: Changes) -> dict[str, float]:
-        return {name: checked(name, value, self._limits) for name, value in changes.items()}
+        return {name: checked(name, value, self._strobe_range) for name, value in changes.items()}
 
     def _goal(self, values: Changes) -> Configure:
         """
@@ -271,7 +271,7 @@ class ConfigurationManager:
                         f'{DEFAULT_DUTY_CYCLE:g} %')
             goal = replace(self._sendable(self.confirmed, values), **values)
         # Here, since each command is made here: no way to the light passes around the limits.
-        limited = self._safety.clipped(goal, self._limits)
+        limited = self._limits.clipped(goal, self._strobe_range)
         return Configure(limited, list(dict.fromkeys((*values, *goal.differences(limited)))),
                          note)
 
@@ -288,7 +288,7 @@ class ConfigurationManager:
         for name in FIELDS:
             try:
                 if name != 'mode' and name not in changes:
-                    checked(name, getattr(confirmed, name), self._limits)
+                    checked(name, getattr(confirmed, name), self._strobe_range)
             except InvalidValue:
                 ruled_out[name] = getattr(reported, name)
         return replace(confirmed, **ruled_out)
@@ -469,14 +469,15 @@ class ConfigurationManager:
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it, once."""
         exceeded = events.LimitExceeded(
-            self._address, self._safety.excess(reported), self._safety.impossible(self._limits))
+            self._address, self._limits.excess(reported),
+            self._limits.impossible(self._strobe_range))
         if exceeded != self.limit_exceeded:
             self.limit_exceeded = exceeded
             self._emit(exceeded)
         # Values that another sender has changed may be put back only later.
         is_free = self._pending is None or self._pending.origin is Origin.OTHER_SENDER
         if exceeded.excess and is_free and (due := self._limiting.take(now)) is not None:
-            limited = self._safety.clipped(reported, self._limits)
+            limited = self._limits.clipped(reported, self._strobe_range)
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
             self._pending = Pending({**values, **self._wanted}, Origin.LIMIT, due)
 
@@ -548,7 +549,7 @@ class ConfigurationManager:
             pending.due += STATUS_TIMEOUT
         for name, value in pending.values.items():
             try:
-                checked(name, value, self._limits)
+                checked(name, value, self._strobe_range)
             except InvalidValue as error:
                 self._drop_pending([name])
                 self._restored(False, str(error))

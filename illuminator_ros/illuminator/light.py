@@ -25,7 +25,7 @@ from .command_sources import LightSources
 from .commands import SWITCHES
 from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
-from .model import Changes, DIMMING_FLAGS, ErrorFlag, Limits, Mode, SafetyLimits, Status
+from .model import Changes, DIMMING_FLAGS, ErrorFlag, Mode, SafetyLimits, Status, StrobeRange
 from .status_tracker import RESTART_PROOF_TIME, StatusTracker, Uptime
 from ..mavlink.command_sender import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
@@ -332,9 +332,9 @@ class Light:
     # Values
 
     @property
-    def limits(self) -> Limits:
+    def strobe_range(self) -> StrobeRange:
         """Return the strobe periods that the light reports to be possible."""
-        return self.status.limits if self.status else Limits()
+        return self.status.strobe_range if self.status else StrobeRange()
 
     @property
     def temperature(self) -> float | None:

@@ -111,7 +111,7 @@ def shortest(value: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class StrobeRange:
     """
     The strobe periods that a light reports to be possible, s.
 
@@ -130,8 +130,8 @@ class Limits:
 
 
 @lru_cache(maxsize=256)
-def _limits(low: float, high: float) -> Limits:
-    return Limits(low, high)
+def _strobe_range(low: float, high: float) -> StrobeRange:
+    return StrobeRange(low, high)
 
 
 class InvalidValue(ValueError):
@@ -191,7 +191,7 @@ _NUMBERS = {'brightness': ('%', 100.0), 'strobe_period': ('s', MAX_STROBE_PERIOD
             'strobe_duty_cycle': ('%', 100.0)}
 
 
-def checked(name: str, value: object, limits: Limits | None = None) -> Mode | float:
+def checked(name: str, value: object, strobe_range: StrobeRange | None = None) -> Mode | float:
     """
     Return the value of a configuration field, ready to be sent.
 
@@ -213,18 +213,19 @@ def checked(name: str, value: object, limits: Limits | None = None) -> Mode | fl
     if not 0 <= value <= upper:
         raise InvalidValue(f'{name} {value:g} {unit} is out of range: 0 to {upper:g} {unit}')
     if name == 'strobe_period':
-        _check_period(float(value), limits)
+        _check_period(float(value), strobe_range)
     return float(value)
 
 
-def _check_period(period: float, limits: Limits | None) -> None:
+def _check_period(period: float, strobe_range: StrobeRange | None) -> None:
     """Compare as float32, which is what the light compares: 0.1 there is more than 0.1."""
     sent = float32(period)
-    if period and limits and limits.known and not (
-            limits.min_strobe_period <= sent <= limits.max_strobe_period):
+    if period and strobe_range and strobe_range.known and not (
+            strobe_range.min_strobe_period <= sent <= strobe_range.max_strobe_period):
         raise InvalidValue(
             f'strobe_period {period:g} s is outside what the light reports: 0 (no strobe) or '
-            f'{shortest(limits.min_strobe_period):g} to {shortest(limits.max_strobe_period):g} s')
+            f'{shortest(strobe_range.min_strobe_period):g} to '
+            f'{shortest(strobe_range.max_strobe_period):g} s')
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,29 +257,30 @@ class SafetyLimits:
                     f'{self.min_strobe_period:g} s')
         return ''
 
-    def clipped(self, configuration: Configuration, limits: Limits) -> Configuration:
+    def clipped(self, configuration: Configuration, strobe_range: StrobeRange) -> Configuration:
         """
         Return the configuration within the limits that is nearest to another one.
 
-        :param limits: those of the light; where these exclude each other it does not strobe.
+        :param strobe_range: of the light; where it excludes the limit the light does not strobe.
         """
         brightness = min(configuration.brightness, self.max_brightness)
         period = configuration.strobe_period
         if self._excess('strobe_period', period):
-            period = 0.0 if self.impossible(limits) else self.min_strobe_period
+            period = 0.0 if self.impossible(strobe_range) else self.min_strobe_period
         return replace(configuration, brightness=brightness, strobe_period=period)
 
     def excess(self, configuration: Configuration) -> tuple[str, ...]:
         """Describe how a configuration exceeds the limits by more than a light's own steps."""
         return tuple(self._excess(name, getattr(configuration, name)) for name
-                     in configuration.differences(self.clipped(configuration, Limits())))
+                     in configuration.differences(self.clipped(configuration, StrobeRange())))
 
-    def impossible(self, limits: Limits) -> str:
+    def impossible(self, strobe_range: StrobeRange) -> str:
         """Describe why a light cannot strobe within the limits, '' if it can."""
-        if not limits.known or float32(self.min_strobe_period) <= limits.max_strobe_period:
+        longest = strobe_range.max_strobe_period
+        if not strobe_range.known or float32(self.min_strobe_period) <= longest:
             return ''
         return (f'min_strobe_period {self.min_strobe_period:g} s is above the '
-                f'{shortest(limits.max_strobe_period):g} s that the light can do')
+                f'{shortest(longest):g} s that the light can do')
 
 
 @dataclass(slots=True)
@@ -305,7 +307,7 @@ class Status:
     strobe_period: float | None
     strobe_duty_cycle: float | None
     temperature: float | None
-    limits: Limits
+    strobe_range: StrobeRange
     invalid: tuple[str, ...] = ()
     gimbal_device_id: int = 0
 
@@ -313,14 +315,14 @@ class Status:
     def from_message(cls, message: IlluminatorStatus) -> Status:
         """Read a message. Each content is accepted: a wrong field is marked, not raised."""
         brightness, duty = message.brightness, message.strobe_duty_cycle
-        limits = _limits(message.min_strobe_period, message.max_strobe_period)
+        strobe_range = _strobe_range(message.min_strobe_period, message.max_strobe_period)
         if (message.enable in (0, 1) and message.mode in _MODES and 0.0 <= brightness <= 100.0
                 and 0.0 <= duty <= 100.0 and 0.0 <= message.strobe_period <= MAX_STROBE_PERIOD
                 and ABSOLUTE_ZERO_C <= message.temp_c <= MAX_TEMPERATURE_C):
             return cls(
                 message.uptime_ms, message.enable == 1, _MODES[message.mode],
                 message.mode_bitmask, message.error_status, brightness, message.strobe_period,
-                duty, message.temp_c, limits, (), message.gimbal_device_id)
+                duty, message.temp_c, strobe_range, (), message.gimbal_device_id)
         invalid: list[str] = []
 
         def number(name: str, low: float, high: float) -> float | None:
@@ -343,7 +345,7 @@ class Status:
             number('brightness', 0, 100), number('strobe_period', 0, MAX_STROBE_PERIOD),
             number('strobe_duty_cycle', 0, 100),
             number('temp_c', ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C),
-            limits, tuple(invalid), message.gimbal_device_id)
+            strobe_range, tuple(invalid), message.gimbal_device_id)
 
     @property
     def complete(self) -> bool:

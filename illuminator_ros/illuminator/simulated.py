@@ -145,13 +145,13 @@ class SimulatedIlluminator(SimulatedDevice):
         flags = thermal.flags | behaviour.false_flags
         if behaviour.inverted_flags and self.enabled:
             flags ^= model.ErrorFlag.THERMAL_THROTTLING
-        limits = self.properties.limits if behaviour.measures else model.Limits()
+        strobe_range = self.properties.strobe_range if behaviour.measures else model.StrobeRange()
         fields = (
             self.uptime_ms(now) if behaviour.has_clock else 0, int(self.enabled),
             self.properties.reported_bitmask, flags, int(configuration.mode), brightness,
             configuration.strobe_period, configuration.strobe_duty_cycle,
             thermal.reading if behaviour.measures else 0.0,
-            limits.min_strobe_period, limits.max_strobe_period)
+            strobe_range.min_strobe_period, strobe_range.max_strobe_period)
         return IlluminatorStatus(*fields, *(behaviour.extension or ()))
 
     def _information(self, now: float) -> mav.ComponentInformationBasic:
@@ -184,7 +184,7 @@ class SimulatedIlluminator(SimulatedDevice):
     def _configuration_reply(
         self, mode: float, brightness: float, period: float, duty_cycle: float,
     ) -> CommandReply:
-        behaviour, limits = self.behaviour, self.properties.limits
+        behaviour, strobe_range = self.behaviour, self.properties.strobe_range
         known = mode in (model.Mode.INTERNAL_CONTROL, model.Mode.EXTERNAL_SYNC)
         configuration = model.Configuration(
             model.Mode(int(mode)) if known else self.configuration.mode, brightness, period,
@@ -197,7 +197,7 @@ class SimulatedIlluminator(SimulatedDevice):
             for name, value in (('brightness', brightness), ('strobe_period', period),
                                 ('strobe_duty_cycle', duty_cycle)):
                 if not (math.isnan(value) and behaviour.accepts_nan):
-                    model.checked(name, value, limits)
+                    model.checked(name, value, strobe_range)
         except model.InvalidValue:
             accepted = behaviour.accepts_out_of_range
         else:
@@ -225,9 +225,9 @@ class SimulatedIlluminator(SimulatedDevice):
         :raises InvalidValue: if the light cannot be set so.
         """
         self.warm(now)
-        limits = self.properties.limits
+        strobe_range = self.properties.strobe_range
         checked: model.Changes = {
-            name: model.checked(name, value, limits) for name, value in changes.items()}
+            name: model.checked(name, value, strobe_range) for name, value in changes.items()}
         configuration = replace(self.configuration, **checked)
 
         def change() -> None:
@@ -343,8 +343,9 @@ def properties(
         return {name: settings[name] for name in names if name in settings}
 
     profile = _profile(settings)
-    limits = replace(profile.limits, **given(field.name for field in fields(model.Limits)))
-    if limits.min_strobe_period > limits.max_strobe_period:
+    strobe_range = replace(
+        profile.strobe_range, **given(field.name for field in fields(model.StrobeRange)))
+    if strobe_range.min_strobe_period > strobe_range.max_strobe_period:
         raise ValueError('min_strobe_period is above max_strobe_period')
     behaviour = profile.behaviour
     if extension := given(Extension._fields):
@@ -358,7 +359,8 @@ def properties(
         identity = replace(
             identity, serial_number=f'{identity.serial_number}-{address.component}')
     return replace(
-        profile, address=address, identity=identity, limits=limits, behaviour=behaviour,
+        profile, address=address, identity=identity, strobe_range=strobe_range,
+        behaviour=behaviour,
         thermal=ThermalProperties(**{**given(['ambient']), **settings.get('thermal', {})}),
         **given(['modes', 'mode_bitmask', 'status_interval', 'time_scale']))
 

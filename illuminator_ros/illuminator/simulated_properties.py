@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import functools
 from typing import NamedTuple
 
-from .model import ErrorFlag, Limits, Mode
+from .model import ErrorFlag, Mode, StrobeRange
 from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
@@ -109,7 +109,7 @@ class IlluminatorProperties:
     address: messages.Address = messages.Address(1, messages.MAV_COMP_ID_ILLUMINATOR)
     identity: Identity = Identity(
         'illuminator_ros', 'simulator', __version__, '1.0.0', 'SIM-1-243')
-    limits: Limits = Limits(0.05, 10.0)
+    strobe_range: StrobeRange = StrobeRange(0.05, 10.0)
     modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
     mode_bitmask: int | None = None
     shifted_bitmask: bool = False
@@ -140,7 +140,7 @@ PROFILES = {
         'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
         'status at 1 Hz or not at all',
         IlluminatorProperties(
-            address=messages.Address(255, 0), limits=Limits(0.0, 10.0),
+            address=messages.Address(255, 0), strobe_range=StrobeRange(0.0, 10.0),
             identity=Identity(
                 'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
                 'Illuminator Hardware Version', 'Illuminator Serial Number'),
@@ -153,7 +153,8 @@ PROFILES = {
         "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
         'for what it does not measure, brightness 0 is off',
         IlluminatorProperties(
-            address=messages.Address(1, messages.MAV_COMP_ID_AUTOPILOT1), limits=Limits(0.0, 0.0),
+            address=messages.Address(1, messages.MAV_COMP_ID_AUTOPILOT1),
+            strobe_range=StrobeRange(0.0, 0.0),
             modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True,
             behaviour=IlluminatorBehaviour(
                 heartbeat_type=messages.MavType.SUBMARINE,

@@ -18,7 +18,7 @@ from dataclasses import replace
 import math
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.model import Limits, Mode
+from illuminator_ros.illuminator.model import Mode, StrobeRange
 from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
@@ -84,7 +84,7 @@ PROPERTIES = {
     'address': IlluminatorProperties(address=Address(255, 0)),
     'status-stream': IlluminatorProperties(status_interval=0.0),
     'status-mode': IlluminatorProperties(mode_bitmask=0),
-    'strobe-limits': IlluminatorProperties(limits=Limits(5.0, 1.0)),
+    'strobe-limits': IlluminatorProperties(strobe_range=StrobeRange(5.0, 1.0)),
     'information-text': IlluminatorProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
     'mode-internal': IlluminatorProperties(modes=()),
 }

@@ -31,7 +31,7 @@ from support.fake_light import status_message
 from support.messages import decode_payload
 
 NAN, INF = math.nan, math.inf
-LIMITS = model.Limits(model.float32(0.05), model.float32(10.0))
+LIMITS = model.StrobeRange(model.float32(0.05), model.float32(10.0))
 BASE = model.Configuration(model.Mode.INTERNAL_CONTROL, 50.0, 1.0, 25.0)
 SYNCED = replace(BASE, mode=model.Mode.EXTERNAL_SYNC)
 UNKNOWN = replace(BASE, mode=model.Mode.UNKNOWN)
@@ -78,8 +78,8 @@ def test_an_invalid_value_is_refused_with_a_short_reason(
 
 @given(st.integers(1, 100_000).map(lambda number: number / 1000))
 def test_a_period_on_a_limit_is_valid_although_float32_moves_the_limit(limit: float) -> None:
-    for limits in (model.Limits(model.float32(limit), 3600.0),
-                   model.Limits(0.0, model.float32(limit))):
+    for limits in (model.StrobeRange(model.float32(limit), 3600.0),
+                   model.StrobeRange(0.0, model.float32(limit))):
         assert model.checked('strobe_period', limit, limits) == limit
 
 
@@ -91,7 +91,7 @@ def test_a_period_on_a_limit_is_valid_although_float32_moves_the_limit(limit: fl
 def test_limits_of_a_light_count_only_where_they_are_possible(
     low: float, high: float, known: bool,
 ) -> None:
-    limits = read(min_strobe_period=low, max_strobe_period=high).limits
+    limits = read(min_strobe_period=low, max_strobe_period=high).strobe_range
     assert limits.known is known
     if not known:
         assert model.checked('strobe_period', 77.0, limits) == 77.0
@@ -189,7 +189,7 @@ def test_a_plausible_status_is_read_as_sent() -> None:
     assert status == model.Status(
         uptime_ms=1234, enabled=True, mode=model.Mode.EXTERNAL_SYNC, mode_bitmask=2, error_flags=5,
         brightness=50.0, strobe_period=0.5, strobe_duty_cycle=25.0, temperature=-40.5,
-        limits=model.Limits(0.25, 8.0), invalid=())
+        strobe_range=model.StrobeRange(0.25, 8.0), invalid=())
 
 
 @pytest.mark.parametrize('value', [NAN, INF, -INF, 3.0e38, -3.0e38])

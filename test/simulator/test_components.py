@@ -21,7 +21,7 @@ from typing import Any, cast
 from illuminator_ros.cli.simulator import components
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.gimbal.simulated_manager import SIMULATED as MANAGERS
-from illuminator_ros.illuminator.model import Limits, Mode
+from illuminator_ros.illuminator.model import Mode, StrobeRange
 from illuminator_ros.illuminator.simulated import SIMULATED, SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
@@ -67,8 +67,8 @@ def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(
 
 def test_without_arguments_a_light_follows_the_protocol() -> None:
     (light,), (one,) = described(), properties()
-    assert (one.limits, one.reported_bitmask, one.identity.serial_number) == (
-        Limits(0.05, 10.0), 3, 'SIM-1-243')
+    assert (one.strobe_range, one.reported_bitmask, one.identity.serial_number) == (
+        StrobeRange(0.05, 10.0), 3, 'SIM-1-243')
     assert faults(light) == []
 
 
@@ -81,7 +81,7 @@ def test_each_option_sets_its_property() -> None:
     identity, thermal = light.identity, light.thermal
     assert (identity.vendor, identity.model, identity.serial_number) == ('ACME', 'Sun', '0815')
     assert (identity.software_version, identity.hardware_version) == ('2.0', 'B')
-    assert light.limits == Limits(0.2, 5.0)
+    assert light.strobe_range == StrobeRange(0.2, 5.0)
     assert (light.modes, light.reported_bitmask) == ((Mode.INTERNAL_CONTROL,), 1)
     assert (light.status_interval, light.time_scale) == (0.5, 10.0)
     assert (thermal.ambient, thermal.rise, thermal.time_constant) == (40, 80, 30)

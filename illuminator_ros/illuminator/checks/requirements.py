@@ -33,7 +33,7 @@ from .tester import (
     status_text,
 )
 from ..messages import IlluminatorStatus
-from ..model import ErrorFlag, flag_names, float32, KNOWN_FLAGS, Limits, Mode, Status
+from ..model import ErrorFlag, flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
 from ...mavlink import messages
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
@@ -226,7 +226,7 @@ not_a_number = _rejects(
 
 def _strobe(
     name: str, title: str, specification: Specification, section: str,
-    values: Callable[[Limits], list[tuple[float, float]]], *shown: str,
+    values: Callable[[StrobeRange], list[tuple[float, float]]], *shown: str,
 ) -> Requirement[LightTester]:
     """
     Return a requirement on strobe periods and duty cycles.
@@ -239,9 +239,9 @@ def _strobe(
     async def check(tester: LightTester) -> str:
         await tester.baseline()
         status = await tester.status()
-        if status is None or not status.limits.known:
+        if status is None or not status.strobe_range.known:
             raise Skipped('it reports no strobe limits')
-        sent = values(status.limits)
+        sent = values(status.strobe_range)
         fail_if([
             (await tester.configure(period=period, duty=duty)).unmet(*shown) if shown
             else await tester.rejected(CONFIGURE, INTERNAL, LOW, period, duty)
@@ -250,32 +250,34 @@ def _strobe(
     return check
 
 
-def _within(period: float, limits: Limits) -> float:
-    return float32(min(max(period, limits.min_strobe_period), limits.max_strobe_period))
+def _within(period: float, reported: StrobeRange) -> float:
+    return float32(min(max(period, reported.min_strobe_period), reported.max_strobe_period))
 
 
 STROBE = (
     _strobe('strobe', 'applies a strobe period and duty cycle', ILLUMINATOR, 'CONFIGURE',
-            lambda limits: [
-                (_within(1.0, limits), 50.0), (_within(0.5, limits), 25.0), (0.0, 0.0)],
+            lambda reported: [
+                (_within(1.0, reported), 50.0), (_within(0.5, reported), 25.0), (0.0, 0.0)],
             'strobe_period', 'strobe_duty_cycle'),
     _strobe('strobe-limit-values', 'accepts the strobe periods that it reports as its limits',
             MESSAGES, 'ILLUMINATOR_STATUS',
             # Except 0, which means no strobe.
-            lambda limits: [(one, 50.0) for one in astuple(limits) if one],
+            lambda reported: [(one, 50.0) for one in astuple(reported) if one],
             'strobe_period'),
     _strobe('strobe-values', 'rejects a strobe period outside its limits',
             MESSAGES, CONFIGURE_SECTION,
             # Half of a smallest period of 0 would be 0, which means no strobe.
-            lambda limits: [(period, 50.0) for period in (
-                -1.0, limits.max_strobe_period * 1.5, limits.min_strobe_period / 2) if period]),
+            lambda reported: [
+                (period, 50.0) for period in (
+                    -1.0, reported.max_strobe_period * 1.5, reported.min_strobe_period / 2)
+                if period]),
     _strobe('duty-cycle', 'accepts strobe duty cycles of 0 % and 100 %',
             MESSAGES, CONFIGURE_SECTION,
-            lambda limits: [(_within(1.0, limits), duty) for duty in (0.0, 100.0)],
+            lambda reported: [(_within(1.0, reported), duty) for duty in (0.0, 100.0)],
             'strobe_duty_cycle'),
     _strobe('duty-cycle-values', 'rejects a duty cycle outside 0 to 100 %',
             MESSAGES, CONFIGURE_SECTION,
-            lambda limits: [(_within(1.0, limits), duty) for duty in (-1.0, 101.0)]),
+            lambda reported: [(_within(1.0, reported), duty) for duty in (-1.0, 101.0)]),
 )
 
 
@@ -320,7 +322,7 @@ async def mode(tester: LightTester) -> str:
 async def limits(tester: LightTester) -> str:
     """Compare the limits."""
     status = await _status(tester)
-    low, high = status.limits.min_strobe_period, status.limits.max_strobe_period
+    low, high = astuple(status.strobe_range)
     if low == high == 0:
         raise Skipped('both are 0: it reports no strobe limits')
     if not (math.isfinite(low) and math.isfinite(high) and 0 <= low <= high):

@@ -81,7 +81,7 @@ class EventPublisher:
         self._max_brightness = limits.max_brightness
         # The source of setpoints as a part of its topics.
         self._source = ''
-        self._limits = model.Limits()
+        self._strobe_range = model.StrobeRange()
         self._condition: tuple[object, ...] = ()
         self._flags = FlagLog()
         interface.publish('connected', False)
@@ -165,14 +165,14 @@ class EventPublisher:
             self._interface.publish_to_subscribers('temperature', lambda: temperature(
                 celsius, self._clock.now().nanoseconds, self._frame_id))
         yield_processor()
-        condition = (status.error_flags, status.invalid, status.limits)
+        condition = (status.error_flags, status.invalid, status.strobe_range)
         if condition != self._condition:
             self._condition = condition
             self._condition_changed(event)
 
     def _condition_changed(self, event: events.StatusReceived) -> None:
-        if event.status.limits != self._limits:
-            self._limits = event.status.limits
+        if event.status.strobe_range != self._strobe_range:
+            self._strobe_range = event.status.strobe_range
             self._fit(0.0)
         for level, text in self._flags.take(event.status.error_flags, event.received_at):
             self._log.write(_SEVERITIES.get(level, logging.INFO), f'light {event.address}: {text}',
@@ -207,7 +207,8 @@ class EventPublisher:
 
         :param period: a value that must fit too, s: some lights report more than they allow.
         """
-        longest = model.shortest(self._limits.max_strobe_period) if self._limits.known else 0.0
+        possible = self._strobe_range
+        longest = model.shortest(possible.max_strobe_period) if possible.known else 0.0
         self._parameters.set_high(
             'strobe_period', max(longest if longest > 0 else model.MAX_STROBE_PERIOD, period))
 

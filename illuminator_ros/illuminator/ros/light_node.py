@@ -239,7 +239,7 @@ class LightNode:
     def _check_value(self, name: str, value: object) -> None:
         light = self._light()
         self._client.settings.limits.check(
-            name, checked(name, value, light.limits if light else None))
+            name, checked(name, value, light.strobe_range if light else None))
 
     def _configure(
         self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
