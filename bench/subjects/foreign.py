@@ -38,7 +38,7 @@ BUSY = (5000, 0)
 TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 8, 'serial': 1 / 8}
 
 
-class FrameReader:
+class Receiver:
     """A receiver and its CPU time."""
 
     def __init__(self, program: Program, line: Line) -> None:
@@ -66,7 +66,7 @@ class FrameReader:
         self.costs[rate].append((cpu(self.program.pid) - before - idle) / count * 1e6)
 
 
-def receivers(transport: str, stack: contextlib.ExitStack) -> dict[str, FrameReader]:
+def receivers(transport: str, stack: contextlib.ExitStack) -> dict[str, Receiver]:
     """Start the three, each with a line of its own."""
     found = {}
     for name in (OURS, RECV_MATCH, BARE):
@@ -91,7 +91,7 @@ def receivers(transport: str, stack: contextlib.ExitStack) -> dict[str, FrameRea
             else peer('bare_receiver', *urls[2]))
         line = make_line()
         stack.callback(line.close)
-        found[name] = FrameReader(program, line)
+        found[name] = Receiver(program, line)
     return found
 
 

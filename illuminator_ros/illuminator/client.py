@@ -71,7 +71,7 @@ class IlluminatorClient(Payload):
                          *(self.mounts.messages if needs_mounts else ()))
 
     @property
-    def commanded_or_found(self) -> list[Light]:
+    def lights_by_address(self) -> list[Light]:
         """Return every light that may be on, by address."""
         return [self.lights[address] for address in sorted(self.lights)]
 

@@ -46,7 +46,7 @@ RESTORE_INTERVAL = 2.0
 # Attempts before giving up on a light that accepts a configuration but does not apply it.
 MAX_CONTRADICTIONS = 3
 # s without a status after which a complete set of overrides is sent all the same.
-STATUS_TIMEOUT = 3.0
+FIRST_STATUS_TIMEOUT = 3.0
 # %; set together with a strobe period where the duty cycle is 0, at which nothing strobes.
 DEFAULT_DUTY_CYCLE = 50.0
 # s after a command of ours in which a light may show what it asks for, and what it implies.
@@ -57,8 +57,8 @@ REPEATS = 3
 REPEAT_INTERVAL = 2.0
 
 
-class Origin(Enum):
-    """The origin of values that must be sent."""
+class PendingReason(Enum):
+    """Why values must be sent."""
 
     OVERRIDE = 'override'
     RESTART = 'restart'
@@ -67,7 +67,7 @@ class Origin(Enum):
 
 
 # Their further repeats are limited by a RepeatLimit.
-_SENT_ONCE = (Origin.LIMIT, Origin.OTHER_SENDER)
+_SENT_ONCE = (PendingReason.LIMIT, PendingReason.OTHER_SENDER)
 
 
 @dataclass
@@ -81,7 +81,7 @@ class Pending:
     """
 
     values: Changes
-    origin: Origin
+    reason: PendingReason
     due: float
     attempts: int = 0
     has_ended: bool = False
@@ -162,7 +162,7 @@ class ConfigurationManager:
         """Whether the light must be sent a configuration before it is switched on."""
         pending = self._pending
         return (pending is not None and not pending.has_ended
-                and pending.origin is not Origin.OTHER_SENDER)
+                and pending.reason is not PendingReason.OTHER_SENDER)
 
     @property
     def sent_at(self) -> float:
@@ -214,14 +214,14 @@ class ConfigurationManager:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._want({**self._wanted, **values}, Origin.OVERRIDE, self._first_due(now))
+        self._want({**self._wanted, **values}, PendingReason.OVERRIDE, self._first_due(now))
 
     def _first_due(self, now: float) -> float:
-        return now if self.confirmed else now + STATUS_TIMEOUT
+        return now if self.confirmed else now + FIRST_STATUS_TIMEOUT
 
-    def _want(self, values: Changes, origin: Origin, due: float) -> None:
+    def _want(self, values: Changes, reason: PendingReason, due: float) -> None:
         """Have values sent; those that already wait keep their origin."""
-        self._pending = Pending(values, self._pending.origin if self._pending else origin, due)
+        self._pending = Pending(values, self._pending.reason if self._pending else reason, due)
 
     @property
     def _wanted(self) -> Changes:
@@ -340,8 +340,8 @@ class ConfigurationManager:
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
             # Overrides that have not been sent yet replace the values from before.
-            self._pending = Pending({**values, **self._wanted}, Origin.RESTART, now)
-        elif self._pending and self._pending.origin in _SENT_ONCE:
+            self._pending = Pending({**values, **self._wanted}, PendingReason.RESTART, now)
+        elif self._pending and self._pending.reason in _SENT_ONCE:
             # The light has other values now.
             self._pending = None
         # The light has forgotten that it was brought within the limits.
@@ -393,10 +393,10 @@ class ConfigurationManager:
                 self._unapplied, reported, status.error_flags, step=True):
             self._unapplied, self.discrepancy = None, ''
         if self.confirmed is None:
-            self._adopt(reported, events.Cause.FIRST_STATUS, now)
+            self._adopt(reported, events.ChangeCause.FIRST_STATUS, now)
             if self._pending:
                 self._pending.due, self._pending.has_ended = min(self._pending.due, now), False
-        elif self._pending and self._pending.origin is not Origin.OVERRIDE:
+        elif self._pending and self._pending.reason is not PendingReason.OVERRIDE:
             wanted = replace(self.confirmed, **self._pending.values)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
                 # It kept its configuration, or got it back from another sender.
@@ -418,11 +418,11 @@ class ConfigurationManager:
                 name: getattr(reported, name)
                 for name in goal.differences(reported, step=False) if name not in far})
         self._unapplied, self.discrepancy = None, ''
-        self._adopt(goal, events.Cause.REQUEST, 0.0)
+        self._adopt(goal, events.ChangeCause.REQUEST, 0.0)
 
-    def _adopt(self, configuration: Configuration, cause: events.Cause, now: float) -> None:
+    def _adopt(self, configuration: Configuration, cause: events.ChangeCause, now: float) -> None:
         old, self.confirmed = self.confirmed, configuration
-        if cause is not events.Cause.ROUNDING:
+        if cause is not events.ChangeCause.ROUNDING:
             self._reference = configuration
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
@@ -441,11 +441,11 @@ class ConfigurationManager:
         far = unexpected_differences(
             self._reference or confirmed, reported, status.error_flags, step=True,
             external=False)
-        cause = events.Cause.ROUNDING
+        cause = events.ChangeCause.ROUNDING
         if far:
             own = all(self._is_own(name, reported, switched_at, now) for name in far)
-            cause = events.Cause.REQUEST if own else events.Cause.LIGHT
-        if self._reassert and cause is events.Cause.LIGHT and self._undo_change(
+            cause = events.ChangeCause.REQUEST if own else events.ChangeCause.LIGHT
+        if self._reassert and cause is events.ChangeCause.LIGHT and self._undo_change(
                 status, confirmed, reported, now):
             return
         self._adopt(replace(confirmed, **{name: getattr(reported, name) for name in names}),
@@ -461,7 +461,7 @@ class ConfigurationManager:
         due = self._undoing.take(now)
         if due is not None:
             self._want({**{name: getattr(confirmed, name) for name in names}, **self._wanted},
-                       Origin.OTHER_SENDER, due)
+                       PendingReason.OTHER_SENDER, due)
         self._emit(events.ChangedByOther(
             self._address, reported.describe(names), due is not None))
         return due is not None
@@ -475,11 +475,11 @@ class ConfigurationManager:
             self.limit_exceeded = exceeded
             self._emit(exceeded)
         # Values that another sender has changed may be put back only later.
-        is_free = self._pending is None or self._pending.origin is Origin.OTHER_SENDER
+        is_free = self._pending is None or self._pending.reason is PendingReason.OTHER_SENDER
         if exceeded.excess and is_free and (due := self._limiting.take(now)) is not None:
             limited = self._limits.clipped(reported, self._strobe_range)
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
-            self._pending = Pending({**values, **self._wanted}, Origin.LIMIT, due)
+            self._pending = Pending({**values, **self._wanted}, PendingReason.LIMIT, due)
 
     def _is_own(
         self, name: str, reported: Configuration, switched_at: float, now: float,
@@ -546,7 +546,7 @@ class ConfigurationManager:
             self._restored(False, self.discrepancy)
             return
         if self.confirmed is None:
-            pending.due += STATUS_TIMEOUT
+            pending.due += FIRST_STATUS_TIMEOUT
         for name, value in pending.values.items():
             try:
                 checked(name, value, self._strobe_range)
@@ -561,7 +561,7 @@ class ConfigurationManager:
             pending.attempts += result.contradicted
             if (result.success or result.permanent
                     or pending.attempts >= MAX_CONTRADICTIONS
-                    or pending.attempts and pending.origin in _SENT_ONCE):
+                    or pending.attempts and pending.reason in _SENT_ONCE):
                 self._drop_pending(pending.values)
                 self._restored(result.success, result.message)
             if not result.success:

@@ -22,12 +22,11 @@ from typing import NamedTuple
 
 from .model import Configuration, FIELDS, Status
 from ..mavlink.messages import Address
-from ..payload.arbitration import Cause as HolderCause
-from ..payload.arbitration import HolderChanged
+from ..payload.arbitration import Cause, HolderChanged
 from ..payload.identity import Identity
 
 
-class Cause(Enum):
+class ChangeCause(Enum):
     """Why the confirmed configuration has changed."""
 
     FIRST_STATUS = 'first status'
@@ -132,7 +131,7 @@ class ConfigurationChanged(LightEvent):
 
     configuration: Configuration
     names: list[str]
-    cause: Cause
+    cause: ChangeCause
 
 
 @dataclass(frozen=True)
@@ -272,8 +271,8 @@ class LightSnapshot(NamedTuple):
             events.append(AddressShared(self.address, True))
         if self.configuration:
             events.append(ConfigurationChanged(
-                self.address, self.configuration, list(FIELDS), Cause.FIRST_STATUS))
+                self.address, self.configuration, list(FIELDS), ChangeCause.FIRST_STATUS))
         if self.holder:
             events.append(LightHeld(
-                self.address, HolderChanged(None, self.holder, HolderCause.CLAIM)))
+                self.address, HolderChanged(None, self.holder, Cause.CLAIM)))
         return events

@@ -68,10 +68,11 @@ PROOF_TIME = 1.0
 # no gaps. The most urgent group may wait behind one more in the line.
 WRITE_AHEAD = 0.002
 URGENT_WRITE_AHEAD = 0.02
-# s without a frame from any peer, longer than between heartbeats; and then between greetings. A
-# router that has restarted forwards nothing to us until it has heard us.
+# s without a frame from any peer until the endpoint announces itself again, longer than between
+# heartbeats; and then between announcements. A router that has restarted forwards nothing to us
+# until it has heard us.
 SILENCE = 1.5
-GREETING_INTERVAL = 0.25
+ANNOUNCE_INTERVAL = 0.25
 # s until a thread that could not be started is tried again.
 THREAD_RETRY_INTERVAL = 0.25
 # s; after a fault of ours the loop goes on no faster, and logs no more of them, than this.
@@ -144,7 +145,7 @@ class Link:
         # When the channel is proved without a frame, and whether a frame was received over it.
         self._proven_at = math.inf
         self._frame_received = False
-        self._greet_at = math.inf
+        self._announce_at = math.inf
         self._store_due = 0.0
         # When there is something to do next, s, and whether there may be before that.
         self._due = 0.0
@@ -369,7 +370,7 @@ class Link:
     def _next_deadline(self) -> float:
         """Return when :meth:`_poll` is due."""
         return min(
-            self.endpoint.next_deadline(), self._greet_at, self._proven_at, self._store_due,
+            self.endpoint.next_deadline(), self._announce_at, self._proven_at, self._store_due,
             self._status.next_deadline(), self._stream_due(), self._receiver.next_deadline(),
             math.inf if self._channel is not None or self._connecting else self._connect_at)
 
@@ -460,7 +461,7 @@ class Link:
             self._frame_received = self._work_pending = True
             self._connector.backoff.answered()
             self._status.take(LinkInput.PROVED, now, channel.name)
-        self._greet_at = now + SILENCE
+        self._announce_at = now + SILENCE
         if channel.heard(peer, now):
             self._work_pending = True
             if _frame_log.isEnabledFor(logging.DEBUG):
@@ -476,8 +477,8 @@ class Link:
             self._status.take(LinkInput.PROVED, now, channel.name)
         for peer, frame in self._receiver.give_up(now, self._wall_clock()):
             self._accept(channel, peer, frame, now)
-        if now >= self._greet_at:
-            self._greet_at = now + GREETING_INTERVAL
+        if now >= self._announce_at:
+            self._announce_at = now + ANNOUNCE_INTERVAL
             self._safe_call(self.endpoint.link_opened, now)
 
     def _flush(self) -> None:
@@ -585,7 +586,7 @@ class Link:
         self._line_free_at = -math.inf
         self._proven_at = now + PROOF_TIME
         self._frame_received = False
-        self._greet_at = now + GREETING_INTERVAL
+        self._announce_at = now + ANNOUNCE_INTERVAL
         try:
             channel.register(self._selector)
         except (OSError, ValueError) as error:
@@ -619,7 +620,7 @@ class Link:
         channel, self._channel = self._channel, None
         with contextlib.suppress(OSError):
             channel.close()
-        self._proven_at = self._greet_at = math.inf
+        self._proven_at = self._announce_at = math.inf
         self._receiver.clear()
         self._router.clear()
         self._heard_last = None

@@ -107,7 +107,7 @@ class Bridge:
         self._closed = threading.Event()
         self._housekeeping = threading.Thread(
             target=self._keep_house, name='housekeeping', daemon=True)
-        self.pool = NodeManager(node, arguments, self.log, self._wake.set)
+        self._nodes = NodeManager(node, arguments, self.log, self._wake.set)
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self.component, url=parameters.connection_url,
             period=parameters.diagnostics_period)
@@ -122,7 +122,7 @@ class Bridge:
                 self._own_nodes, kinds, self.clients, values, strict=True):
             log = self.log if own is node else NodeLog(own.get_logger())
             self._payloads.append(kind.serve(client, Host(
-                own, self.link, log, frame_log, self.pool, self._diagnostics, parameters, value,
+                own, self.link, log, frame_log, self._nodes, self._diagnostics, parameters, value,
                 self._wake.set)))
             if own is not node:
                 self._executor.add_node(own)
@@ -139,7 +139,7 @@ class Bridge:
     @property
     def nodes(self) -> list[Node]:
         """Return all nodes of the process."""
-        return [*self._own_nodes, *self.pool.nodes]
+        return [*self._own_nodes, *self._nodes.nodes]
 
     def _may_name(self, name: str) -> bool:
         return any(payload.may_name(name) for payload in self._payloads)
@@ -152,11 +152,11 @@ class Bridge:
         if not self._ended.is_set():
             self.end()
         self._closed.wait(OFF_LIMIT + STOP_LIMIT)
-        self.pool.end()
+        self._nodes.end()
         deadline = time.monotonic() + THREADS_LIMIT
         if self._housekeeping.ident is not None:
             self._housekeeping.join(max(deadline - time.monotonic(), 0.0))
-        self.pool.join(deadline)
+        self._nodes.join(deadline)
         for payload in self._payloads:
             payload.close()
         # At once, so that other nodes learn of the end; the first one last, whose publisher of
@@ -217,7 +217,7 @@ class Bridge:
         names_due, shared = 0.0, frozenset[str]()
         while not self._ended.is_set():
             try:
-                more = self.pool.work()
+                more = self._nodes.work()
                 self.link.run_turn(self._poll)
                 self._diagnostics.poll(self._tick / 2)
                 self.log.flush()

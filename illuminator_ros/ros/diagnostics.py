@@ -89,7 +89,7 @@ def _text(value: Value) -> str:
 
 
 @dataclass(frozen=True)
-class LinkSnapshot:
+class LinkDiagnostics:
     """
     The link at one moment, for any thread.
 
@@ -107,7 +107,7 @@ class LinkSnapshot:
     devices: Mapping[Address, Mapping[str, Value]]
 
 
-def link_snapshot(link: Link, component: Component, url: str, now: float) -> LinkSnapshot:
+def link_diagnostics(link: Link, component: Component, url: str, now: float) -> LinkDiagnostics:
     """Return a snapshot of the link; call it in a turn of the link."""
     state = link.snapshot(now)
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
@@ -124,7 +124,7 @@ def link_snapshot(link: Link, component: Component, url: str, now: float) -> Lin
             'round_trip_p50_ms': None if p50 is None else p50 * 1000,
             'round_trip_p95_ms': None if p95 is None else p95 * 1000,
         }
-    return LinkSnapshot(
+    return LinkDiagnostics(
         state, now, component.address, component.address_conflict(now),
         frozenset(commands.unanswering), {
             'url': url,
@@ -151,7 +151,7 @@ def link_snapshot(link: Link, component: Component, url: str, now: float) -> Lin
         }, devices)
 
 
-def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
+def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     """
     Return the likeliest reason why no device is found on an open link, for people.
 
@@ -180,7 +180,7 @@ def why_nothing_is_heard(link: LinkSnapshot, device: str) -> str:
 
 
 def link_report(
-    link: LinkSnapshot, device: Address | None, *, kind: str, absence: str, started: float,
+    link: LinkDiagnostics, device: Address | None, *, kind: str, absence: str, started: float,
     count: int | None = None, limit_reached: bool = False,
 ) -> Report:
     """

@@ -24,7 +24,7 @@ import threading
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from .diagnostics import link_snapshot, LinkSnapshot, Report
+from .diagnostics import link_diagnostics, LinkDiagnostics, Report
 from .node import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
@@ -33,7 +33,7 @@ from ..mavlink.link import Link
 SNAPSHOT_TIMEOUT = 1.0
 
 # Makes reports of a snapshot that was taken in a turn of the link; a pure function.
-MakeReports = Callable[[LinkSnapshot], Sequence[Report]]
+MakeReports = Callable[[LinkDiagnostics], Sequence[Report]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class DiagnosticsSource:
     The reports of one node.
 
     :param node: its name with its namespace.
-    :param look: takes a snapshot, in a turn of the link, given the time (s).
+    :param take_snapshot: takes a snapshot, in a turn of the link, given the time (s).
     """
 
     node: str
-    look: Callable[[float], MakeReports]
+    take_snapshot: Callable[[float], MakeReports]
 
 
 class DiagnosticsPublisher:
@@ -80,9 +80,9 @@ class DiagnosticsPublisher:
         with self._lock:
             self._sources.pop(source, None)
 
-    def look(self, now: float) -> LinkSnapshot:
+    def snapshot(self, now: float) -> LinkDiagnostics:
         """Return a snapshot of the link; call it in a turn of the link."""
-        return link_snapshot(self._link, self._component, self._url, now)
+        return link_diagnostics(self._link, self._component, self._url, now)
 
     def poll(self, tolerance: float) -> None:
         """
@@ -92,15 +92,15 @@ class DiagnosticsPublisher:
         """
         with self._lock:
             sources = list(self._sources)
-        taken: queue.SimpleQueue[tuple[float, LinkSnapshot, list[MakeReports]]] = (
+        taken: queue.SimpleQueue[tuple[float, LinkDiagnostics, list[MakeReports]]] = (
             queue.SimpleQueue())
         self._link.run_turn(lambda now: taken.put((
-            now, self.look(now), [source.look(now) for source in sources])))
+            now, self.snapshot(now), [source.take_snapshot(now) for source in sources])))
         try:
-            now, link, looks = taken.get(timeout=SNAPSHOT_TIMEOUT)
+            now, link, snapshots = taken.get(timeout=SNAPSHOT_TIMEOUT)
         except queue.Empty:
             return
-        for source, make_reports in zip(sources, looks, strict=True):
+        for source, make_reports in zip(sources, snapshots, strict=True):
             reports = make_reports(link)
             levels = [report.level for report in reports]
             due, published = self._sources.get(source, (0.0, levels))

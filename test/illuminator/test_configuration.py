@@ -20,7 +20,7 @@ from dataclasses import astuple, replace
 from typing import Any
 
 from illuminator_ros.illuminator.configuration_manager import RESTORE_INTERVAL
-from illuminator_ros.illuminator.events import Cause
+from illuminator_ros.illuminator.events import ChangeCause
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
@@ -77,7 +77,7 @@ def test_a_confirmed_set_is_one_event_before_its_answer(pair: Pair) -> None:
     (message, event), = answers
     assert message.startswith('brightness 50 %, strobe_duty_cycle 5 %, confirmed by '
                               'ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED (1 try, ')
-    assert event == (Cause.REQUEST, {'brightness': 50.0, 'strobe_duty_cycle': 5.0})
+    assert event == (ChangeCause.REQUEST, {'brightness': 50.0, 'strobe_duty_cycle': 5.0})
     assert len(pair.recorder.changes) == 2
 
 
@@ -153,15 +153,15 @@ def strobe(fake: FakeLight) -> Pair:
 
 
 @pytest.mark.parametrize(('fields', 'cause', 'change'), [
-    ({'mode': 2}, Cause.LIGHT, {'mode': Mode.EXTERNAL_SYNC}),
-    ({'brightness': 30.0}, Cause.LIGHT, {'brightness': 30.0}),
-    ({'strobe_period': 0.0}, Cause.LIGHT, {'strobe_period': 0.0}),
-    ({'strobe_duty_cycle': 12.5}, Cause.LIGHT, {'strobe_duty_cycle': 12.5}),
-    ({'brightness': 81.0, 'strobe_period': 2.0}, Cause.LIGHT,
+    ({'mode': 2}, ChangeCause.LIGHT, {'mode': Mode.EXTERNAL_SYNC}),
+    ({'brightness': 30.0}, ChangeCause.LIGHT, {'brightness': 30.0}),
+    ({'strobe_period': 0.0}, ChangeCause.LIGHT, {'strobe_period': 0.0}),
+    ({'strobe_duty_cycle': 12.5}, ChangeCause.LIGHT, {'strobe_duty_cycle': 12.5}),
+    ({'brightness': 81.0, 'strobe_period': 2.0}, ChangeCause.LIGHT,
      {'brightness': 81.0, 'strobe_period': 2.0}),
-    ({'brightness': 80.3}, Cause.ROUNDING, {'brightness': 80.3}),
-    ({'strobe_period': float32(1.001)}, Cause.ROUNDING, {'strobe_period': 1.001}),
-    ({'error_status': 1, 'brightness': 40.0, 'strobe_period': 2.0}, Cause.LIGHT,
+    ({'brightness': 80.3}, ChangeCause.ROUNDING, {'brightness': 80.3}),
+    ({'strobe_period': float32(1.001)}, ChangeCause.ROUNDING, {'strobe_period': 1.001}),
+    ({'error_status': 1, 'brightness': 40.0, 'strobe_period': 2.0}, ChangeCause.LIGHT,
      {'strobe_period': 2.0}),
     ({'error_status': 1, 'brightness': 40.0}, None, {}),
     ({'error_status': 2, 'brightness': 0.0}, None, {}),
@@ -170,7 +170,7 @@ def strobe(fake: FakeLight) -> Pair:
     ({'strobe_period': -1.0}, None, {}),
 ])
 def test_a_change_by_another_sender_is_followed_with_one_event_and_no_command(
-    fake: FakeLight, strobe: Pair, fields: dict[str, Any], cause: Cause | None,
+    fake: FakeLight, strobe: Pair, fields: dict[str, Any], cause: ChangeCause | None,
     change: dict[str, Any],
 ) -> None:
     normal = dict(fake.fields)
@@ -207,7 +207,8 @@ def test_a_first_status_that_is_implausible_confirms_nothing(fake: FakeLight) ->
 def test_float32_rounding_is_not_a_change(faked: Pair, value: float) -> None:
     faked.configure(brightness=value, strobe_duty_cycle=value)
     faked.run(10.0)
-    assert [cause for cause, _ in faked.recorder.changes] == [Cause.FIRST_STATUS, Cause.REQUEST]
+    assert [cause for cause, _ in faked.recorder.changes] == [
+        ChangeCause.FIRST_STATUS, ChangeCause.REQUEST]
     assert confirmed(faked).brightness == value
 
 
@@ -217,14 +218,14 @@ def test_external_sync_is_followed_with_its_output(fake: FakeLight, strobe: Pair
     for brightness in (10.0, 90.0, 20.0):
         fake.fields['brightness'] = brightness
         strobe.run(2.0)
-        assert strobe.recorder.changes[-1] == (Cause.LIGHT, {'brightness': brightness})
+        assert strobe.recorder.changes[-1] == (ChangeCause.LIGHT, {'brightness': brightness})
 
 
 @pytest.mark.parametrize(('change', 'cause'), [
-    ({'brightness': 30.0}, Cause.REQUEST), ({'strobe_period': 2.0}, Cause.LIGHT)],
+    ({'brightness': 30.0}, ChangeCause.REQUEST), ({'strobe_period': 2.0}, ChangeCause.LIGHT)],
     ids=['ours that takes effect late', 'by another sender meanwhile'])
 def test_a_change_during_a_failed_command_is_followed_after_it(
-    fake: FakeLight, strobe: Pair, change: dict[str, Any], cause: Cause,
+    fake: FakeLight, strobe: Pair, change: dict[str, Any], cause: ChangeCause,
 ) -> None:
     fake.results[CONFIGURE] = None
     answer = strobe.ask_configure(brightness=30)
@@ -239,7 +240,7 @@ def test_small_steps_add_up_to_a_change(fake: FakeLight, strobe: Pair) -> None:
         fake.fields['brightness'] -= 0.4
         strobe.run(1.0)
     assert confirmed(strobe).brightness == 78.0
-    assert [cause for cause, _ in strobe.recorder.changes].count(Cause.LIGHT) == 2
+    assert [cause for cause, _ in strobe.recorder.changes].count(ChangeCause.LIGHT) == 2
 
 
 # Streams of setpoints
@@ -495,7 +496,7 @@ def test_after_a_restart_the_configuration_is_sent_and_the_light_stays_off(
     assert fake.fields['enable'] == 0
     fake.fields['brightness'] = 66.0
     agreed.run(2.0)
-    assert agreed.recorder.changes[-1] == (Cause.LIGHT, {'brightness': 66.0})
+    assert agreed.recorder.changes[-1] == (ChangeCause.LIGHT, {'brightness': 66.0})
 
 
 def test_after_a_restart_a_light_that_kept_its_configuration_is_sent_nothing(
@@ -569,4 +570,4 @@ def test_a_light_that_restarts_is_followed_where_restoring_is_switched_off(
     fake.restart(pair.now)
     pair.run(10.0)
     assert len(sent(pair)) == 1
-    assert pair.recorder.changes[-1] == (Cause.LIGHT, {'brightness': 100.0})
+    assert pair.recorder.changes[-1] == (ChangeCause.LIGHT, {'brightness': 100.0})

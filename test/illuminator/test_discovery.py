@@ -120,7 +120,7 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
     forgotten = [event.address for event in client.heard
                  if isinstance(event, events.LightForgotten)]
     assert sorted(forgotten) == FORGED[1:MAX_DEVICES]
-    assert [light.address for light in client.commanded_or_found] == [LIGHT, FORGED[0]]
+    assert [light.address for light in client.lights_by_address] == [LIGHT, FORGED[0]]
 
 
 def test_a_light_that_is_not_wanted_is_named_and_not_commanded() -> None:

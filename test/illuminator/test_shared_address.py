@@ -18,7 +18,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.illuminator.events import AddressShared, AnyLightEvent, Cause, StatusReceived
+from illuminator_ros.illuminator.events import (
+    AddressShared,
+    AnyLightEvent,
+    ChangeCause,
+    StatusReceived,
+)
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.illuminator.status_tracker import AddressConflict
@@ -63,7 +68,7 @@ def test_parameters_move_once_at_most_and_nothing_is_sent_while_lights_differ(
 ) -> None:
     pair, lights = two(enable=1, brightness=40.0, offset=offset)
     pair.settle(60.0)
-    assert [cause for cause, _ in pair.recorder.changes][1:] in ([], [Cause.LIGHT])
+    assert [cause for cause, _ in pair.recorder.changes][1:] in ([], [ChangeCause.LIGHT])
     assert pair.commands(CONFIGURE, ON_OFF) == []
     assert pair.recorder.events == ['connected']
     assert len(pair.recorder.statuses) >= 110

@@ -21,7 +21,7 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import (
     AnyLightEvent,
-    Cause,
+    ChangeCause,
     LightSwitched,
     Origin,
     StatusReceived,
@@ -238,7 +238,7 @@ def test_a_field_that_a_command_of_ours_implies_is_ours(
     assert change(faked).success
     fake.fields['brightness'] = 70.0
     faked.run(1.5)
-    assert Cause.LIGHT not in [cause for cause, _ in faked.recorder.changes]
+    assert ChangeCause.LIGHT not in [cause for cause, _ in faked.recorder.changes]
 
 
 def test_a_strobe_period_alone_also_sets_a_duty_cycle_that_is_0(

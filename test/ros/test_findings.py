@@ -32,7 +32,7 @@ from illuminator_ros.illuminator.ros.diagnostics import (
 )
 from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
 from illuminator_ros.mavlink.signing import Signing, SigningMode
-from illuminator_ros.ros.diagnostics import link_snapshot
+from illuminator_ros.ros.diagnostics import link_diagnostics
 import pytest
 from support.client import Client
 from support.fake_light import LIGHT, status_message
@@ -73,7 +73,7 @@ class Reported:
         """Return the statuses by what they are of."""
         light = self.snapshot()
         made = reports(
-            link_snapshot(self.link, self.client, 'udpin://', self.link.now), light=light,
+            link_diagnostics(self.link, self.client, 'udpin://', self.link.now), light=light,
             heard=heard or LightsHeard(0, (), False),
             hardware_id=hardware_id(light) if light else '', started=self._started)
         return {one.name: one.message('/illuminator') for one in made}

@@ -49,7 +49,7 @@ class Talker(Endpoint):
 
     :ivar heard: source and message, in order.
     :ivar receivers: the thread that each of them came in.
-    :ivar greetings: when a new peer was greeted, s.
+    :ivar announcements: when the link was opened or a new peer was heard, s.
     :ivar turns: how often the link's thread has gone round.
     """
 
@@ -60,12 +60,12 @@ class Talker(Endpoint):
         self.heartbeat = HeartbeatTimer(BRIDGE, 18)
         self.heard: Log[tuple[Address, Any]] = Log()
         self.receivers: Log[threading.Thread] = Log()
-        self.greetings: Log[float] = Log()
+        self.announcements: Log[float] = Log()
         self.turns = 0
 
     def link_opened(self, now: float) -> None:
         self.heartbeat.send(now, self.outgoing)
-        self.greetings.append(now)
+        self.announcements.append(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         self.heartbeat.stop()

@@ -33,7 +33,7 @@ class Recorder:
     events: list[str] = field(default_factory=list)
     statuses: list[Status] = field(default_factory=list)
     identities: list[Identity] = field(default_factory=list)
-    changes: list[tuple[light_events.Cause, dict[str, Any]]] = field(default_factory=list)
+    changes: list[tuple[light_events.ChangeCause, dict[str, Any]]] = field(default_factory=list)
     restorations: list[tuple[bool, str]] = field(default_factory=list)
     failed_setpoints: list[str] = field(default_factory=list)
     others: list[light_events.AnyLightEvent] = field(default_factory=list)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A link with little to do: how often it greets, what it counts, and that it rests."""
+"""A link with little to do: how often it announces itself, what it counts, and that it rests."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ def simulated() -> tuple[SimulatedLink, Talker]:
 
 
 # A router that has restarted forwards nothing to us until it has heard us.
-@pytest.mark.parametrize(('steps', 'greetings'), [
+@pytest.mark.parametrize(('steps', 'announcements'), [
     # Before the first frame, at the first frame, and not while frames come.
     ([0.6, BEAT, 1.0], [0.0, 0.25, 0.5, 0.6]), ([BEAT, 1.4, BEAT, 1.4, BEAT, 1.4], [0.0, 0.0]),
     ([BEAT, *[1.4, foreign_frame(0)] * 5], [0.0, 0.0]),
     # Again after 1.5 s without a valid frame.
     ([BEAT, 2.1], [0.0, 0.0, 1.5, 1.75, 2.0]), ([BEAT, 1.0, NOISE, 0.6], [0.0, 0.0, 1.5])])
-def test_link_greets_while_it_hears_no_valid_frame(
-        steps: list[float | bytes], greetings: list[float]) -> None:
+def test_link_announces_itself_while_it_hears_no_valid_frame(
+        steps: list[float | bytes], announcements: list[float]) -> None:
     link, endpoint = simulated()
     for step in steps:
         if isinstance(step, bytes):
             link.receive((step, PEER))
         else:
             link.run(step)
-    assert list(endpoint.greetings) == greetings
+    assert list(endpoint.announcements) == announcements
 
 
 def test_heartbeat_is_sent_once_a_second_while_a_peer_is_heard() -> None:

@@ -225,7 +225,7 @@ def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: live_link.R
             light.sendto(heartbeat_frame(), ('127.0.0.1', port))
             for link in (udp, tcp):
                 link.endpoint.wait_heard(count)
-            # It is greeted as a new peer, however many there were before.
+            # It is answered as a new peer, however many there were before.
             assert light.recv(300)
         clock.ahead += PEER_EXPIRY / MAX_PEERS + 0.1
     live_link.wait_for_resources(*before)

@@ -235,7 +235,7 @@ def bridge(run: Run) -> tuple[LiveLink, int]:
 
 
 @pytest.mark.parametrize('garbage', [b'', bytes(300), heartbeat_frame()[:-1] + b'\0'])
-def test_garbage_makes_no_peer_and_a_valid_frame_one_that_is_greeted_at_once(
+def test_garbage_makes_no_peer_and_a_valid_frame_one_that_is_answered_at_once(
         bridge: tuple[LiveLink, int], garbage: bytes) -> None:
     link, port = bridge
     with bound_socket() as light, bound_socket() as liar:

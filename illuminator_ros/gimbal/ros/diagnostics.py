@@ -35,7 +35,9 @@ _CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags
                | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER)
 
 
-def why_no_gimbal(link: diagnostics.LinkSnapshot, heard: Sequence[GimbalKey], known: str) -> str:
+def why_no_gimbal(
+    link: diagnostics.LinkDiagnostics, heard: Sequence[GimbalKey], known: str,
+) -> str:
     """
     Return why a node has no gimbal, for people.
 
@@ -53,8 +55,8 @@ def why_no_gimbal(link: diagnostics.LinkSnapshot, heard: Sequence[GimbalKey], kn
 
 
 def reports(
-    link: diagnostics.LinkSnapshot, *, gimbal: GimbalSnapshot | None, heard: Sequence[GimbalKey],
-    known: str, limit_reached: bool, interval: float, started: float,
+    link: diagnostics.LinkDiagnostics, *, gimbal: GimbalSnapshot | None,
+    heard: Sequence[GimbalKey], known: str, limit_reached: bool, interval: float, started: float,
 ) -> list[diagnostics.Report]:
     """
     Return the reports of a node.

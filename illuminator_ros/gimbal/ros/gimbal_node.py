@@ -106,7 +106,7 @@ class GimbalNode:
             self._interface.publish('source', '')
         self._interface.publish('connected', False)
         self._publish_control(None, False)
-        self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._look)
+        self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, key: events.GimbalKey, now: float) -> None:
         """Serve a gimbal from now on, and publish what is known of it."""
@@ -129,7 +129,7 @@ class GimbalNode:
 
     def absence(self, now: float) -> str:
         """Return why there is no gimbal, for people."""
-        link = self._host.diagnostics.look(now)
+        link = self._host.diagnostics.snapshot(now)
         reason = why_no_gimbal(link, tuple(self._client.gimbals), self._why_none())
         return f'no gimbal connected: {reason}'
 
@@ -282,7 +282,7 @@ class GimbalNode:
 
     # Diagnostics
 
-    def _look(self, now: float) -> MakeReports:
+    def _take_snapshot(self, now: float) -> MakeReports:
         gimbal = self._gimbal()
         return functools.partial(
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,

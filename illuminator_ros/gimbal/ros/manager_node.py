@@ -40,7 +40,7 @@ from ...payload.messages import GimbalDeviceAttitudeStatus
 from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
-from ...ros.diagnostics import ERROR, Finding, LinkSnapshot, Report, Value, WARN
+from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication, STREAM_QOS
 from ...ros.parameters import ParameterError, ParameterSpec, Values
@@ -129,7 +129,8 @@ class ManagerNode(ServedPayload):
             publications=() if manager.tracker.has_mavlink else (
                 Publication('device/setpoint', QuaternionStamped, STREAM_QOS),),
             commands=tuple(self._topics()))
-        host.diagnostics.add(DiagnosticsSource(host.node.get_fully_qualified_name(), self._look))
+        host.diagnostics.add(DiagnosticsSource(
+            host.node.get_fully_qualified_name(), self._take_snapshot))
         manager.events.subscribe(self._take)
 
     def _topics(self) -> list[AnyCommand]:
@@ -222,7 +223,7 @@ class ManagerNode(ServedPayload):
 
     # Diagnostics
 
-    def _look(self, now: float) -> MakeReports:
+    def _take_snapshot(self, now: float) -> MakeReports:
         holder = self._manager.control.holder(Role.PRIMARY)
         peers = self._host.link.peer_count_of(holder, now) if holder else 0
         return functools.partial(_reports, findings=findings(self._manager, peers), values=_values(
@@ -247,7 +248,7 @@ def findings(manager: gimbal_manager.GimbalManager, peers: int) -> list[Finding]
 
 
 def _reports(
-    link: LinkSnapshot, *, findings: list[Finding], values: dict[str, Value],
+    link: LinkDiagnostics, *, findings: list[Finding], values: dict[str, Value],
 ) -> list[Report]:
     return [Report('manager', f'manager {values["gimbal_device_id"]}', findings, 'active',
                    lambda: values)]

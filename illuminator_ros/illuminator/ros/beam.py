@@ -44,7 +44,7 @@ RED = (1.0, 0.0, 0.0)
 REFRESH = 1.0
 LIFETIME = 5
 # s between publications of a beam that a gimbal turns.
-TURN_INTERVAL = 0.1
+MOVE_INTERVAL = 0.1
 # For which a bridge that ends waits until its beam was removed.
 REMOVAL_TIMEOUT = Duration(seconds=0.05)
 
@@ -152,11 +152,11 @@ class BeamPublisher:
         if time.monotonic() >= self._due:
             self._publish()
         else:
-            self.turn()
+            self.mount_moved()
 
-    def turn(self) -> None:
+    def mount_moved(self) -> None:
         """Publish the beam if it is visible and its direction has changed."""
-        if (self._beam.alpha and time.monotonic() >= self._published_at + TURN_INTERVAL
+        if (self._beam.alpha and time.monotonic() >= self._published_at + MOVE_INTERVAL
                 and self._current_rotation() != self._rotation):
             self._publish()
 

@@ -96,7 +96,7 @@ class LightsHeard:
     limit_reached: bool
 
 
-def why_no_light(link: diagnostics.LinkSnapshot, heard: LightsHeard) -> str:
+def why_no_light(link: diagnostics.LinkDiagnostics, heard: LightsHeard) -> str:
     """Return why the node has no light, for people."""
     if link.state.failure:
         return link.state.failure
@@ -108,7 +108,7 @@ def why_no_light(link: diagnostics.LinkSnapshot, heard: LightsHeard) -> str:
 
 
 def reports(
-    link: diagnostics.LinkSnapshot, *, light: LightSnapshot | None, heard: LightsHeard,
+    link: diagnostics.LinkDiagnostics, *, light: LightSnapshot | None, heard: LightsHeard,
     hardware_id: str, started: float, mount_absence: str = '',
 ) -> list[diagnostics.Report]:
     """

@@ -181,7 +181,7 @@ class EventPublisher:
 
     def _configuration_changed(self, event: events.ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names
-        if event.cause is events.Cause.LIGHT:
+        if event.cause is events.ChangeCause.LIGHT:
             self._log.info(f'light {event.address} was changed: {configuration.describe(names)}',
                            'changed')
         if 'strobe_period' in names:

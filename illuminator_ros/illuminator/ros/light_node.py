@@ -101,7 +101,7 @@ class LightNode:
             check_diagnostics=host.check_diagnostics)
         self._beam = (BeamPublisher(node, geometry, self._direction)
                       if geometry.beam_range else None)
-        self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._look)
+        self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, address: Address, now: float) -> None:
         """Serve a light from now on, and publish what is known of it."""
@@ -126,10 +126,10 @@ class LightNode:
         if self._beam is not None:
             self._beam.take(event)
 
-    def turn(self) -> None:
+    def mount_moved(self) -> None:
         """Note that a gimbal of the vehicle has sent its attitude."""
         if self._beam is not None:
-            self._beam.turn()
+            self._beam.mount_moved()
 
     def _direction(self, device_id: int) -> Quaternion | None:
         return self.address and self._client.mounts.direction(
@@ -157,7 +157,7 @@ class LightNode:
 
     def absence(self, now: float) -> str:
         """Return why there is no light, for people."""
-        why = why_no_light(self._host.diagnostics.look(now), self._heard())
+        why = why_no_light(self._host.diagnostics.snapshot(now), self._heard())
         return f'no light connected: {why}'
 
     def _light(self) -> Light | None:
@@ -254,7 +254,7 @@ class LightNode:
 
     # Diagnostics
 
-    def _look(self, now: float) -> MakeReports:
+    def _take_snapshot(self, now: float) -> MakeReports:
         light = self._light()
         snapshot = light.snapshot(now) if light else None
         if snapshot is not None and snapshot.identity_is_settled:

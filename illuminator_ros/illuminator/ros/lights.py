@@ -67,12 +67,12 @@ class Lights(ServedPayload):
         self._second_reported = False
         self._names_due = math.inf
         client.events.subscribe(self._take)
-        client.mount_moved.subscribe(self._turn)
+        client.mount_moved.subscribe(self._mount_moved)
 
-    def _turn(self, system: int) -> None:
+    def _mount_moved(self, system: int) -> None:
         for node in self._nodes:
             if node.address and node.address.system == system:
-                node.turn()
+                node.mount_moved()
 
     def _take(self, event: events.AnyLightEvent) -> None:
         node = self._nodes.get(event.address)
@@ -106,7 +106,7 @@ class Lights(ServedPayload):
     # Requests to all lights
 
     def _enable_all(self, request: SetBool.Request, now: float, answer: Answer) -> None:
-        lights = self._client.commanded_or_found
+        lights = self._client.lights_by_address
         if lights:
             enable_all(lights, request.data, now,
                        lambda result, now: answer(result.success, result.message),
@@ -144,7 +144,7 @@ class Lights(ServedPayload):
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""
-        lights = self._client.commanded_or_found
+        lights = self._client.lights_by_address
         if not self._host.values['off_on_shutdown']:
             on = [light for light in lights if light.status and light.status.enabled]
             for light in on:

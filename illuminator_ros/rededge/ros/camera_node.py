@@ -113,7 +113,8 @@ class CameraNode(ServedPayload):
         client.feeder.set_fixed_mount(_angles(angles), host.link.clock())
         ParameterServices(
             host.node, host.link, host.log, self._parameters, configure=self._set_mount)
-        host.diagnostics.add(DiagnosticsSource(host.node.get_fully_qualified_name(), self._look))
+        host.diagnostics.add(DiagnosticsSource(
+            host.node.get_fully_qualified_name(), self._take_snapshot))
         client.events.subscribe(self._take)
 
     # Requests
@@ -193,7 +194,7 @@ class CameraNode(ServedPayload):
                 Header(stamp=stamp, frame_id=EARTH_FRAME), attitude))
         self._interface.publish('image/index', feedback.img_idx)
 
-    def _look(self, now: float) -> MakeReports:
+    def _take_snapshot(self, now: float) -> MakeReports:
         return functools.partial(
             reports, client=self._client.snapshot(now), started=self._started,
             geoid_is_known=self._geoid_is_known)

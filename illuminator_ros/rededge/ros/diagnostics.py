@@ -28,7 +28,7 @@ from ...ros.diagnostics import (
     ERROR,
     Finding,
     link_report,
-    LinkSnapshot,
+    LinkDiagnostics,
     Report,
     Value,
     WARN,
@@ -40,7 +40,7 @@ HARDWARE_ID = f'mavlink:{MAV_COMP_ID_CAMERA}'
 
 
 def reports(
-    link: LinkSnapshot, *, client: ClientSnapshot, started: float, geoid_is_known: bool,
+    link: LinkDiagnostics, *, client: ClientSnapshot, started: float, geoid_is_known: bool,
 ) -> list[Report]:
     """
     Return the reports of the node.
