@@ -28,7 +28,6 @@ from illuminator_ros.gimbal.manager_control import Role, RoleHolderChanged
 from illuminator_ros.gimbal.manager_state import ManagerState, StateChanged
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.component import HEARTBEAT_INTERVAL
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Cause
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
@@ -301,12 +300,6 @@ def test_values_of_the_vehicle_beyond_all_limits_are_refused(value: float) -> No
         _read_imu(Imu(orientation=upright, angular_velocity=geometry.Vector3(z=value)))
     with pytest.raises(ValueError, match='is not a place'):
         read_place(NavSatFix(latitude=47.0, longitude=8.0, altitude=value), 0.0)
-
-
-def test_the_lease_outlasts_a_lost_heartbeat() -> None:
-    [lease] = [one for one in MANAGER_PARAMETERS if one.name == 'lease']
-
-    assert lease.low == 2 * HEARTBEAT_INTERVAL
 
 
 def test_list_of_a_wrong_type_is_refused_without_the_example_of_another_parameter() -> None:

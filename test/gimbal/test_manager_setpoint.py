@@ -87,10 +87,12 @@ def test_gm_9_offsets_add_to_the_angles(
 
 
 @given(ATTITUDES, st.floats(0.0, 1.0))
-def test_gm_9_an_offset_is_never_above_the_limit(
+def test_gm_9_an_offset_is_the_angle_or_the_limit_where_that_is_smaller(
         angles: tuple[float, float, float], limit: float) -> None:
     for demand in (Demand(angles=angles), Demand(attitude=Quaternion.from_euler(*angles))):
-        assert all(abs(offset) <= limit for offset in nudge(demand, limit))
+        for angle, offset in zip(demand.target, nudge(demand, limit), strict=True):
+            assert abs(offset) == min(abs(angle), limit)
+            assert offset * angle >= 0
 
 
 RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends))

@@ -25,7 +25,7 @@ import pytest
 from support.fork_server import prepare_child
 from support.live_link import Bridge
 from support.ports import free_port
-from support.processes import ended, environment, python, ROOT, run
+from support.processes import ended, environment, python, ROOT
 from support.waiting import eventually, PATIENCE
 
 SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
@@ -74,14 +74,6 @@ def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped() -> None:
     with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{free_port()}',
                       '--light', '1/243=Größe', env={'PYTHONIOENCODING': 'ascii'})) as program:
         program.wait_for(r'1/243 Gr\xf6\xdfe')
-
-
-def test_a_program_has_the_variables_of_python_that_its_test_has_set(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    for path in '', '/nowhere':
-        monkeypatch.setenv('PYTHONPATH', path)
-        assert run('illuminator_ros.simulator', '--version').returncode == 0
 
 
 def test_the_first_message_of_a_peer_is_one_line() -> None:
