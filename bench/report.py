@@ -56,7 +56,7 @@ def machine() -> dict[str, Any]:
 
 
 def number(value: float) -> str:
-    """Return a figure with three digits, or more where it is great."""
+    """Return a figure with three digits, or more if it is large."""
     if abs(value) >= 1000:
         return f'{value:,.0f}'
     if abs(value) >= 100:
@@ -112,7 +112,7 @@ def markdown(rows: Iterable[Row], about: dict[str, Any]) -> str:
         result.append(f'| {what} | {figures(row.ours, row.unit)} | {beside} | '
                       f'{figures(row.ratios)}{spread(row)} | '
                       f'{"<br>".join(map(judged, row.targets))} |')
-    # Two tildes would strike out what is between them.
+    # Markdown strikes out text between two tildes.
     result = [re.sub(r'~/\w+', r'`\g<0>`', line) for line in result]
     return '\n'.join(result).replace(' |  |', ' | |').replace('|  |', '| |')
 

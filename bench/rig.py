@@ -48,7 +48,7 @@ Response = TypeVar('Response')
 __all__ = ['Program', 'ROOT', 'start_interpreter']
 
 PEERS = Path(__file__).with_name('peers')
-# s, the longest wait for anything that must happen.
+# s; the longest wait for an event.
 PATIENCE = 60.0
 _numbers = itertools.count()
 _ports: Iterator[int] = iter(())
@@ -59,10 +59,10 @@ class Bench:
     """
     The options of a run.
 
-    :param quick: do as little as possible: a test of the benchmark itself.
+    :param quick: measure as little as possible, to test the benchmark itself.
     :param soak: s.
     :param lights: numbers of lights that get a node each.
-    :param domain: the ROS domain of its own.
+    :param domain: a ROS domain that only this run uses.
     """
 
     quick: bool = False
@@ -108,7 +108,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def running(program: Program) -> Iterator[Program]:
-    """End a program in any case."""
+    """Yield a program, and end it in any case."""
     try:
         yield program
         if program.running:
@@ -160,7 +160,7 @@ class Client(SpunNode):
         self.close()
 
     def client(self, service: str) -> RosClient[SetBool.Request, SetBool.Response]:
-        """Return the client of a SetBool service, there or not."""
+        """Return the client of a SetBool service, whether the service exists or not."""
         if service not in self._clients:
             self._clients[service] = self.node.create_client(SetBool, service)
         return self._clients[service]
@@ -172,7 +172,7 @@ class Client(SpunNode):
     def call(
         self, service: str, on: bool, patience: float = PATIENCE,
     ) -> tuple[float, SetBool.Response | None]:
-        """Return the s until the caller has the answer, and the answer; None if none came."""
+        """Return the time until the caller has the answer, s, and the answer or None."""
         return _timed(self.client(service), SetBool.Request(data=on), patience)
 
     def request(
@@ -188,7 +188,7 @@ class Client(SpunNode):
 
     def meet(self, service: str, *, success: bool = True) -> None:
         """
-        Wait until a service answers, and with success where that is wanted.
+        Wait until a service answers, with success if ``success`` is set.
 
         The first call may get lost: the server may receive it before it discovers the client.
         """
@@ -255,6 +255,6 @@ def udp_queue(port: int) -> tuple[int, int]:
 
 
 def interleaved(names: Sequence[str], rounds: int) -> Iterator[str]:
-    """Yield each name once a round, in alternating order, so that drift affects all alike."""
+    """Yield each name once a round, in alternating order, so that drift affects all equally."""
     for number in range(rounds):
         yield from names if number % 2 == 0 else reversed(names)

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 import itertools
 import statistics
 
-# Statistic -> value; a single figure is called VALUE.
+# Statistic -> value; the key of a single figure is VALUE.
 Figures = dict[str, float]
 VALUE = 'value'
 QUANTILES = {'p50': 0.5, 'p95': 0.95, 'p99': 0.99}

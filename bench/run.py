@@ -53,9 +53,9 @@ def measure(
     names: Sequence[str], to: TextIO, **options: Any,
 ) -> tuple[list[Row], dict[str, float], list[str]]:
     """
-    Return the rows of some subjects, the s that each took, and the subjects that failed.
+    Return the rows of some subjects, the time of each, s, and the subjects that failed.
 
-    :param to: rows are printed here as they come.
+    :param to: the stream to which each row is printed as soon as it is measured.
     :param options: see :class:`bench.rig.Bench`.
     """
     # Slow, and not needed to show a run that was kept.
@@ -75,7 +75,7 @@ def measure(
                     rows.append(row)
                     print('\n'.join(lines(row)), file=to, flush=True)
             except Exception as error:
-                # The other subjects are measured all the same.
+                # The other subjects are measured nevertheless.
                 failed.append(name)
                 print(f'{name} FAILED: {error!r}', file=sys.stderr, flush=True)
                 if bench.quick:
@@ -111,9 +111,9 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run it; return the exit status."""
+    """Run the benchmark; return the exit status."""
     options = parser().parse_args(arguments)
-    # A shell that starts it in the background ignores SIGINT, for its children too.
+    # A shell ignores SIGINT for programs that it starts in the background, and for their children.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     # With --markdown, stdout has the table only.
     to = sys.stderr if options.markdown else sys.stdout

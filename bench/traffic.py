@@ -28,20 +28,20 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from .rig import udp_queue
 
-# Frames that are made: a multiple of 256, so that the sequence goes on when they are repeated.
+# Frames that are prepared: a multiple of 256, so that repeating them continues the sequence.
 PREPARED = 1024
 # In the proportions in which ArduPilot streams them: mostly attitude and position.
 COMMON = ('ATTITUDE',) * 5 + ('GLOBAL_POSITION_INT',) * 5 + ('VFR_HUD',) * 3 + (
     'RAW_IMU', 'RAW_IMU', 'SYS_STATUS', 'GPS_RAW_INT', 'GPS_RAW_INT', 'RC_CHANNELS',
     'RC_CHANNELS', 'SERVO_OUTPUT_RAW', 'SERVO_OUTPUT_RAW', 'SCALED_PRESSURE',
     'LOCAL_POSITION_NED', 'BATTERY_STATUS', 'VIBRATION', 'NAV_CONTROLLER_OUTPUT', 'SYSTEM_TIME')
-# One of them is a heartbeat, which comes once a second.
+# Of so many frames one is a heartbeat, which ArduPilot sends once a second.
 HEARTBEAT_EVERY = 512
-# Messages of its own dialect, which other software does not have.
+# Messages of ArduPilot's own dialect, which other software does not have.
 ARDUPILOT = ('AHRS', 'EKF_STATUS_REPORT')
 # Bytes that wait in a UDP socket while it is kept busy: 768 for a small datagram, as the kernel
-# counts. More than the 128 datagrams that the bridge lets collect, which would otherwise be slowed
-# down, and less than the 208 KiB that any system grants.
+# counts. This is more than the 128 datagrams that the bridge collects, so that it need
+# not wait for them, and less than the 208 KiB that any system grants.
 FULL = 150_000
 CHUNK = 32
 
@@ -91,7 +91,7 @@ class Line:
         """
         Send frames; return the s that it took.
 
-        :param rate: frames per second; 0 as many as are taken, without any being lost.
+        :param rate: frames per second; 0 = as many as the receiver takes without loss.
         """
         began = time.monotonic()
         done = 0
@@ -127,7 +127,7 @@ def udp_line(port: int) -> Line:
 
 
 class TcpListener:
-    """Waits for the receivers."""
+    """Accepts the connections of the receivers."""
 
     def __init__(self) -> None:
         self._listener = socket.create_server(('127.0.0.1', 0))

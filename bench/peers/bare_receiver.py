@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The least that Python can do: read, and do nothing with it."""
+"""A bare receive loop, the least work in Python: it reads data and discards it."""
 
 from __future__ import annotations
 

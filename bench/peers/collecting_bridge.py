@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bridge, which prints how long collections of its garbage stop it, ms."""
+"""The bridge; it prints for how long garbage collections stop it, ms."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from illuminator_ros.cli.bridge import main  # noqa: E402
 
-# s after the start, when the bridge serves its light.
+# s from the start until the bridge serves its light.
 DELAY = 3.0
 
 
 def collect(count: int) -> None:
-    """Collect all garbage so many times, as the interpreter does now and then."""
+    """Collect all garbage ``count`` times, as the interpreter sometimes does."""
     for _ in range(count):
         began = time.perf_counter()
         gc.collect()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The least that rclpy can do: a node with a SetBool server that does nothing."""
+"""The least work in rclpy: a node with a SetBool server that does nothing."""
 
 from __future__ import annotations
 

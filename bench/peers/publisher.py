@@ -15,8 +15,8 @@
 """
 A bare publisher that datagrams control.
 
-``publish COUNT INTERVAL``: publish so many times, so many s apart, the time of publishing.
-``relay TIME``: publish this, at once.
+``publish COUNT INTERVAL``: publish the time of publishing COUNT times, INTERVAL s apart.
+``relay TIME``: publish TIME at once.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main() -> None:
     """Publish until SIGINT; the argument is the UDP port to listen on."""
     rclpy.init()
     node = rclpy.create_node('publisher')
-    # As the bridge's topics of state have it.
+    # The QoS of the bridge's state topics.
     publisher = node.create_publisher(Float64, '~/time', QoSProfile(
         depth=1, reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""pymavlink's receiving loop; at its end it says how many frames came."""
+"""pymavlink's receive loop; at its end it prints the number of received frames."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pymavlink import mavutil  # noqa: E402
 
 
 def main() -> None:
-    """Receive from a pymavlink connection string until SIGINT; a device is followed by a baud."""
+    """Receive from a pymavlink connection string until SIGINT; a device needs a baud rate."""
     device, *baud = sys.argv[1].split(',')
     connection = mavutil.mavlink_connection(device, *(int(rate) for rate in baud))
     count = 0

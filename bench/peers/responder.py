@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A minimal light, which sends to the UDP port given, and takes next to no time to answer."""
+"""A minimal light that sends to the given UDP port and answers almost immediately."""
 
 from __future__ import annotations
 

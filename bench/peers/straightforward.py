@@ -15,8 +15,8 @@
 """
 The script that a user would write: pymavlink's recv_match in an rclpy node.
 
-It sends the command and waits for its acknowledgement, and takes that for the light being on; it
-neither looks at the status nor resends.
+It sends the command and reports success as soon as the command is acknowledged. It neither checks
+the status nor resends.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ ON_OFF = 405
 
 
 def main() -> None:
-    """Serve a light at the URL given until SIGINT."""
+    """Serve the light at the given URL until SIGINT."""
     connection = mavutil.mavlink_connection(sys.argv[1], source_system=1, source_component=191)
     rclpy.init()
     node = rclpy.create_node('straightforward')

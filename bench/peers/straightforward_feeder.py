@@ -15,7 +15,7 @@
 """
 A straightforward feeder of the camera: rclpy subscribers that pack with pymavlink.
 
-It checks nothing, and has neither a heartbeat nor a service. Its argument is the device.
+It checks nothing, and has neither a heartbeat nor a service. Its argument is the serial device.
 """
 
 from __future__ import annotations

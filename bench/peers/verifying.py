@@ -46,7 +46,7 @@ FRAMES = {on: frame_of(mav.CommandLong(
 
 
 def main() -> None:
-    """Serve the light that sends to the UDP port given, until SIGINT."""
+    """Serve the light that sends to the given UDP port, until SIGINT."""
     light = socket.socket(type=socket.SOCK_DGRAM)
     light.bind(('127.0.0.1', int(sys.argv[1])))
     rclpy.init()

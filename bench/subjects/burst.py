@@ -34,7 +34,7 @@ from ..traffic import COMMON, frames, udp_line
 OURS, RECV_MATCH = 'bridge', 'recv_match'
 BURST, AT_ONCE, INTERVAL = 20_000, 1000, 0.05
 LINK = 'illuminator: link'
-# Bytes that the kernel lets a socket keep at most; the bridge asks for 4 MiB.
+# Bytes of the largest receive buffer that the kernel grants; the bridge requests 4 MiB.
 RMEM_MAX = Path('/proc/sys/net/core/rmem_max')
 
 
@@ -60,7 +60,7 @@ def measure(bench: Bench) -> Iterator[Row]:
             began = time.monotonic()
             for number in range(size // AT_ONCE or 1):
                 time.sleep(max(began + number * INTERVAL - time.monotonic(), 0.0))
-                # Faster than anybody can send: all of them at once.
+                # A rate above that of any sender: all frames are sent at once.
                 lines[name].feed(prepared, 1e9, min(AT_ONCE, size))
             settle(programs[name].pid)
             sent[name] += size

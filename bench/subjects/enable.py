@@ -15,9 +15,9 @@
 """
 ``~/enable`` over UDP, acknowledged by the light and verified by a status.
 
-Against an empty SetBool server, the straightforward script, which verifies nothing, and the least
-script that does. The light is the simulator, and in a second row one that takes next to no time,
-so that the row is the bridge's own share.
+The peers are an empty SetBool server, the straightforward script, which verifies nothing, and the
+least script that verifies. The light is the simulator. In a second row it is a minimal light,
+which answers almost immediately, so that the row shows the bridge's own share.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ from ..rows import at_most, one, quantiles, Row, times
 
 OURS, EMPTY, SCRIPT = '/illuminator/enable', '/empty/enable', '/straightforward/enable'
 MINIMAL, LEAST = '/minimal/enable', '/verifying/enable'
-# Of the order of the calls: each server is called after each other one equally often, since the
-# program that ran before decides what is in the processor's caches.
+# Seed of the order of the calls. Each server is called after each other one equally often, since
+# the program that ran before determines the content of the processor's caches.
 SEED = 1
 WARM_UP = 50
 CLIENTS = 50
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Call one after the other, in turn."""
+    """Call the servers in turn."""
     took: dict[str, list[float]] = {name: [] for name in (OURS, EMPTY, SCRIPT, MINIMAL, LEAST)}
     ports = free_port(), free_port(), free_port(), free_port()
     with contextlib.ExitStack() as stack:
@@ -61,7 +61,7 @@ def measure(bench: Bench) -> Iterator[Row]:
         names, last, order = list(took), '', random.Random(SEED)
         for number in range(bench.amount(1500, 4)):
             order.shuffle(names)
-            # Never the same one twice in a row: it may still have to clear up after its answer.
+            # Never call a server twice in a row: it may still be busy after its answer.
             if names[0] == last:
                 names.reverse()
             last = names[-1]

@@ -33,7 +33,7 @@ OURS, RECV_MATCH, BARE = 'bridge', 'recv_match', 'bare receive loop'
 BAUD = 921_600
 # Frames a second (0: as many as the receiver takes) -> frames in a block.
 RATES = {500: 350, 5000: 2500, 0: 6000}
-# The rates with targets: at 500 a second, waking up costs more than the frame.
+# The rates with targets: at 500 frames a second, waking up takes more CPU time than a frame.
 BUSY = (5000, 0)
 TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 8, 'serial': 1 / 8}
 
@@ -96,13 +96,13 @@ def receivers(transport: str, stack: contextlib.ExitStack) -> dict[str, Receiver
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Feed all three over each transport at each rate."""
+    """Send frames to all three receivers over each transport at each rate."""
     for transport in TARGETS:
         yield from over(bench, transport)
 
 
 def over(bench: Bench, transport: str) -> Iterator[Row]:
-    """Feed all three over one transport."""
+    """Send frames to all three receivers over one transport."""
     prepared = frames()
     with contextlib.ExitStack() as stack:
         fed = receivers(transport, stack)

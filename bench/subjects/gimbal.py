@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-From a message on ``~/cmd/rate`` to the datagram.
+The time from a message on ``~/cmd/rate`` to the datagram.
 
-Against a bare subscriber that sends one: from before the call of ``publish`` to the arrival of
-the datagram. All times are of this process.
+The peer is a bare subscriber that sends a datagram. The time runs from before the call of
+``publish`` to the arrival of the datagram. This process takes all times.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ from ..rows import quantiles, Row, times
 MANAGER, BRIDGE = Address(1, 1), Address(1, 194)
 OURS, BARE = 'bridge', 'bare subscriber'
 TOPICS = {OURS: '/gimbal/cmd/rate', BARE: '/subscriber/cmd/rate'}
-# s between two; more than any of it takes.
+# s between two messages; longer than the path of a message takes.
 INTERVAL = 0.008
 BLOCK = 50
-# Where a setpoint has its yaw rate, and a datagram of the peer.
+# Offset of the yaw rate in a setpoint of the bridge, and in a datagram of the peer.
 RATE_OFFSET = {OURS: HEADER_V2 + 28, BARE: 8}
 NAN = math.nan
 
@@ -115,7 +115,7 @@ class Manager:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Publish to each in blocks, in alternate order."""
+    """Publish to both in blocks, in alternate order."""
     port = free_port()
     took: dict[str, list[float]] = {name: [] for name in TOPICS}
     with contextlib.ExitStack() as stack:
@@ -133,7 +133,7 @@ def measure(bench: Bench) -> Iterator[Row]:
             sent: dict[float, float] = {}
             for _ in range(size):
                 number += 1
-                # Exact in float32.
+                # The rates are exact in float32.
                 rate = number / 65536
                 message = Vector3Stamped(vector=Vector3(z=rate))
                 sent[rate] = time.monotonic()

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A gimbal manager: the way of a setpoint to the device, and control that 20 players compete for.
+A gimbal manager: the path of a setpoint to the device, and 20 players that compete for control.
 
 The setpoint of a MAVLink player goes over UDP to the manager, and from there to the device. The
 peer is a forwarder in Python that reads no MAVLink.
@@ -44,8 +44,8 @@ CLASSES: dict[int, type[mav.Message]] = {cls.id: cls for cls in (
     mav.CommandAck, gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerStatus)}
 WARM_UP = 50
 RATE, SECONDS = 1000, 10.0
-# s between setpoints, as players send them. Back to back, the ratio depends on which processors
-# are awake: 4.3 to 8.3.
+# s between setpoints, as players send them. Without pauses the ratio depends on the processors
+# that are awake: 4.3 to 8.3.
 PERIOD = 0.02
 # rad between the yaws by which the setpoints of two players differ.
 STEP = 0.1
@@ -78,7 +78,7 @@ class Line:
 
     def arrival(self, wanted: type[mav.Message]) -> float:
         """
-        Wait for a message, and return when its datagram came, before that was decoded.
+        Wait for a message, and return the arrival time of its datagram, before decoding.
 
         :raises TimeoutError: if no datagram comes.
         """
@@ -93,7 +93,7 @@ class Line:
                 for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
 
     def drain(self) -> None:
-        """Drop the datagrams that have come."""
+        """Drop the datagrams that have arrived."""
         self.socket.setblocking(False)
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -136,7 +136,7 @@ def managed() -> Iterator[tuple[int, Line, Line]]:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Measure the way of a setpoint, then the competition."""
+    """Measure the path of a setpoint, then the competition."""
     yield _setpoints(bench)
     yield from _competition(bench)
 
@@ -183,7 +183,7 @@ def _competition(bench: Bench) -> Iterator[Row]:
         for line in (players, device):
             line.drain()
         began, beat = time.monotonic(), 0.0
-        # A second more for late answers.
+        # One more second is for late answers.
         while (now := time.monotonic()) < began + seconds + 1.0:
             if now >= beat:
                 beat = now + 0.5

@@ -15,9 +15,10 @@
 """
 CPU time for a status with 1, 10 and 100 lights on one link.
 
-Without ROS and without sockets: the turns of the link, which for each light do all but publish. In
-simulated time, so that the numbers of lights are compared in turn within milliseconds: on a shared
-machine, the processor's speed and caches change the cost by half from one second to the next.
+The turns of the link run without ROS and without sockets, and do everything except publishing.
+Time is simulated, so that the numbers of lights are compared in turn within milliseconds: on a
+shared machine, the processor's speed and caches change the cost by half from one second to the
+next.
 """
 
 from __future__ import annotations
@@ -39,11 +40,11 @@ from ..rig import Bench, interleaved
 from ..rows import one, Row, times
 
 COUNTS = (1, 10, 100)
-# Frames per second, half of them statuses; the same for any number of lights, so that nothing
-# but the number differs.
+# Frames per second, half of them statuses; the same for any number of lights, so that only the
+# number differs.
 RATE = 800
-# Frames before the measurement, until no light is asked for its identity any more, and in each
-# part of it: those of 1 s, so that each part has the work that is due once a second.
+# Frames before the measurement, until the requests for identity have ended, and in each part of
+# the measurement: those of 1 s, so that each part has the work that is due once a second.
 WARM_UP, PART = 10 * RATE, RATE
 ROUNDS = 75
 FLAT = 1.2
@@ -102,7 +103,7 @@ def measure(bench: Bench) -> Iterator[Row]:
     found = {str(count): Lights(count, bench.amount(WARM_UP, RATE)) for count in COUNTS}
     for name in interleaved(list(found), bench.amount(ROUNDS, 1)):
         found[name].measure(bench.amount(PART, 20))
-    # The least: whatever else the machine does only adds to it.
+    # Take the least: other load on the machine only adds to it.
     least = {name: min(lights.costs) for name, lights in found.items()}
     base = one(least['1'])
     for name, cost in least.items():

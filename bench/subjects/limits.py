@@ -41,13 +41,13 @@ def limited(text: str, took: list[float], limit: float) -> Row:
 
 
 def set_brightness(client: Client, value: float) -> float:
-    """Return the s until a set of the parameter is answered."""
+    """Return the time until a set of the parameter is answered, s."""
     return client.request(SetParameters, '/illuminator/set_parameters', SetParameters.Request(
         parameters=[Parameter('brightness', value=value).to_parameter_msg()]))[0]
 
 
 def ended(program: Program, number: int) -> float:
-    """Return the s until a program has ended after a signal."""
+    """Return the time from a signal to the end of a program, s."""
     began = time.monotonic()
     if program.end(number):
         raise RuntimeError(program.log)
@@ -55,7 +55,7 @@ def ended(program: Program, number: int) -> float:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Try each limit some times."""
+    """Measure each limit several times."""
     tries = range(bench.amount(5, 1))
     port = free_port()
     with (bridge(f'udpin://127.0.0.1:{port}') as program, Client(bench.domain) as client):
@@ -93,7 +93,7 @@ def measure(bench: Bench) -> Iterator[Row]:
 
 
 def collections(count: int) -> list[float]:
-    """Return how long collections of garbage stop a bridge that serves a light, s."""
+    """Return for how long garbage collections stop a bridge that serves a light, s."""
     port = free_port()
     with (serving(port), peer('collecting_bridge', str(count), '--ros-args', '-p',
                               f'connection_url:=udpin://127.0.0.1:{port}') as program):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Commands through 30 % loss each way, and beside it repeated and reordered frames."""
+"""Commands over a line that loses, repeats and reorders 30 % of the frames each way."""
 
 from __future__ import annotations
 

@@ -24,10 +24,10 @@ from ..rig import Bench, bridge, Client, free_port, memory, peer, simulator
 from ..rows import at_most, middle, one, Row
 
 CALLS = 20
-# s of a light's statuses before it is looked.
+# s for which a light sends statuses before the memory is measured.
 SERVED = 3.0
 LIMIT_MB = 12.0
-# MB that memory may grow by in the soak: the allocator's own variation.
+# MB; the growth of memory that the soak tolerates, which the allocator causes.
 GROWTH_MB = 1.0
 
 
@@ -59,7 +59,7 @@ def measure(bench: Bench) -> Iterator[Row]:
 
 
 def growth(bench: Bench) -> Row:
-    """Call ``~/enable`` of a light at 10 Hz for some time; the first quarter is to warm up."""
+    """Call ``~/enable`` of a light at 10 Hz for some time; the first quarter is the warm-up."""
     seconds = bench.amount(bench.soak, 0.4)
     port = free_port()
     with contextlib.ExitStack() as stack:

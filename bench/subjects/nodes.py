@@ -33,7 +33,7 @@ MEMORY, THREADS, DISCOVERY = 160.0, 20, 3.0
 
 
 def seen(client: Client, names: list[str]) -> float:
-    """Return the s until a participant has discovered the services of all nodes."""
+    """Return the time until a participant has discovered the services of all nodes, s."""
     began = time.monotonic()
     clients = [client.client(f'/{name}/enable') for name in names]
     while not all(one.service_is_ready() for one in clients):

@@ -28,14 +28,14 @@ from ..rows import at_most, one, Row
 from ..traffic import COMMON, frames
 
 MOST_NOISE = 40
-# Bytes that a read brings.
+# Bytes of one read.
 PIECE = 512
-# Longer than any frame: what looks like one at the end waits for no more than that.
+# Longer than any frame, so that the parser waits for no further bytes at the end.
 END = bytes(300)
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Give both the same stream."""
+    """Give both parsers the same stream."""
     good = frames(COMMON, bench.amount(20_000, 200))
     draw = random.Random('noise')
     stream = b''.join(draw.randbytes(draw.randint(0, MOST_NOISE)) + frame for frame in good) + END

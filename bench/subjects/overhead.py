@@ -29,7 +29,7 @@ LIMIT = 60.0
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Count for a light with a status a second."""
+    """Count the bytes for a light that sends a status each second."""
     port = free_port()
     with bridge(f'udpin://127.0.0.1:{port}'), serving(port) as light:
         time.sleep(bench.amount(SETTLING, 0.2))

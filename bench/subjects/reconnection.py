@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-How long the link takes to be up again once the other side is back.
+The time that the link needs to recover after the return of the other side.
 
-From its return (a TCP server listens, a serial device is there, a UDP light sends from another
-port) to the first frame of the bridge that comes there.
+It runs from that return (a TCP server listens, a serial device exists, a UDP light sends from
+another port) to the first frame of the bridge that arrives there.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from ..rig import Bench, bridge, free_port, PATIENCE
 from ..rows import at_most, quantile, Row
 
 LIMIT_MS = 1000.0
-# s that it is away; the longer, the rarer the attempts may have become.
+# s for which the other side is absent; the pauses between attempts grow with it.
 ABSENCES = (0.2, 1.0, 4.0)
-# s that it is there; longer than a connection has to last to be taken for a good one.
+# s for which the other side is present; longer than the time that proves a connection.
 LASTING = 1.2
 HELLO = frame_of(heartbeat(MavType.ILLUMINATOR), 0)
 
@@ -110,7 +110,7 @@ def udp(absences: tuple[float, ...], lasting: float) -> list[float]:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Try all three at once: almost all of it is waiting."""
+    """Measure all three at once, since they mostly wait."""
     kinds: dict[str, Callable[[tuple[float, ...], float], list[float]]] = {
         'TCP server restarted': tcp, 'serial device plugged in again': serial,
         'UDP light on another port': udp}

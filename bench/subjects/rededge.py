@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-A camera that is fed over a line of 57,600 baud, beside what a user would write.
+The input of a camera over a line of 57,600 baud, compared with a script that a user would write.
 
-The line is a pseudo-terminal, and each byte takes its time of the line from when it arrives, or
-from the end of the byte before.
+The line is a pseudo-terminal, and each byte takes the time of the line, from its arrival or from
+the end of the byte before.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ROTATIONS = 100_000
 
 
 class Line:
-    """The far end of a serial line: when each frame has been sent, by what is in it."""
+    """The far end of a serial line; it notes when each frame was sent, by its content."""
 
     def __init__(self) -> None:
         self._far, self._near = os.openpty()
@@ -87,7 +87,7 @@ class Line:
 
 
 def measure(bench: Bench) -> Iterator[Row]:
-    """Feed both at once, at a rate that the line carries, and at one that it does not."""
+    """Feed both at once, at a rate that the line can carry and at a rate that it cannot."""
     for rate in (50.0, 200.0):
         yield from fed(bench, rate)
     yield orientation(bench)
@@ -125,7 +125,7 @@ def publish(
     """
     Publish for a time.
 
-    Return when each fix was published, the CPU time of the processes, and the time that it took.
+    Return when each fix was published, the CPU time of the processes, and the elapsed time.
     """
     node = client.node
     fixes = node.create_publisher(NavSatFix, '/fix', 10)
@@ -155,7 +155,7 @@ def publish(
 
 
 def orientation(bench: Bench) -> Row:
-    """Compose what is sent of random attitudes and mounts, and compare it with what was given."""
+    """Compose the sent angles of random attitudes and mounts, and compare them with the input."""
     from scipy.spatial.transform import Rotation
 
     chance = random.Random(1)

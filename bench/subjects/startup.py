@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-From the start of the process to its service answering, and to the first status published.
+The time from the start of the process to the first answer, and to the first published status.
 
-Against the same of an empty node. The light is there before, with a status a second, so up to
-that second is chance.
+The peer is an empty node. The light runs before the start and sends a status each second, so up to
+one second of the latter is chance.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ RATIO = 1.2
 
 
 def measure(bench: rig.Bench) -> Iterator[Row]:
-    """Start each again and again, in alternate order."""
+    """Start each program repeatedly, in alternate order."""
     port = rig.free_port()
     service: dict[str, list[float]] = {OURS: [], EMPTY: []}
     status: list[float] = []
@@ -59,7 +59,7 @@ def measure(bench: rig.Bench) -> Iterator[Row]:
 
 
 def start(bench: rig.Bench, name: str, node: str, port: int) -> tuple[float, float]:
-    """Return the s from a start until the service answers, and until a status is published."""
+    """Return the times from a start to an answer and to a published status, s."""
     published: list[float] = []
     first = threading.Event()
 

@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-From an ILLUMINATOR_STATUS on the wire to a subscriber.
+The time from an ILLUMINATOR_STATUS on the wire to a subscriber.
 
-Against a bare publisher and subscriber: from before the call of ``publish`` to the subscriber.
-All times are of CLOCK_MONOTONIC, which the processes of a machine share. A status makes seven
-messages, ``~/enabled`` first and ``~/uptime`` last. As the bare subscriber, each has a subscriber
-to itself: one that takes both spends longer on the first than lies between them.
+The peers are a bare publisher and subscriber: from before the call of ``publish`` to the
+subscriber. All times are of CLOCK_MONOTONIC, which the processes of a machine share. A status
+makes seven messages, ``~/enabled`` first and ``~/uptime`` last. Each has a subscriber of its own,
+as in the peer: the first message occupies a shared subscriber until after the last one arrives.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ STATE = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                    durability=DurabilityPolicy.TRANSIENT_LOCAL)
 OURS, BARE, RELAY = 'bridge', 'bare publisher', 'bare relay'
 CALLED = OURS, BARE, RELAY
-# s between two; more than any of it takes, so that what comes is of the newest status.
+# s between two statuses; longer than the path of one, so that a message is of the newest status.
 INTERVAL = 0.008
 BLOCK = 50
 
@@ -51,7 +51,7 @@ def measure(bench: Bench) -> Iterator[Row]:
 
 
 def over(bench: Bench, topic: str, type_: type[object], place: str, limit: float) -> Row:
-    """Publish each in blocks, in alternate order."""
+    """Measure bridge and peer in blocks, in alternate order."""
     port, control_port = free_port(), free_port()
     took: dict[str, list[float]] = {name: [] for name in CALLED}
     with contextlib.ExitStack() as stack:
