@@ -17,8 +17,8 @@ Fly a simulated survey, and compare what a camera writes into its images with th
 
 A robot publishes its position, velocity, attitude and the angles of a gimbal as ROS topics; the
 node ``rededge`` feeds a simulated camera over a pseudo-terminal. For some time there is no fix,
-and the link is pulled once. The flight is played faster than real: all times of the node and of
-the camera are shortened by the same factor, and all clocks are real ones.
+and the link is pulled once. The flight is played faster than real time: all times of the node and
+of the camera are shortened by the same factor, and all clocks are real ones.
 
 The exit status is 0 if the images agree with the truth, otherwise 1.
 """
@@ -74,7 +74,7 @@ from illuminator_ros.rededge.simulated import (  # noqa: E402
 # s to start a program, and s from its start to the take-off, real time.
 START_TIMEOUT, LEAD_TIME = 20.0, 0.5
 END_TIMEOUT = 5.0
-# s, flight time, after which the node refuses a fix, and an attitude.
+# s of flight time after which the node refuses a fix, and an attitude.
 POSITION_TIMEOUT, ATTITUDE_TIMEOUT = 1.0, 0.5
 # s that a message may take from the node to the camera, real time; and the share of images in
 # undisturbed flight whose fix is not older than one interval. Both depend on the computer's load.

@@ -15,7 +15,7 @@
 """
 A simulated survey flight: the truth about it, and the comparison of images with the truth.
 
-Times are flight time, s since the take-off. A flight may be played faster than it is.
+Times are flight time, s since the take-off. A flight may be played faster than real time.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from illuminator_ros.payload.rotation import Quaternion, Vector
 
 # m/s, degrees, m/s^2
 SPEED, BANK, GRAVITY = 5.0, 40.0, 9.81
-# s: a straight leg with the turn behind it, and how long the vehicle takes to bank.
+# s of a leg with the turn after it, of its straight part, and of a change of the bank.
 LEG, STRAIGHT, BANKING = 9.0, 6.0, 0.6
 # s between the points of the path.
 STEP = 0.005
@@ -171,7 +171,7 @@ class Flight:
         """
         Return the delay, within a limit, that explains attitude and mount best.
 
-        It must be the same for both, since they are of one instant, if they came together.
+        If both came together, they are of one instant, so the delay must be the same for both.
 
         :return: the delay, s; and the error that it leaves, degrees.
         """
@@ -189,7 +189,7 @@ class Flight:
 
 def least(error: Callable[[float], float], limit: float) -> tuple[float, float]:
     """Return the argument, within a limit on both sides, with the least error; and that error."""
-    # In steps so short that the error has one minimum between two neighbours.
+    # The steps are so short that the error has one minimum between two neighbours.
     count = max(40, math.ceil(limit / 0.05))
     best = min((limit * number / count for number in range(-count, count + 1)), key=error)
     low, high = best - limit / count, best + limit / count
@@ -255,7 +255,7 @@ class Comparison:
     :param position_error: of those, from the truth at the time of the image, at most, m.
     :param fix_error: of every injected position, from the truth at the time of the fix, m.
     :param angle_error: of every injected attitude and mount, from the truth, degrees.
-    :param delay: by which such a time differs from what the ages say, at most, s.
+    :param delay: the largest difference of such a time from the time that the ages give, s.
     :param oldest: age of the oldest injected position or attitude, s.
     :param own: images in the outage with the position of the camera's own GPS.
     :param returned: images with a fresh fix after the link was pulled.
@@ -273,7 +273,7 @@ class Comparison:
     failures: list[str] = field(default_factory=list)
 
     def check(self, met: bool, text: str) -> None:
-        """Note a failure."""
+        """Note a failure unless a condition is met."""
         if not met:
             self.failures.append(text)
 

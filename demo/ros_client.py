@@ -44,7 +44,7 @@ STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TimedOut(Exception):
-    """Something did not happen in time; the text says what."""
+    """An event did not happen in time; the text names it."""
 
 
 class RosClient:

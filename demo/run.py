@@ -57,7 +57,7 @@ PARAMETER_TIMEOUT = 5.0
 
 
 class Failed(Exception):
-    """A step had another result than it must have; the text says which."""
+    """A step had an unexpected result, which the text names."""
 
 
 def free_port() -> int:
@@ -108,7 +108,7 @@ class Demo:
         return 'accepted; the light flashes twice a second'
 
     def refuse(self) -> str:
-        """Ask for a period that the light does not support."""
+        """Request a period that the light does not support."""
         result = self.ros.set('strobe_period', 60.0)
         if result.successful or self.ros.get('strobe_period') != 0.5:
             raise Failed('the parameter strobe_period took 60 s, which the light cannot do')
