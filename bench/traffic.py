@@ -40,8 +40,8 @@ HEARTBEAT_EVERY = 512
 # Messages of ArduPilot's own dialect, which other software does not have.
 ARDUPILOT = ('AHRS', 'EKF_STATUS_REPORT')
 # Bytes that wait in a UDP socket while it is kept busy: 768 for a small datagram, as the kernel
-# counts. This is more than the 128 datagrams that the bridge collects, so that it need
-# not wait for them, and less than the 208 KiB that any system grants.
+# counts. This is more than the 128 datagrams that the bridge collects, so that it need not wait
+# for them, and less than the 208 KiB that any system grants.
 FULL = 150_000
 CHUNK = 32
 
