@@ -19,7 +19,7 @@ from __future__ import annotations
 from hypothesis import HealthCheck, settings
 import pytest
 
-# How long an example takes is a matter of the machine, and of what else runs on it.
+# The time of an example depends on the machine and on its other load.
 settings.register_profile(
     'steady', deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('steady')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which parts of the package may import which, and what the protocol core must do without."""
+"""The imports that are allowed between parts of the package, and the limits of the core."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def test_shared_protocol_modules_name_no_payload() -> None:
                            and not name.isupper()])} == {}
 
 
-# The parts of the monitor that may know the terminal, and those that may know the ROS graph.
+# The parts of the monitor that may use the terminal, and those that may use the ROS graph.
 @pytest.mark.parametrize(('part', 'foreign'), [
     ('model', ROS | IO | TIME | {'rich'}), ('key_bindings', ROS | IO | TIME | THREADS | {'rich'}),
     ('view', ROS | IO | TIME | THREADS), ('terminal', ROS | {'rich'}),
@@ -188,7 +188,7 @@ def tracked() -> list[Path]:
 
 
 def test_no_file_refers_to_documents_outside_the_repository() -> None:
-    # In parts, so that this file is not one of them.
+    # In parts, so that this file does not contain it.
     outside = re.compile('DESIGN' r'\.md|\.\./' 'shared/|/work' '/(shared|plan)')
     texts = {path: path.read_text(errors='replace') for path in tracked() if path.is_file()}
 

@@ -92,7 +92,7 @@ def test_executables_are_installed(launch: ET.Element) -> None:
                 if argument.attrib['name'] == 'executable']
     for executable in launch.findall('executable'):
         if executable.attrib['cmd'].startswith('$(var '):
-            # A program of the user's.
+            # The user's own program.
             continue
         names = re.findall(r'\$\(exec-in-pkg (\w+) (\w+)\)', executable.attrib['cmd'])
         started += [(package, name) for name, package in names]
@@ -103,7 +103,7 @@ def test_executables_are_installed(launch: ET.Element) -> None:
 
 @EVERY
 def test_packages_of_others_are_looked_for_before_anything_is_started(launch: ET.Element) -> None:
-    # Launch ends at a package that is missing, and leaves the programs running before it.
+    # Launch ends at a missing package without ending the programs that it has started.
     found: set[str] = set()
     started = [*launch.iter('node'), *(
         node for include in launch.findall('include')
@@ -137,7 +137,7 @@ def test_included_file_declares_the_arguments_given_to_it(launch: ET.Element) ->
 @EVERY
 def test_included_file_is_given_each_argument_that_the_including_file_has_too(
         launch: ET.Element) -> None:
-    # It would have the value of the including file, not its own default.
+    # Otherwise it would have the value of the including file, not its own default.
     for include in launch.findall('include'):
         included = FILES[Path(include.attrib['file']).name]
         given = {argument.attrib['name'] for argument in include.findall('arg')}

@@ -28,7 +28,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = 'illuminator_ros'
-# Modules whose rosdep key is another than their name; fastcrc comes with pymavlink.
+# Modules whose rosdep key differs from their name; fastcrc comes with pymavlink.
 KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
         'numpy': 'python3-numpy',
         'pymavlink': 'python3-pymavlink-pip', 'pytest': 'python3-pytest',
@@ -39,12 +39,12 @@ KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
 pytestmark = pytest.mark.timeout(300)
 # Extras of setup.py.
 OPTIONAL = {'python3-rich'}
-# Without a rosdep key; tests skip where it is absent.
+# Modules without a rosdep key; tests skip if one is absent.
 PEERS = {'mavsdk'}
 
 
 def imported(folder: Path) -> set[str]:
-    """Return the modules that the Python files of a folder import, of whatever package."""
+    """Return the modules that the Python files of a folder import, of any package."""
     names = set()
     for path in folder.rglob('*.py'):
         for node in ast.walk(ast.parse(path.read_text())):
@@ -52,7 +52,7 @@ def imported(folder: Path) -> set[str]:
                 names |= {alias.name.partition('.')[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 names.add(str(node.module).partition('.')[0])
-    # _typeshed is a name of type checkers only.
+    # _typeshed exists for type checkers only.
     return names - sys.stdlib_module_names - {'_typeshed'}
 
 
@@ -72,7 +72,7 @@ def versions(folder: Path) -> list[str]:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """Return a copy of what is released."""
+    """Return a copy of the released files."""
     return shutil.copytree(ROOT, tmp_path / PACKAGE, ignore=shutil.ignore_patterns(
         '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'test'))
 

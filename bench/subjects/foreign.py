@@ -67,7 +67,7 @@ class Receiver:
 
 
 def receivers(transport: str, stack: contextlib.ExitStack) -> dict[str, Receiver]:
-    """Start the three, each with a line of its own."""
+    """Start the three receivers, each with a line of its own."""
     found = {}
     for name in (OURS, RECV_MATCH, BARE):
         make_line: Callable[[], Line]

@@ -31,7 +31,7 @@ Start = Callable[..., Program]
 
 CONFORMANCE = 'support.quick_conformance'
 
-# Would keep the light at 100 % for an hour.
+# A run that would keep the light at 100 % for an hour.
 LONG = ('--yes', '--only', 'brightness', '--only', 'thermal-flags', '--heat', '3600')
 
 
@@ -73,7 +73,7 @@ def test_a_run_ends_with_its_verdict_and_its_reports_agree(
         str(tmp_path / 'report.json'))
     assert program.wait() == 1
     assert 'FAIL    brightness ' in program.log
-    # No terminal, no --yes: no consent.
+    # Without a terminal and without --yes the user cannot consent.
     assert 'switched on, it would shine at 100 %' in program.log
     assert re.search(r'1 passed, 1 failed, 1 skipped .*', program.log), program.log
     assert json.loads((tmp_path / 'report.json').read_text())['passed'] is False
@@ -122,7 +122,7 @@ def test_a_second_signal_ends_at_once_and_says_that_the_light_is_changed(
     simulator = simulate()
     program = start(CONFORMANCE, f'udpout://{url}', *LONG)
     simulator.wait_for('ON     100 %')
-    # So that the light is not restored before the second signal.
+    # Stop the light, so that it is not restored before the second signal.
     simulator.send(signal.SIGSTOP)
     program.send(signal.SIGINT)
     program.wait_for('restoring the light')
@@ -173,7 +173,7 @@ def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirec
 @pytest.mark.parametrize(('link', 'used', 'status', 'reason'), [
     ('udpin://{url}', False, 1, 'no light was heard within 0.5 s'),
     ('tcp://127.0.0.1:1', False, 1, 'link not open: tcp://127.0.0.1:1: '),
-    # This computer cannot open the link, which is not a finding about the light.
+    # This computer cannot open the link, which does not concern the light.
     ('udpin://{url}', True, 2, 'Address already in use; nothing was checked'),
     ('serial:///nowhere/tty:57600', False, 2, 'nothing was checked')])
 def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
@@ -186,7 +186,7 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
     assert program.wait() == status
     assert reason in program.log
     assert ('0 passed, 1 failed' in program.log) == ('FAIL' in program.log) == (status == 1)
-    # Not more often than as a line while it waits, and as the result.
+    # The reason is printed at most twice: while the program waits, and as the result.
     assert program.log.count(reason.partition(';')[0]) <= 3 - status
     assert 'trying again' not in program.log or status == 1
     assert len(program.log.splitlines()) < 10

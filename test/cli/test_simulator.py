@@ -66,7 +66,7 @@ def test_undecodable_input_does_not_end_the_console_of_a_simulator(url: str) -> 
     assert process.stdin is not None
 
     def ended() -> bool:
-        # Repeated, because a line that is read together with the bytes is dropped with them.
+        # Repeat the line: the simulator drops a line that it reads together with invalid bytes.
         assert process.stdin is not None
         with contextlib.suppress(BrokenPipeError):
             process.stdin.write(b'quit\n')

@@ -44,7 +44,8 @@ all_lights = pytest.mark.parametrize('light', LIGHTS.values(), ids=LIGHTS)
 
 
 def dazzling(seen: list[Configuration]) -> list[Configuration]:
-    # A comparison with NaN is false, so NaN dazzles; in external sync another signal may strobe.
+    # A comparison with NaN is false, so NaN counts as dazzling. Under external sync the other
+    # signal may strobe.
     return [one for one in seen if not (
         one.brightness <= 20.0 and one.strobe_period == 0
         and one.mode is Mode.INTERNAL_CONTROL)]

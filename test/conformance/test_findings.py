@@ -49,7 +49,7 @@ SEEDED = {
     'progress': {'finished'},
     'busy': {'not-busy'},
     'slow': {'acknowledged-promptly'},
-    # It is already off when it is switched off.
+    # The light is already off when it is switched off.
     'lie': ACCEPTED_CHANGES - {'off'} | {'status-agrees'},
     'heartbeat': {'heartbeat-rate'},
     'type': {'heartbeat-type'},
@@ -163,9 +163,9 @@ ARDUSUB = properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.addr
     (HEALTHY, 'anything', 'brightness-values', FAIL,
      'MAV_CMD_DO_ILLUMINATOR_CONFIGURE 1 101 0 0: MAV_RESULT_ACCEPTED',
      '< COMMAND_ACK MAV_CMD_DO_ILLUMINATOR_CONFIGURE: MAV_RESULT_ACCEPTED'),
-    # A change in progress for ever does not delay the run.
+    # A change that never completes does not delay the run.
     (HEALTHY, 'progress=3600', 'on', FAIL, 'no acknowledgement', ''),
-    # A light without strobe limits is not made to strobe.
+    # The checks do not make a light without strobe limits strobe.
     *((ARDUSUB, '', name, SKIPPED, 'reports no strobe limits', '')
       for name in ('strobe', 'strobe-values', 'duty-cycle')),
     (replace(HEALTHY, time_scale=120.0), '', 'thermal-flags', PASS,

@@ -27,7 +27,7 @@ import pytest
 from support.conformance_run import Run
 
 BEFORE = Configuration(Mode.EXTERNAL_SYNC, 60.0, 0.5, 25.0)
-# Faults with which a light can be heard and does what it is told.
+# Faults with which a light sends messages and applies commands.
 RESTORABLE = sorted(set(FAULTS) - {
     'silence', 'refuse', 'lie', 'no-stop', 'reboot', 'toggle', 'no-resume'})
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The design page: modules, places and bounds, as the code has them."""
+"""The modules, places and bounds of the design page, compared with the code."""
 
 from importlib import import_module
 from pathlib import Path

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pages about the ROS interface, and what the bridge has."""
+"""The pages about the ROS interface, compared with the bridge."""
 
 from collections.abc import Sequence
 import dataclasses

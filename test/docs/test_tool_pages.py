@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pages of simulator and conformance, and what these programs have; no ROS is needed."""
+"""The pages of simulator and conformance, compared with these programs; needs no ROS."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -68,7 +68,7 @@ def settings(of: SimulatedType[Any]) -> list[list[str]]:
 
 
 def of_both(device: list[list[str]], manager: list[list[str]]) -> list[list[str]]:
-    """Return the rows of gimbal devices and managers, with the one that alone has a row."""
+    """Return the rows of devices and managers; a row of only one of them ends with its name."""
     return [*([*row, '' if row in manager else 'device'] for row in device),
             *([*row, 'manager'] for row in manager if row not in device)]
 

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Attacks both sides of the protocol with hostile input for as long as is wanted.
+Attacks both sides of the protocol with hostile input for a given time.
 
 Everything between the socket and the observers takes part: channel, framing, signing, routes,
-controller or simulated lights, in all signing modes, while honest requests go on. What must hold
-is in test/support/attacked_link.py. The same seed sends the same input.
+controller or simulated lights, in all signing modes, beside honest requests. The same seed sends
+the same input. test/support/attacked_link.py has the conditions that must hold.
 
     python3 test/fuzz/run.py --seconds 60 --seed 1
     python3 test/fuzz/run.py --only 1/17        one round again, as a finding names it
@@ -42,9 +42,9 @@ from illuminator_ros.mavlink.signing import SigningMode  # noqa: E402
 from support.attacked_link import ATTACKED  # noqa: E402
 
 KINDS = list(itertools.product(ATTACKED, SigningMode))
-# Datagrams of one round: enough to fill every table, few enough to find one of them again.
+# Datagrams of one round: enough to fill every table, few enough to repeat a finding quickly.
 ROUND = 10_000
-# Rounds after which memory must not grow any more, and by how much it may (MB).
+# Rounds after which memory must not grow any more, and the tolerance, MB.
 WARM_UP = 12
 MAX_GROWTH = 8.0
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The checks of gimbal devices and managers: each fault is found by exactly what it breaks."""
+"""Checks of gimbal devices and managers: a fault fails exactly the requirements it breaks."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ SEEDED = {
         'stale-control': {'take', 'secondary', 'one-player'},
     },
 }
-# Found at random, or with others that depend on when they strike.
+# Random fault -> a requirement that fails; others fail too, depending on its moment.
 RANDOM = {'drop': 'acknowledged', 'duplicate': 'acknowledged-once', 'corrupt': 'checksums',
           'delay': 'acknowledged-promptly', 'reboot': 'uptime'}
 PROFILES: dict[str, set[str]] = {
@@ -241,7 +241,7 @@ def test_every_fault_is_seeded_and_every_requirement_can_fail(kind: str) -> None
     assert set(simulated.device.faults) == {*SEEDED[kind], *RANDOM}
     found = set().union(*SEEDED[kind].values(), RANDOM.values(), *PROFILES.values(),
                         {name for one, name in DEVIATIONS if one == kind})
-    # test/conformance covers the address, and changes by command, of which a device has none.
+    # test/conformance covers the address, and changes by command, which a device does not have.
     others = {'address'} if kind == 'gimbal_manager' else {'address', 'finished', 'not-busy'}
     assert {one.name for one in checks.requirements} - found == others
 

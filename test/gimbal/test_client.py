@@ -53,7 +53,7 @@ def test_gm_27_gimbal_is_found_by_the_information_of_its_manager() -> None:
     # Two devices without MAVLink behind one manager.
     ((FakeManager(device_id=1), FakeManager(device_id=6)),
      [GimbalKey(AUTOPILOT, 1), GimbalKey(AUTOPILOT, 6)]),
-    # The same number behind two managers is two gimbals.
+    # The same number behind two managers means two gimbals.
     ((FakeManager(device_id=1), FakeManager(OTHER, 1)),
      [GimbalKey(AUTOPILOT, 1), GimbalKey(OTHER, 1)]),
     # A manager on the device itself, and another vehicle.
@@ -97,7 +97,7 @@ def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> Non
 
     assert rig.all_of(events.GimbalConnected)
     assert rig.gimbal.snapshot(rig.now).capabilities is None
-    # Less and less often.
+    # The pauses grow.
     assert 3 <= len(requests(rig)) <= 15
 
 
@@ -115,7 +115,7 @@ def test_gm_27_hundred_components_are_asked_one_after_the_other(answer: int | No
     for at, target in asked:
         first.setdefault(target, at)
     assert set(first) == set(others)
-    # Four frames for each that stays silent.
+    # Each request of a silent component is four frames.
     busiest = max(sum(at <= other < at + 10 for other, _ in asked) for at, _ in asked)
     assert busiest <= 10 / limits.REQUEST_SPACING * 4 + 4
     starts = sorted(first.values())
@@ -193,7 +193,7 @@ def test_silent_gimbal_is_forgotten_unless_it_was_commanded(was_commanded: bool)
     if was_commanded:
         rig.gimbal.release_control(rig.now, rig.done)
     rig.managers.clear()
-    # Nothing else is due without a link.
+    # Without a link only the removal of the gimbal is due.
     rig.component.link_closed(rig.now, 'cable pulled')
     rig.run(60.1)
 

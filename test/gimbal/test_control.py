@@ -292,7 +292,7 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
         False, True), message
     rig.managers[0].device_alive = True
     rig.run(1.0)
-    # Another player takes control while the command is on its way.
+    # Another player takes control while the command is in flight.
     ask(rig.gimbal, rig.now, rig.done)
     rig.managers[0].primary = OTHER
     rig.receive(AUTOPILOT, rig.managers[0].status())

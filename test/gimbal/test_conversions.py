@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Angles and rates in messages of ROS that no gimbal can be meant to obey."""
+"""Implausible angles and rates in messages of ROS."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def start_gimbal(ros: Ros, port: int, **parameters: Any) -> Program:
 
 @contextlib.contextmanager
 def bridge(ros: Ros, *managers: FakeManager, **parameters: Any) -> Iterator[Program]:
-    """Run a bridge that serves gimbals, and fake managers that are connected to it, in time."""
+    """Run a bridge that serves gimbals, and fake managers that are connected to it."""
     port = free_port()
     with (ended(start_gimbal(ros, port, **parameters)) as program,
           served_gimbals(port, *managers, link=SlowLink), time_passes()):
@@ -80,10 +80,10 @@ def served(ros: Ros) -> Iterator[tuple[Program, FakeManager]]:
 
 @pytest.fixture
 def gimbal(ros: Ros, served: tuple[Program, FakeManager]) -> Iterator[FakeManager]:
-    """Return the module's gimbal, which does as it is told and has received nothing yet."""
+    """Return the module's gimbal, which obeys and has received nothing yet."""
     manager = served[1]
     before = vars(manager).copy()
-    # The end of control ends the setpoints of the test before, which would be repeated.
+    # Releasing control ends the repeated setpoints of the previous test.
     for name in ('take_control', 'release_control'):
         assert trigger(ros, name).success
     manager.received.clear()
@@ -202,7 +202,7 @@ def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_serv
 
     publish(ros, 'cmd/roi', NavSatFix(latitude=47.39, longitude=8.54, altitude=535.5))
 
-    # It may be sent again, if time passes before its acknowledgement.
+    # The command may be sent again if its acknowledgement is late.
     place, *_ = eventually(
         lambda: [one for one in gimbal.commands if isinstance(one, CommandInt)])
     assert (place.command, place.frame, place.x, place.y, place.z) == (
@@ -351,7 +351,7 @@ def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
     manager = FakeManager(primary=OURS, capabilities=lacking)
     with bridge(own_ros, manager, attitude_interval=0.05, earth_frame='odom') as program:
         own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
-        # The status that shows the control may come before the capabilities.
+        # The status that shows control may arrive before the capabilities.
         eventually(lambda: own_ros.call(
             SetBool, '/gimbal/set_yaw_lock', SetBool.Request(data=True)).message
             == 'gimbal 1/154 does not have HAS_YAW_LOCK')
@@ -398,5 +398,5 @@ def test_lost_gimbal_is_reported(own_ros: Ros) -> None:
         controller.wait_value('unknown')
         manager.alive = manager.device_alive = True
         controller.wait_value('primary 1/195, secondary none')
-        # The same components are in control as before.
+        # The components in control have not changed, so a second line is not logged.
         assert program.count('control of gimbal 1/154: ') == 1

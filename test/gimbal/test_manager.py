@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gimbal manager: its messages, and the way of a setpoint from a player to the device."""
+"""A gimbal manager: its messages, and the path of a setpoint from a player to the device."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def last(rig: ManagerRig) -> GimbalDeviceSetAttitude:
     return rig.messages(GimbalDeviceSetAttitude)[-1]
 
 
-# GM-10, GM-27: INFORMATION is static and on request, STATUS says who is in control
+# GM-10, GM-27: INFORMATION is static and on request, STATUS names the players in control
 
 @pytest.mark.parametrize('to', [OURS, mav.Address(1, 0), mav.Address(0, 0)])
 def test_gm_27_information_is_sent_on_request_with_what_the_device_reports(
@@ -247,7 +247,7 @@ def test_a_setpoint_is_repeated_at_least_once_a_second() -> None:
 
 Q = Quaternion.from_euler(0.1, 0.2, 0.3)
 HALF = (Q.w / 2, Q.x / 2, Q.y / 2, Q.z / 2)
-# A message of a player; angles (rad), rates (rad/s) and flags that the device gets.
+# A message of a player; the angles (rad), rates (rad/s) and flags that the device then receives.
 SETPOINTS: dict[str, tuple[Any, Any, Any, MountFlags]] = {
     'quaternion': (
         GimbalManagerSetAttitude(*OURS, int(F.YAW_LOCK), 0, HALF, NAN, 0.2, 0.3),
@@ -344,7 +344,7 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_without_north(
         return
     assert euler(sent[0]) == (0.0, 0.1, 0.2)
     assert F(sent[0].flags) == F.YAW_IN_VEHICLE_FRAME
-    # It follows the vehicle when that turns.
+    # The gimbal follows the vehicle when that turns.
     rig.heading = 1.1
     rig.report()
     rig.run(gimbal_manager.FOLLOW_INTERVAL)

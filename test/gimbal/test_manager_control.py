@@ -123,9 +123,10 @@ SECONDARY = (LOWER, (-1, -1, *LOWER))
 
 
 @pytest.mark.parametrize(('before', 'params', 'changes', 'holders'), [
-    # The id of the sender.
+    # -2 is the id of the sender.
     (SECONDARY, (-2, -2, -1, -1), [TAKEN], [PLAYER, LOWER]),
-    # Both roles or neither; a player that claims both gets the primary one beside another.
+    # Both roles change or neither; a player that claims both gets only the primary role
+    # while another player has the secondary one.
     (SECONDARY, (*PLAYER, *THIRD), None, [None, LOWER]),
     (SECONDARY, (*PLAYER, *PLAYER), [TAKEN], [PLAYER, LOWER]),
     ((PLAYER, (*PLAYER, *PLAYER)), (-3, -3, -3, -3), [

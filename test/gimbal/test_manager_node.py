@@ -141,7 +141,7 @@ def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
                 return gimbal.mount.motion.heading_known(gimbal.mount.motion.now)
 
             eventually(north_is_known)
-        # The heading does not get out of date while time hardly passes.
+        # The heading stays valid, since time hardly passes.
         north_is_known()
         own_ros.synchronize(NODE)
         assert own_ros.call(

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-One player at a time, whatever the players do and whatever happens to their frames.
+The manager obeys one player at a time, whatever the players do and the lines lose.
 
-Up to 20 players obey, lie, die, flood and forge the addresses of others, over lines that lose,
-repeat, reorder and spoil frames.
+Up to 20 players obey, lie, stop, flood and forge the addresses of others, over lines that lose,
+repeat, reorder and corrupt frames.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Player:
     dies_at: float = math.inf
 
     def send(self, now: float) -> None:
-        """Send what it sends at this moment."""
+        """Send the messages that are due."""
         if now >= self.dies_at:
             return
         if now >= self.heartbeat_due:
@@ -103,12 +103,12 @@ class Player:
 
 
 def mark(number: int) -> float:
-    """Return the yaw that only one address sets, rad."""
+    """Return the yaw that marks the setpoints of one address, rad."""
     return (number - 10) * 0.25
 
 
 class Arena:
-    """The manager among its players; the checks are those of the module's heading."""
+    """A manager and its players, with checks that it obeys one player at a time."""
 
     def __init__(self, kinds: list[str], faults: Faults, overruling: set[int], seed: int) -> None:
         self.overruling = {address_of(number) for number in overruling}
@@ -128,7 +128,7 @@ class Arena:
         self.changes = 0
 
     def run(self) -> None:
-        """Let all of them play."""
+        """Run the manager and all players."""
         end = self.rig.now + SECONDS
         while self.rig.now < end:
             for player, decoder in zip(self.players, self.decoders, strict=True):

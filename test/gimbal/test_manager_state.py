@@ -100,7 +100,7 @@ def test_each_input_leads_to_the_state_of_the_table(
     expected = TRANSITIONS.get((state, input_), state)
 
     if (state, input_) == (ManagerState.LISTENING, ManagerInput.MANAGER_LOST):
-        # Its time is over meanwhile.
+        # The time of LISTENING ends meanwhile.
         expected = ManagerState.ACTIVE
     assert rig.manager.tracker.state is expected
 
@@ -186,7 +186,7 @@ def test_gm_18_managers_that_send_no_status_are_asked_before_ours_announces_anyt
 @pytest.mark.parametrize('apart', [0.0, 1.0])
 def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
         apart: float, address: Address) -> None:
-    # At first the two listen until the same moment.
+    # At first both managers listen until the same moment.
     first = ManagerRig(active=False, draws=(0.5, 0.0))
     first.run(apart)
     second = ManagerRig(active=False, address=address, draws=(0.5 - apart / 2, 0.5))
@@ -195,7 +195,7 @@ def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
     for _ in range(400):
         for rig in (first, second):
             rig.run(0.05)
-        # Both have run: neither hears the other before it has begun itself.
+        # Both have run: each starts before it hears the other.
         sent = len(first.sent), len(second.sent)
         for index, rig in enumerate((first, second)):
             for _, message in rig.sent[seen[index]:sent[index]]:

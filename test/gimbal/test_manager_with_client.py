@@ -69,7 +69,7 @@ class Rig(ManagerRig):
         return gimbal
 
     def ask(self, request: Callable[..., None], *arguments: Any) -> str:
-        """Return '' if a request of ROS succeeds, else why not."""
+        """Return '' if a request of ROS succeeds, otherwise the reason."""
         before = len(self.results)
         request(*arguments, self.now, lambda result, now: self.results.append(result))
         self.run(2.0, each=self.heartbeats(PILOT))

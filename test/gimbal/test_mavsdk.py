@@ -52,7 +52,7 @@ OURS, FIRST, SECOND, DEVICE = (
 GIMBAL = 1
 # MAVSDK's name of MAV_RESULT_DENIED.
 DENIED = 'ERROR'
-# s: MAVSDK lives by the clock of the machine, which may stand still between two heartbeats.
+# s; MAVSDK uses the clock of the machine, which may pause between two heartbeats.
 LEASE = 60.0
 T = TypeVar('T')
 
@@ -88,14 +88,14 @@ def result(call: Callable[..., Any], *arguments: Any) -> str:
 
 
 def points_to(device: SimulatedGimbal, pitch: float, yaw: float) -> Callable[[], bool]:
-    """Return whether the gimbal points somewhere, deg relative to the vehicle."""
+    """Return a condition: the gimbal has these angles relative to the vehicle, deg."""
     return lambda: all(
         abs(math.degrees(angle) - asked) < 0.5
         for angle, asked in zip(device.mount.motion.angles[1:], (pitch, yaw), strict=True))
 
 
 def turns(device: SimulatedGimbal) -> Callable[[], bool]:
-    """Return whether the gimbal has turned up by a degree since now."""
+    """Return a condition: the gimbal has turned up by a degree since this call."""
     before = device.mount.motion.angles[1]
     return lambda: device.mount.motion.angles[1] > before + math.radians(1)
 

@@ -208,7 +208,7 @@ def test_gm_2_axis_is_left_as_it_is_in_the_other_frame_only_if_the_heading_is_kn
 
     assert bool(reason) is not sent
     if sent:
-        # The vehicle looks east, which is a yaw of 0 in ROS.
+        # The vehicle heads east, which is a yaw of 0 in ROS.
         assert from_mavlink(setpoints(rig)[0][1].q, EARTH).euler() == approx((0.0, 0.5, 0.3))
     else:
         assert 'yaw relative to the earth' in reason

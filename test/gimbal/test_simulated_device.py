@@ -44,7 +44,7 @@ UNSET = (NAN, NAN, NAN)
 
 
 class Bench:
-    """A simulated device with a manager; angles in degrees, time as it is told."""
+    """A simulated device with a manager; angles in degrees, time as given."""
 
     def __init__(self, *, announced: bool = True, **settings: object) -> None:
         device: SimulatedGimbal = SIMULATED.make(settings, DEVICE, False)
@@ -87,14 +87,14 @@ class Bench:
         return tuple(round(math.degrees(angle), 3) + 0.0 for angle in euler)
 
 
-# An action, the seconds after it, and the angles then, degrees.
+# An action, the time after it, s, and the angles then, degrees.
 Step = tuple[Callable[[Bench], object] | None, float, tuple[float, ...]]
 VEHICLE = YawFrame.VEHICLE.flag
 
 
 def to(*degrees: float, flags: int = FOLLOW | VEHICLE, rate: float = NAN,
        yaw_rate: float = NAN) -> Callable[[Bench], object]:
-    """Return what points it, or turns pitch or yaw, degrees."""
+    """Return an action that points the gimbal, degrees, or turns pitch or yaw, deg/s."""
     rates = NAN, math.radians(rate), math.radians(yaw_rate)
     return lambda bench: bench.point(*degrees, flags=flags, rates=rates)
 

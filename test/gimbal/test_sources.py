@@ -32,7 +32,7 @@ from support.gimbals import FakeManager, in_control, OURS, Rig
 NAMES = ('safety', 'operator', 'default', 'autonomy')
 TIMEOUT = 2.0
 VEHICLE = YawFrame.VEHICLE
-# The yaw that each source asks for, rad.
+# The yaw that each source requests, rad.
 YAW = {name: 0.1 * (index + 1) for index, name in enumerate(NAMES)}
 
 
@@ -41,7 +41,7 @@ def shared(**fields: Any) -> Rig:
 
 
 def point(rig: Rig, source: str) -> str:
-    """Let a source ask for its yaw; return the refusal."""
+    """Let a source request its yaw; return the refusal."""
     return rig.gimbal.claim(source, rig.now) or rig.gimbal.set_angles(
         (0.0, 0.0, YAW[source]), VEHICLE, rig.now)
 
@@ -57,7 +57,7 @@ def asked(rig: Rig, since: float = 0.0) -> set[str]:
             if abs(from_mavlink(one.q, VEHICLE).euler()[2] - yaw) < 0.01}
 
 
-# How safety's hold ends.
+# The ends of the hold of ``safety``.
 ENDS: dict[Cause, Callable[[Rig], object]] = {
     Cause.RELEASE: lambda rig: rig.gimbal.release('safety', rig.now),
     Cause.SILENCE: lambda rig: rig.run(TIMEOUT - 0.9),

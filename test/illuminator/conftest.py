@@ -21,17 +21,17 @@ from support.fake_light import FakeLight
 
 @pytest.fixture
 def pair() -> Pair:
-    """Return a controller and a simulated light that know each other."""
+    """Return a controller and a simulated light that have discovered each other."""
     return Pair().settle()
 
 
 @pytest.fixture
 def fake() -> FakeLight:
-    """Return a light that does what the test says; ``faked`` has it at its other end."""
+    """Return a light whose behaviour the test sets; ``faked`` connects it to a controller."""
     return FakeLight()
 
 
 @pytest.fixture
 def faked(fake: FakeLight) -> Pair:
-    """Return a controller and the light ``fake`` that know each other."""
+    """Return a controller and the light ``fake`` that have discovered each other."""
     return Pair(fake).settle()

@@ -41,7 +41,7 @@ def reasserting(**fields: Any) -> tuple[FakeLight, Pair]:
 
 
 def insist(light: FakeLight, pair: Pair, seconds: float, **fields: object) -> None:
-    """Be a sender that changes the light again whenever it differs, ten times a second."""
+    """Act as a sender that restores its values of the light ten times a second."""
     for _ in range(round(seconds * 10)):
         light.fields |= fields
         pair.run(0.1)

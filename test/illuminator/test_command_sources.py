@@ -37,7 +37,7 @@ TIMEOUT, SILENCE = 2.3, 6.0
 
 
 class Shared:
-    """A light that sources share, and what they ask of it."""
+    """A light that sources share, and their requests."""
 
     def __init__(self, *, light: FakeLight | None = None, timeout: float = TIMEOUT,
                  off_on_release: bool = False, seed: int = 0, **faults: float) -> None:
@@ -85,7 +85,7 @@ def test_a_request_of_a_lower_source_is_refused_and_not_sent() -> None:
     assert (len(shared.pair.commands(ON_OFF)), shared.pair.commands(CONFIGURE)) == (sent, [])
 
 
-# How safety's hold ends, and why the light has another holder then.
+# The ends of the hold of ``safety``, each with the cause of the change of the holder.
 ENDS: dict[Cause, Callable[[Shared], None]] = {
     Cause.RELEASE: lambda shared: shared.release('safety'),
     Cause.SILENCE: lambda shared: shared.pair.run(TIMEOUT - 0.9),
@@ -191,7 +191,7 @@ def test_the_last_switch_before_the_end_is_sent_whatever_holds_the_light() -> No
 
 
 class Model:
-    """The rules, written once more in the plainest way."""
+    """An independent, simple implementation of the rules."""
 
     def __init__(self) -> None:
         self.heard: dict[str, float] = {}
@@ -210,7 +210,7 @@ def test_the_highest_source_wins_within_one_turn_and_only_its_requests_are_sent(
     shared = Shared(seed=seed, drop=draw.choice((0.0, 0.3)), duplicate=draw.choice((0.0, 0.2)),
                     delay=draw.choice((0.0, 0.3)), reorder=0.1)
     pair, model = shared.pair, Model()
-    # Each source has brightnesses of its own, by which its frames are known.
+    # Each source has brightnesses of its own, which identify its frames.
     of_source = {name: 10.0 * (index + 1) for index, name in enumerate(NAMES)}
     desired: dict[str, list[bool]] = {name: [] for name in NAMES}
     alive = dict.fromkeys(NAMES, True)

@@ -177,7 +177,7 @@ def test_a_change_by_another_sender_is_followed_with_one_event_and_no_command(
     fake.fields |= fields
     strobe.run(10.0)
     if cause is None:
-        # Neither on its way there nor back.
+        # Neither the change nor its end is reported.
         fake.fields = normal
         strobe.run(10.0)
     assert strobe.recorder.changes[1:] == ([(cause, change)] if cause else [])
@@ -259,7 +259,7 @@ def most_in_flight(pair: Pair) -> int:
     events += [(at, -1) for at, _, message in pair.near.received
                if isinstance(message, CommandAck) and message.command == CONFIGURE]
     most = level = 0
-    # At one moment the acknowledgement comes first: the next command waits for it.
+    # At equal times an acknowledgement sorts before the next command, which waits for it.
     for _, step in sorted(events):
         level += step
         most = max(most, level)
@@ -275,7 +275,7 @@ def test_one_command_is_in_flight_at_any_rate_and_the_newest_setpoint_wins(
     pair = Pair(there=Faults(latency=latency)).settle()
     at = pair.now
     publish(pair, *values, rate=rate)
-    # As fast as the line.
+    # The stream is as fast as the line.
     assert len(sent(pair)) >= min(200, 0.9 * (pair.now - at) / (2 * latency) - 1)
     pair.run(1.0)
     assert most_in_flight(pair) == 1
@@ -292,12 +292,12 @@ def test_a_setpoint_is_sent_once_with_the_other_fields_as_confirmed(pair: Pair) 
 
 
 @pytest.mark.parametrize(('values', 'light', 'then', 'last'), [
-    # It takes 30 and cannot say so: it may be at 30 or at 100.
+    # The light takes 30 and cannot report it: it may be at 30 or at 100.
     ([30.0], {'results': {CONFIGURE: None}, 'stream': 0.0,
               'fields': {'brightness': 30.0}}, ACCEPTED, 100.0),
-    # It has accepted 40 and shows 100.
+    # The light has accepted 40 and shows 100.
     ([40.0], {'applies': False}, ACCEPTED, 40.0),
-    # 30 is accepted, not done, and superseded by 40, which is refused.
+    # The light accepts 30 without applying it; 40 supersedes it and is refused.
     ([30.0], {'applies': False}, [DENIED, ACCEPTED], 30.0),
 ], ids=['not acknowledged', 'not done', 'superseded'])
 def test_a_setpoint_is_sent_again_where_the_light_may_have_another_value(
@@ -546,7 +546,7 @@ def test_setting_all_values_to_be_restored_ends_the_restoration(
     if is_stream:
         publish(pair, 70.0)
         pair.run_until(lambda: confirmed(pair).brightness == 70.0)
-    # Before the next status another sender dims it, which must be followed.
+    # Another sender dims the light before the next status; the parameter must follow.
     fake.fields['brightness'] = 20.0
     pair.run(5.0)
     assert confirmed(pair).brightness == 20.0

@@ -50,14 +50,14 @@ def test_an_attack_breaks_nothing(kind: str, mode: SigningMode) -> None:
 
 @pytest.fixture
 def bridge() -> Iterator[AttackedBridge]:
-    """Return the drone's side with its genuine light."""
+    """Return the bridge's side with its genuine light."""
     attacked = AttackedBridge('flood', SigningMode.OFF)
     yield attacked
     attacked.close()
 
 
 def flood(attacked: AttackedLink, frames: Iterable[bytes], *, peers: int = 1) -> None:
-    """Send frames, at one moment, from so many peers in turn."""
+    """Send frames at one moment, from ``peers`` peers in turn."""
     for number, frame in enumerate(frames):
         attacked.link.receive((frame, ('127.0.0.2', 1 + number % peers)))
 
@@ -175,7 +175,7 @@ def send_status(bridge: AttackedBridge, later_ms: int = 10, **fields: Any) -> No
 
 
 def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: AttackedBridge) -> None:
-    # It compares equal to 0, but sent back to the light it would be denied for ever.
+    # The value compares equal to 0, but the light would always deny it.
     light = bridge.controller.lights[GENUINE]
     send_status(bridge, strobe_period=1e-45)
     assert light.snapshot(0.0).configuration.strobe_period == 0.0
@@ -185,7 +185,7 @@ def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: AttackedB
 def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied(
     bridge: AttackedBridge,
 ) -> None:
-    # Under external sync a light's output is not taken for its configuration.
+    # Under external sync the bridge does not take a light's output for its configuration.
     light = bridge.controller.lights[GENUINE]
     bridge.link.ask(lambda now: light.configure(
         {'mode': 'external_sync'}, now, lambda result, now: None))

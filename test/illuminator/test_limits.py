@@ -36,7 +36,7 @@ EXCEEDED = ('brightness 80 % is above max_brightness 60 %',
 
 
 def limited(**fields: Any) -> tuple[FakeLight, Pair]:
-    """Return a light and a client with limits that know each other."""
+    """Return a light and a client with limits, which have discovered each other."""
     light = FakeLight(**{'min_strobe_period': 0.01, 'max_strobe_period': 5.0, **fields})
     return light, Pair(light, settings=LIMITED).settle()
 

@@ -23,7 +23,7 @@ from support.faulty_wire import Faults
 from support.lossy_line import CONFIRMED, Run
 
 KINDS = ('drop', 'duplicate', 'reorder', 'delay', 'corrupt')
-# Faults of the line by name, towards the lights and back.
+# Name -> faults of the line towards the lights, and faults on the way back.
 LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     **{kind: ((kind,), (kind,)) for kind in KINDS},
     'all of these': (KINDS, KINDS),

@@ -59,7 +59,7 @@ def lost(light: FakeLight, settings: Settings | None = None, **how: Any) -> Pair
 
 
 def on_at_connection(pair: Pair) -> Answer:
-    """Ask for an ON as soon as the light is connected."""
+    """Request an ON as soon as the light is connected."""
     pair.run_until(lambda: pair.controller.lights and pair.light.connected)
     return pair.ask_enable(True)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The profiles of simulated lights, lights as seen in the field: how each is served."""
+"""The bridge serves each profile of the simulated light, which imitates a real light."""
 
 from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
@@ -31,7 +31,7 @@ def described(profile: str, **settings: object) -> IlluminatorProperties:
 
 @pytest.mark.parametrize(('profile', 'settings'), [
     *((profile, {}) for profile in PROFILES),
-    # A mode is not refused for a bitmask of either convention.
+    # The bridge does not refuse a mode because of a bitmask of either convention.
     *(('default', {'mode_bitmask': bits}) for bits in (1, 3, 6)),
     ('default', {'status_interval': 0.0})])
 def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost(

@@ -64,7 +64,7 @@ def timing(message: str) -> tuple[int, float]:
 
 
 def change(fake: FakeLight, **attributes: Any) -> None:
-    """Set attributes of a light; ``fields`` and ``results`` are added to those it has."""
+    """Set attributes of a light; ``fields`` and ``results`` are merged into the present ones."""
     for name, value in attributes.items():
         setattr(fake, name, {**getattr(fake, name), **value} if isinstance(value, dict) else value)
 
@@ -140,7 +140,7 @@ def test_switches_that_follow_each_other_within_a_millisecond_are_confirmed_in_f
 @pytest.mark.parametrize(('step_ms', 'rate', 'slowest'), [
     # A status of the same second may be older than the command: the next one confirms.
     (1000, 1.0, 0.26),
-    # So it does where the clock is slow, so that a status looks older than it is.
+    # The next status also confirms if the clock is slow: a status then looks older than it is.
     (1, 0.98, 0.26), (1, 1.02, 0.01), (1, 0.9999, 0.01)])
 def test_a_light_whose_clock_is_coarse_or_wrong_is_confirmed(
         step_ms: int, rate: float, slowest: float) -> None:
@@ -159,8 +159,8 @@ def test_a_light_whose_clock_is_coarse_or_wrong_is_confirmed(
 def test_a_newer_status_that_was_sent_before_the_command_does_not_confirm(
     fake: FakeLight, faked: Pair,
 ) -> None:
-    # Another sender switches the light on and off between two received statuses. The status from
-    # in between arrives late, while we wait for it because of a late acknowledgement.
+    # Another sender switches the light on and off between two received statuses. The status of
+    # that time arrives late, while a late acknowledgement makes the bridge wait for one.
     fake.stream = 0.0
     faked.light.request_status(faked.now)
     faked.run(0.31)
@@ -229,7 +229,7 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
 def test_off_overtakes_the_requests_before_it(pair: Pair) -> None:
     answers = [pair.ask_enable(on) for on in (True, False, True, True, False)]
     pair.run(5.0)
-    # Off is sent twice: the first acknowledgement may be that of on.
+    # OFF is sent twice: the first acknowledgement may belong to the ON.
     assert [bool(m.param1) for m in pair.commands(ON_OFF)] == [True, False, False, False]
     assert [answer.result.success for answer in answers] == [False, True, False, False, True]
 
@@ -513,7 +513,7 @@ def test_the_answer_of_all_lights_names_the_outcome_of_each(
     assert result.success is success
     parts = result.message.split('; ')
     assert [part[:len(text)] for part, text in zip(parts, texts, strict=True)] == texts
-    # In parallel: as long as the slowest takes.
+    # The lights are switched in parallel, in the time of the slowest.
     assert three.now - at < 2.1
     assert len({m.target_component for m in three.commands(ON_OFF, since=at)
                 }) == int(texts[0][5] if texts[0][0].isdigit() else 0)

@@ -74,7 +74,7 @@ def test_parameters_move_once_at_most_and_nothing_is_sent_while_lights_differ(
     assert len(pair.recorder.statuses) >= 110
     agreed = pair.snapshot.configuration
     for light in lights:
-        # A lost status.
+        # Lose a status.
         light.delay_status(1.0)
         pair.run(5.0)
     assert pair.snapshot.shared_address
@@ -92,7 +92,7 @@ def test_a_status_is_published_before_it_shows_that_an_address_is_shared_and_an_
         if isinstance(event, AddressShared):
             events.append((AddressShared, event.shared))
         elif isinstance(event, StatusReceived):
-            # The comparison with earlier statuses would delay the topics.
+            # The event precedes the comparison with earlier statuses, which would delay topics.
             events.append((StatusReceived, pair.snapshot.shared_address))
 
     pair.controller.events.subscribe(note)
@@ -136,7 +136,7 @@ def test_a_switch_fails_where_one_of_two_lights_does_not_obey(
     lights[0].pushes = lights[1].pushes = False
     pair.settle(15.0)
     assert pair.snapshot.shared_address
-    # The second light reports by itself only: it answers no command and no request.
+    # The second light only streams: it answers neither commands nor requests.
     lights[1].results = {ON_OFF: None, MavCmd.REQUEST_MESSAGE: None}
     lights[1].applies = False
     for _ in range(10):

@@ -66,16 +66,16 @@ def meanings(*statuses: tuple[int, float]) -> list[Uptime]:
     # A wrap after 49.7 days.
     (WRAP_MS - 500, 500, 1.0, RUNNING),
     (WRAP_MS - HOUR_MS, HOUR_MS, 7200.0, RUNNING),
-    # Late frames: newer ones have come before, however old these are.
+    # Late frames: newer ones have arrived earlier, however old these are.
     (10_000, 9_000, 0.1, LATE),
     (10_000, 4_000, 0.1, LATE),
     (DAY_MS, DAY_MS - 20_000, 1.0, LATE),
     (500, WRAP_MS - 500, 0.1, LATE),
-    # A frame from just after the start of a light that has started lately may be late, too.
+    # A frame from the start of a recently started light may be late, too.
     (10_000, 300, 1.0, LATE),
     (200, 100, 0.001, LATE),
     (10_000, 50_000, 100.0, LATE),
-    # Restarts: a frame that old does not come.
+    # Restarts: a frame is never late by that much.
     (DAY_MS, 0, 1.0, RESTARTED),
     (DAY_MS, 1_500, 2.0, RESTARTED),
     (DAY_MS, HOUR_MS, 2 * 3600.0, RESTARTED),
@@ -91,17 +91,17 @@ def test_an_uptime_shows_a_restart_a_late_frame_or_no_clock(
 
 
 @pytest.mark.parametrize(('statuses', 'meaning'), [
-    # A second status goes on from the first: a delayed frame does not do that.
+    # A second status continues the first one, which a delayed frame does not.
     ([(10_000, 100.0), (300, 101.0), (450, 101.15)], RESTARTED),
     # A second restart 1.1 s after the first, whose first status comes late.
     ([(DAY_MS, 97.0), (30, 100.0), (1_080, 102.18), (1_200, 102.3)], RESTARTED),
-    # Lost for long, restarted, and running for longer than before by now.
+    # A light that was lost, restarted, and has now run for longer than before.
     ([(10_000, 100.0), (90_000, 200.0), (90_200, 200.2)], RESTARTED),
     # Frames that were queued while this process was suspended come in a burst.
     ([(1_000, 100.0), (2_000, 105.0), (3_000, 105.01), (4_000, 105.02)], LATE),
-    # One frame from the start of a light that comes late, before the stream goes on.
+    # One late frame from the start of a light, before the stream continues.
     ([(9_000, 100.0), (500, 101.0), (10_010, 101.01)], RUNNING),
-    # A clock that was set back is followed once that has lasted.
+    # A clock that was set back is accepted after some time.
     ([(DAY_MS, 100.0), (HOUR_MS, 101.0), (HOUR_MS + 1000, 102.0)], LATE),
     ([(DAY_MS, 100.0), (HOUR_MS, 101.0), (HOUR_MS + 5100, 106.1)], RESTARTED),
 ])
@@ -112,7 +112,7 @@ def test_several_uptimes_show_what_one_cannot(
 
 
 @pytest.mark.parametrize(('uptimes', 'meaning'), [
-    # The line delivers in a burst what it held back, and then the present status.
+    # The line delivers delayed statuses in a burst, and then the present one.
     ([(91_000, 110.0), (92_000, 110.001), (93_000, 110.002)], LATE),
     ([(91_000, 110.0), (92_000, 110.001), (100_100, 110.1)], RUNNING),
     ([(91_000, 110.0), (92_000, 110.001), (3_000, 110.1)], RESTARTED),
@@ -143,17 +143,17 @@ def test_a_clock_that_is_a_little_wrong_shows_no_restart(drift: float, interval:
     ([(5000, 100.0), (6001, 101.0), (6301, 103.3)], 101.301, True),
     # A delayed status does not make the next delayed one look new.
     ([(5000, 100.0), (6001, 101.0), (6301, 103.3), (6401, 103.4)], 101.401, True),
-    # Nor does the time since the last quick one, which the error of a clock may explain.
+    # Nor does the time since the last status without delay, which a clock error may explain.
     ([(5000, 100.0), (6001, 101.0), (9301, 104.36), (9901, 104.95)], 104.901, True),
-    # A status of the same millisecond as a received one was sent before that was received.
+    # A status of the same millisecond as another one was sent before that one was received.
     ([(5000, 100.0), (6001, 101.0), (6304, 101.302), (6304, 101.5, ON)], 101.302, True),
-    # Nor a pause.
+    # Nor does a pause make a delayed status look new, unless it is long.
     ([(5000, 100.0), (6001, 101.0), (8802, 108.9)], 103.802, True),
     ([(5000, 100.0), (6001, 101.0), (8802, 109.1)], 109.1, False),
-    # One that was sent in time, at regular intervals, is not older than it is.
+    # A status in time, at regular intervals, does not look older than it is.
     ([(5000, 100.0), (6000, 101.0), (7000, 102.0)], 102.0, True),
     ([(5000, 100.0), (6000, 101.0), (7000, 102.9)], 102.001, True),
-    # Without a clock the time of arrival counts; with one in seconds, that and the second.
+    # Without a clock the time of arrival counts; with a clock in seconds, its second counts too.
     ([(7, 100.0), (7, 101.0), (7, 107.0)], 107.0, False),
     ([(5000, 100.2), (5000, 100.9, ON), (6000, 101.3), (7000, 103.8)], 103.2, False),
     # A repeated frame does not show that the clock counts in seconds.
@@ -183,12 +183,12 @@ def test_a_status_is_taken_neither_for_newer_than_it_is_nor_for_older_where_the_
         arrivals.append((sent_at + draw.choice((0.001, 0.01, draw.uniform(0, 3))), sent_at))
     newest = 0.0
     for at, sent_at in sorted(arrivals):
-        # A status that was overtaken is ignored before.
+        # Overtaken statuses do not reach SendingTimes.
         if sent_at >= newest:
             newest = sent_at
             uptime = int((sent_at - boot) * rate * 1000 / step_ms) * step_ms
             sent_by, is_told = times.take(status(uptime % WRAP_MS), at)
-            # At first all may have been delayed.
+            # Before that all statuses may have been delayed.
             if sent_at > 110.0:
                 assert is_told
                 assert -older - 1e-6 <= sent_by - sent_at <= newer
@@ -197,7 +197,7 @@ def test_a_status_is_taken_neither_for_newer_than_it_is_nor_for_older_where_the_
 # Several lights at one address
 
 class Observed:
-    """Statuses in the order of their arrival, one a second unless said otherwise."""
+    """Statuses in the order of their arrival, by default one a second."""
 
     def __init__(self) -> None:
         self.conflict = AddressConflict()
@@ -207,7 +207,7 @@ class Observed:
         self, *shown: Fields, starts: tuple[float, ...] = (0.0,), commanded: bool = False,
         late: float = 0.0, has_clock: bool = True,
     ) -> AddressConflict:
-        """Take statuses that show this, from lights that were started at these times in turn."""
+        """Take statuses with these values, in turn from lights with these starting times."""
         for number, fields in enumerate(shown):
             self.now += 1.0
             uptime = int((self.now - starts[number % len(starts)] - late) * 1000) % WRAP_MS

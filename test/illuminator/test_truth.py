@@ -103,8 +103,8 @@ def test_a_late_status_without_a_time_does_not_confirm() -> None:
 def test_off_is_sent_until_an_acknowledgement_cannot_be_that_of_on(
     fake: FakeLight, faked: Pair,
 ) -> None:
-    # The light acknowledges before it switches, its acknowledgement of on is late, and off is
-    # lost on the way.
+    # The light acknowledges before it switches, its acknowledgement of ON is late, and OFF is
+    # lost.
     fake.results[ON_OFF] = None
     assert not faked.enable(True).success
     fake.applies = False
@@ -120,7 +120,8 @@ def test_off_is_sent_until_an_acknowledgement_cannot_be_that_of_on(
 def test_a_status_from_before_the_last_repeat_does_not_confirm(
     fake: FakeLight, faked: Pair,
 ) -> None:
-    # The light does off and then, late, on: its status from in between comes after the repeat.
+    # The light executes OFF and then a late ON: its status between the two arrives after the
+    # repeat.
     fake.results[ON_OFF] = None
     assert not faked.enable(True).success
     fake.stream, fake.applies = 0.0, False
@@ -137,8 +138,8 @@ def test_a_status_from_before_the_last_repeat_does_not_confirm(
 
 
 def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeLight) -> None:
-    # A copy of an earlier ON comes late and is undone before ours comes: the light acknowledges
-    # it and shows it, after we have sent ours but before it can know of that.
+    # A copy of an earlier ON arrives late, and is undone before the present ON arrives. The light
+    # acknowledges and shows the copy after the present ON was sent and before it can arrive.
     pair = Pair(fake, there=Faults(latency=0.2)).settle()
     for on in (True, False, True, False):
         assert pair.enable(on).success
@@ -157,7 +158,7 @@ def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeL
 def test_a_line_that_stays_ambiguous_confirms_changes_and_nothing_else(
     fake: FakeLight, before: float | None, latency: float,
 ) -> None:
-    # Acknowledgements that no command waits for come for ever. Before, there were none, and the
+    # Acknowledgements that no command waits for keep arriving. Earlier there were none, and the
     # line had another latency.
     pair = Pair(fake, there=Faults(latency=before or latency)).settle()
     fake.stream = 0.0

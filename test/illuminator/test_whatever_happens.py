@@ -30,8 +30,8 @@ from support.faulty_wire import Faults
 from support.records import Answer
 
 SECONDS = 90.0
-# s after which all must be answered and known, once the line is good again: a restored
-# configuration is tried again after 2 s, and so on.
+# s after the repair of the line within which all requests must be answered and all states known:
+# for example, a restored configuration is sent again after 2 s.
 RECOVERY = 12.0
 # s; the tries of a command, its confirmation, and the requests before it in the queue.
 LONGEST = 32.0
@@ -40,7 +40,7 @@ LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperti
 
 
 class Chaos:
-    """Does something at random."""
+    """Takes random actions."""
 
     def __init__(self, seed: int) -> None:
         self.draw = random.Random(seed)
@@ -56,7 +56,7 @@ class Chaos:
         self.is_open = True
 
     def act(self) -> None:
-        """Do one thing."""
+        """Take one random action."""
         users = [self.enable, self.configure, self.publish, self.refresh] * 4
         self.draw.choice([*users, self.cut, self.open, self.restart, self.change, self.hush])()
         self.pair.turn()
@@ -66,7 +66,7 @@ class Chaos:
         return self.draw.choice(lights or [None])
 
     def answer(self, answers: list[Answer]) -> Answer:
-        """Return the place for another answer."""
+        """Append a new answer to the list, and return it."""
         answer = Answer(self.pair.now)
         answers.append(answer)
         return answer
@@ -111,7 +111,7 @@ class Chaos:
             brightness=float(self.draw.randrange(101)))
 
     def hush(self) -> None:
-        """Let nothing through for longer than a heartbeat may take."""
+        """Lose all frames of the lights for 1 to 6 s; after 3 s a light is lost."""
         faults = self.pair.far.wire.faults
         self.pair.far.wire.faults = replace(faults, drop=1.0)
         self.pair.run(self.draw.uniform(1.0, 6.0))

@@ -25,7 +25,7 @@ from support.command_rig import LIGHT, LONG, Rig, Run
 
 COMPONENTS = st.sampled_from([LIGHT, Address(1, 244)])
 COMMANDS = st.sampled_from([405, 406])
-# Half of them those that do not simply end a command.
+# Half of the results have a special meaning.
 RESULTS = st.integers(0, 255) | st.sampled_from([0, 1, 5, 7, 8])
 TIMES = st.floats(0, 4)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A component that is commanded: what it executes, and how it acknowledges."""
+"""A component that receives commands: which it executes, and how it acknowledges."""
 
 from __future__ import annotations
 

@@ -79,10 +79,10 @@ STATUS = CommandStatus
      [0.0, 0.12, 0.34, 0.76, 1.58]),
     ([[REJECTED], [REJECTED]], {'retries': 1}, 'no acknowledgement, last answer '
      'MAV_RESULT_TEMPORARILY_REJECTED (4 tries, 1.34 s)', [0.0, 0.12, 0.34, 0.84]),
-    # The try without an answer may keep the target busy, and succeed.
+    # The try without an answer may keep the target busy, and may still succeed.
     ([[], *[[REJECTED]] * 100], {}, 'not finished in time, last answer '
      'MAV_RESULT_TEMPORARILY_REJECTED (5 tries, 1.28 s)', [0.0, 0.5, 0.62, 0.84, 1.26]),
-    # COMMAND_INT is sent once it was asked for, and only then.
+    # COMMAND_INT is sent only after the target has requested it.
     ([[INT_ONLY], [], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (3 tries, 540 ms)',
      [0.0, 0.02, 0.52]),
     ([[INT_ONLY], [LONG_ONLY]], {}, 'MAV_RESULT_COMMAND_LONG_ONLY (2 tries, 40 ms)',
@@ -349,12 +349,12 @@ def test_overtaking_command_is_sent_beside_one_in_progress(rejections: int) -> N
     rig.ack(IN_PROGRESS)
     off, waiting = rig.start(overtake=True), rig.start()
     for _ in range(rejections):
-        # A command in progress is not rejected: the rejection belongs to the other.
+        # A command in progress is not rejected: the rejection belongs to the other command.
         rig.ack(REJECTED)
         rig.run(0.15)
     assert [len(run.frames) for run in (on, off, waiting)] == [1, 1 + rejections, 0]
     for result in (ACCEPTED, DENIED, FAILED):
-        # The acknowledgements name only the command: each answers the oldest.
+        # An acknowledgement names only the command, so it ends the oldest one.
         rig.ack(result)
     assert (on.result, off.result, waiting.result) == (ACCEPTED, DENIED, FAILED)
 

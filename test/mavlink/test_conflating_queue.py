@@ -74,7 +74,7 @@ class Stream:
 
 
 class Sender(Endpoint):
-    """Makes a pair each 5 ms, which is twice what the line carries, and 10 positions a second."""
+    """Makes a pair each 5 ms, twice the capacity of the line, and 10 positions a second."""
 
     messages = ()
     streams = GROUPS
@@ -133,7 +133,7 @@ def test_on_a_slow_line_nothing_waits_and_whole_pairs_of_the_newest_are_sent() -
         assert (one, other) == pair(one.time_boot_ms)
         assert at - (1000.0 + one.time_boot_ms * 0.005) < 0.006
     dropped = link.snapshot(link.now).traffic.frames_dropped
-    # The newest may still wait.
+    # The newest pair may still wait.
     assert 2 * 1990 - 2 <= dropped + len(others) <= 2 * 1991
 
 

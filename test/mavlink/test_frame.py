@@ -144,7 +144,7 @@ SIGNED = [frame for frame in V2 if frame[2] == FLAG_SIGNED]
 UNSIGNED = [frame for frame in FRAMES if frame not in SIGNED]
 known_ids = st.sampled_from(sorted(LAYOUTS))
 bytes_ = st.integers(0, 255)
-# The beginning of a frame that does not go on: a message id that exists, any length.
+# The beginning of a frame that is never completed: an existing message id, any length.
 false_v2 = st.builds(
     lambda length, flags, rest, id_: bytes((0xFD, length, flags, *rest))
     + id_.to_bytes(3, 'little'),
@@ -162,7 +162,7 @@ sizes_ = st.lists(st.integers(1, 400), min_size=1, max_size=8)
 
 
 def in_pieces(data: bytes, sizes: list[int], decoder: Decoder) -> list[Frame]:
-    """Return the frames in a stream that comes in pieces of these sizes, over and over."""
+    """Return the frames in a stream that arrives in pieces of these sizes, cyclically."""
     found, at, turn = list[Frame](), 0, 0
     while at < len(data):
         size = sizes[turn % len(sizes)]
@@ -183,7 +183,7 @@ def bytes_of(frame: Frame) -> bytes:
 
 
 def authentic(found: list[Frame]) -> list[bytes]:
-    """Return the frames that are not signed, or rightly."""
+    """Return the frames that are unsigned or have a valid signature."""
     return [bytes_of(frame) for frame in found if frame.signature is None
             or frame.signature[7:] == signature(KEY, frame.signed_part + frame.signature[:7])]
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The receiver: frames put together for each peer, and false beginnings given up in time."""
+"""The receiver: it assembles the frames of each peer, and drops false beginnings in time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from support.frames import frame_of, heartbeat_frame, LIGHT, raw_v1
 
 UNIX = 1.7e9
 FRAME = heartbeat_frame()
-# The beginnings of frames of 250 bytes, MAVLink 1 and 2, that do not go on.
+# The beginnings of frames of 250 bytes, MAVLink 1 and 2, that are never completed.
 FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\x00\x00']
 
 

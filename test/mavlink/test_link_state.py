@@ -28,7 +28,7 @@ import pytest
     ('opc', link_state.LinkState.LOST, ['open', 'lost']),
     ('opcop', link_state.LinkState.OPEN, ['open', 'lost', 'open']),
     ('c', link_state.LinkState.RETRYING, ['not open']),
-    # A transport that is closed at once each time counts as open only when it is proved again.
+    # A transport that closes at once each time counts as open only after a new proof.
     ('ococo', link_state.LinkState.DOUBTFUL, ['open', 'lost']),
     ('ocop', link_state.LinkState.OPEN, ['open', 'lost', 'open']),
     ('opcoco', link_state.LinkState.DOUBTFUL, ['open', 'lost', 'open', 'lost']),
@@ -75,7 +75,7 @@ def test_reports_beyond_the_limit_are_refilled_with_time_and_count_the_rest() ->
     assert flap(status, 0.0, 50) == [0] * link_state.MAX_EVENTS
     assert status.next_deadline() == link_state.EVENT_INTERVAL
     assert status.event(link_state.EVENT_INTERVAL - 0.1) is None
-    # The newest two changes are kept, and all others counted.
+    # The newest two changes are kept, and all others are counted.
     event = status.event(link_state.EVENT_INTERVAL)
     assert event is not None
     assert str(event) == (
@@ -84,5 +84,5 @@ def test_reports_beyond_the_limit_are_refilled_with_time_and_count_the_rest() ->
     last = status.event(2 * link_state.EVENT_INTERVAL)
     assert (last and (last.is_open, last.unreported)) == (False, 0)
     assert status.next_deadline() == float('inf')
-    # The limit does not grow beyond its beginning.
+    # The limit does not grow beyond its initial value.
     assert flap(status, 1000 * link_state.EVENT_INTERVAL, 50) == [0] * link_state.MAX_EVENTS

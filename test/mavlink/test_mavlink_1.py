@@ -50,7 +50,7 @@ def test_link_of_version_1_sends_whole_payloads_without_extensions_in_version_1_
     endpoint = Talker1(mav.Heartbeat, mav.CommandAck)
     link = SimulatedLink(endpoint, lambda data, peer: sent.append(data), mavlink_version=1)
 
-    # Whatever it receives: this is a MAVLink 2 frame.
+    # The link sends MAVLink 1 even after it has received this MAVLink 2 frame.
     link.receive((heartbeat_frame(mav.Address(1, 1)), PEER))
     link.ask(lambda now: endpoint.outgoing.extend([
         (BRIDGE, mav.CommandLong(1, 2, 512, 0, 0, 0, 0, 0, 0, 0, 0)),

@@ -60,7 +60,7 @@ def test_value_that_does_not_fit_its_field_is_refused() -> None:
 
 
 def test_frames_of_all_messages_of_pymavlink_can_be_checked() -> None:
-    # A newer pymavlink may have more messages, but no other layout of these.
+    # A newer pymavlink may have more messages, but these must have the same layout.
     known = ardupilotmega.mavlink_map
     assert {id_: (known[id_].crc_extra, known[id_].unpacker.size) for id_ in DIALECT} == DIALECT
     assert {*common.mavlink_map, STATUS_ID} <= {*mav.LAYOUTS}

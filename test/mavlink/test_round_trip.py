@@ -40,10 +40,11 @@ def of(*seconds: float) -> RttEstimator:
 
 @pytest.mark.parametrize(('samples', 'longest', 'timeout'), [
     *(([0.01] * known, 0.5, 0.5) for known in range(MIN_SAMPLES)),
-    # Four round trips, between the floor and the given time-out, which may be below the floor.
+    # Four times the round trip, at least the floor and at most the given time-out, which may be
+    # below the floor.
     ([0.001] * 4, 0.5, 0.2), ([0.06] * 4, 0.5, 0.24), ([0.125] * 4, 0.5, 0.5),
     ([0.4] * 4, 0.5, 0.5), ([0.001] * 10, 0.05, 0.05),
-    # One slow answer in many is an exception, four are not; old ones are forgotten.
+    # One slow answer among many does not count, four do; old samples are dropped.
     ([0.06] * 30 + [0.45], 2.0, 0.24), ([0.06] * 30 + [0.45] * 4, 2.0, 1.8),
     ([0.45] * MAX_SAMPLES + [0.06] * MAX_SAMPLES, 2.0, 0.24)])
 def test_timeout_is_four_times_the_95th_percentile_within_bounds(
@@ -86,7 +87,7 @@ def test_a_resend_before_the_first_sample_makes_that_ambiguous() -> None:
 
 
 def taught(seconds: float, timeout: float) -> Rig:
-    """Return a rig whose light has answered often enough after a time, s."""
+    """Return a rig that has enough samples of this round-trip time, s."""
     rig = Rig(timeout=timeout)
     for _ in range(MIN_SAMPLES):
         rig.start()
@@ -103,7 +104,7 @@ def test_a_line_that_becomes_slower_than_the_wait_is_measured_again() -> None:
         rig.run(0.4)
         rig.ack(ACCEPTED)
         if len(run.frames) > 1:
-            # That of the second try, which was not needed.
+            # Acknowledge the second try, which was not needed.
             rig.run(0.2)
             rig.ack(ACCEPTED)
         tries.append(run.outcome.tries)
@@ -142,7 +143,7 @@ def test_wait_after_a_rejected_try_is_not_longer() -> None:
     assert rig.sender.next_deadline() == pytest.approx(run.frames[1][0] + 0.24)
 
 
-# An acknowledgement after a resend may be that of either try (Karn's algorithm).
+# An acknowledgement after a resend may belong to either try (Karn's algorithm).
 @pytest.mark.parametrize(('answers', 'samples'), [
     ([(0.01, ACCEPTED)], [0.01]), ([(0.6, ACCEPTED)], []),
     ([(0.01, IN_PROGRESS), (0.05, ACCEPTED)], [0.01]),

@@ -64,7 +64,7 @@ def test_message_goes_over_all_peers_that_its_target_was_heard_over(router: Rout
 
 
 def test_component_on_more_peers_than_are_remembered_is_sent_to_over_all_meanwhile() -> None:
-    # A light that restarts on another port each time must be reached on the newest.
+    # Messages must reach a light on its newest port if it restarts on another port each time.
     router, peers = RoutingTable(), tuple(range(MAX_ROUTE_PEERS + 1))
     for peer in peers:
         router.heard(LIGHT, peer, 0.0)
@@ -83,7 +83,7 @@ def test_components_beyond_the_bound_take_no_way_from_those_remembered(
 
 
 def test_full_table_makes_room_for_silent_components_once_a_second(router: RoutingTable) -> None:
-    # A look costs as much as hundreds of frames.
+    # A search for silent components takes as much time as hundreds of frames.
     for number in range(MAX_ROUTES - 1):
         router.heard(Address(2, number), 'a', 0.0)
     new, remembered = Address(3, 0), []

@@ -104,7 +104,7 @@ def test_key_is_not_shown() -> None:
         assert key.hex() not in shown
 
 
-# In the right order: checksum, signature, time stamp, and only then is anything remembered
+# Order of the checks: checksum, signature, time stamp; nothing is stored before all are valid
 
 @pytest.mark.parametrize('at', range(-13, 0))
 def test_frame_with_a_wrong_bit_in_its_signature_is_refused(at: int) -> None:
@@ -147,7 +147,7 @@ def test_forged_frame_changes_nothing(first: list[Any], forged: Any) -> None:
 
 @pytest.mark.parametrize(('stamps', 'accepted'), [
     ([0, 1, 5, 5, 4, 0, 6], [True, True, True, False, False, False, True]),
-    # A new stream may be a minute behind, and no more; a known one with a slow clock further.
+    # A new stream may lag by at most a minute; a known one with a slow clock may lag further.
     ([-60 * SECOND], [True]), ([-60 * SECOND - 1], [False]), ([-600 * SECOND], [False]),
     ([600 * SECOND], [True]), ([-60 * SECOND, -60 * SECOND + 1], [True, True])])
 def test_time_stamps_of_a_stream_must_grow_from_at_most_a_minute_ago(
@@ -215,14 +215,14 @@ def test_our_time_stamps_follow_a_peer_that_is_ahead_by_less_than_10_years(
 @pytest.mark.parametrize(('ahead', 'accepted'), [(3600, True), (2 * 86_400, False)])
 def test_clock_that_is_right_again_accepts_streams_unless_it_was_not_set(
         ahead: int, accepted: bool) -> None:
-    # A clock that is days behind our own time stamps has no battery: it proves nothing.
+    # A clock that is days behind our own time stamps was not set, so it proves nothing.
     assert checker(timestamp=STAMP + ahead * SECOND).accepts(signed(STAMP), NOW) == accepted
 
 
 # Bounded memory
 
 def fill(signing: Signing, now: float) -> None:
-    """Accept as many streams as are remembered at a time."""
+    """Accept as many streams as are stored at a time."""
     for number in range(MAX_STREAMS):
         assert signing.accepts(
             signed(ticks(now), source=Address(100 + number // 256, number % 256)), now)

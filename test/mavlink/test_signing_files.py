@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Key files, and the time stamp that outlives a run."""
+"""Key files, and the time stamp that is stored between runs."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_any_content_is_a_key_of_32_bytes_or_refused_without_showing_it(
         assert len(key) == 32
 
 
-# The time stamp that outlives a run
+# The time stamp that is stored between runs
 
 @pytest.fixture
 def store(tmp_path: Path) -> TimestampStore:
@@ -114,14 +114,14 @@ def store(tmp_path: Path) -> TimestampStore:
 
 
 def run(store: TimestampStore, unix_time: float) -> int:
-    """Return the first time stamp that a run uses, whose clock may be wrong."""
+    """Return the first time stamp of a run, whose clock may be wrong."""
     signing = checker(timestamp=store.begin(unix_time))
     signing.sign(frame_of(signed=True), unix_time)
     return signing.timestamp
 
 
 @pytest.mark.parametrize(('clock', 'last', 'least', 'most'), [
-    # After an orderly end: right behind the last stamp, or with the clock.
+    # After an orderly end: just after the last stamp, or by the clock.
     (-NOW, True, 1, 2), (1.0, True, SECOND, SECOND + 1),
     (3600.0, True, 3600 * SECOND, 3600 * SECOND + 1),
     # After a crash: beyond every stamp that was used, and within the minute that peers accept.

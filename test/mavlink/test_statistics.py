@@ -38,7 +38,7 @@ def after(sequences: Iterable[int]) -> statistics.SequenceCounter:
 
 
 def counts(counter: statistics.SequenceCounter) -> Counts:
-    """Return frames received, lost, duplicate and reordered."""
+    """Return the numbers of received, lost, duplicate and reordered frames."""
     return counter.received, counter.lost, counter.duplicate, counter.reordered
 
 
@@ -50,7 +50,7 @@ def counts(counter: statistics.SequenceCounter) -> Counts:
     (range(10_000), (10_000, 0, 0, 0)),
     # A late frame is recognised as far back as the window.
     ([10, *range(12, 11 + statistics.WINDOW), 11], (statistics.WINDOW + 1, 0, 0, 1)),
-    # The sender has restarted and counts from 0 again: half a turn of losses at most.
+    # The sender has restarted and counts from 0: at most half of the numbers count as lost.
     *(([*range(last - 20, last + 1), *range(100)], (121, lost, duplicate, 0))
       for last, lost, duplicate in ((255, 0, 0), (250, 5, 0), (128, 127, 0), (127, 0, 0),
                                     (statistics.WINDOW, 0, 0), (30, 0, 31))),
@@ -61,16 +61,16 @@ def test_lost_duplicate_and_reordered_frames_are_counted_apart(
 
 
 @pytest.mark.parametrize(('frames', 'senders', 'lost'), [
-    # Numbers far from one another; the first jump looks like a loss.
+    # Numbers far apart; the first jump looks like a loss.
     ([(10, 0), (100, 0), (11, 1), (101, 1), (13, 2), (102, 2), (14, 3)], '0101010', 90),
     ([(10, 0), (200, 0), (11, 1), (201, 1), (12, 2)], '01010', 0),
-    # The same numbers: frames that differ are of two senders, those that do not are one.
+    # Equal numbers: different frames are of two senders, equal frames are one frame.
     ([(10, 1), (10, 1), (11, 2), (11, 3), (12, 4), (12, 5), (13, 6)], '0001100', 0),
-    # One sender: repeated, late, lost, after a restart, and with unknown contents.
+    # One sender: repeated, late and lost frames, a restart, and unknown contents.
     ([(10, 1), (10, 1), (12, 3), (11, 2), (11, 2), (40, 4)], '000000', 27),
     ([(10, 1), (9, 2), (11, 3)], '000', 0),
     ([(10, 1), (11, 2), (200, 3), (201, 4), (202, 5)], '00111', 0),
-    # One that is later than the window, after which late ones do not lead back and forth.
+    # A frame later than the window; late frames after it do not switch the sender again.
     ([*((number, number) for number in range(100, 195) if number not in (129, 192)),
       (129, 129), (192, 192), (200, 200), (196, 196), (201, 201)], '0' * 93 + '1' * 5, 70),
     ([(10, None), (10, None), (9, None), (11, None)], '0000', 0),
@@ -130,7 +130,7 @@ def test_runs_of_numbers_count_as_the_same_numbers_one_by_one(
 
 @pytest.mark.parametrize(('before', 'sequences', 'loss'), [
     ([], [], 0.0), ([], range(0, 80, 2), 100 * 39 / 79),
-    # Duplicates hide no loss, and a late frame of before makes none negative.
+    # Duplicates do not hide a loss, and a late earlier frame does not make a loss negative.
     ([], [0, 0, 0, 0, 2, 2, 2, 2], 100 / 3), ([0, 2], [1], 0.0)])
 def test_recent_loss_is_the_share_of_the_frames_sent_lately(
         before: list[int], sequences: Iterable[int], loss: float) -> None:
@@ -164,7 +164,7 @@ def test_rate_is_that_of_the_last_seconds(interval: float) -> None:
         now += interval
         window = window.sample(count, now)
         rates.append((now, window.rate))
-    # There is no rate before any time has passed.
+    # The rate is unknown before any time has passed.
     assert rates[0][1] == 0.0
     assert all(rate == pytest.approx(1000) for now, rate in rates[1:] if now < 50.0)
     assert all(rate == pytest.approx(10) for now, rate in rates if now > 80.0)

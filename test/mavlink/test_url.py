@@ -65,7 +65,7 @@ MAVROS: dict[str, Url] = {
     'serial:///dev/ttyACM0': SerialUrl('/dev/ttyACM0', 57600),
     'serial:///dev/ttyACM0:921600': SerialUrl('/dev/ttyACM0', 921600),
     'serial-hwfc:///dev/ttyS1:921600': SerialUrl('/dev/ttyS1', 921600, True)}
-# Of its guide and its CliArg tests.
+# From the guide of MAVSDK and its CliArg tests.
 MAVSDK: dict[str, Url] = {
     'udp://0.0.0.0:888': listen('0.0.0.0', 888),
     'udp://127.0.0.1:65535': send('127.0.0.1', 65535),
@@ -84,7 +84,7 @@ PYMAVLINK: dict[str, Url] = {
     'tcp:127.0.0.1:5760': connect('127.0.0.1', 5760),
     'tcpin::5760': serve('', 5760),
     '/dev/ttyUSB0,57600': SerialUrl('/dev/ttyUSB0', 57600)}
-# URLs that none of the three has.
+# URLs that only this package has.
 OURS: dict[str, Url] = {
     'udpin:[::]:14550': listen('::', 14550),
     'udp://[::]:14550': listen('::', 14550),

@@ -63,7 +63,7 @@ def test_switch_reverses_the_newest_wanted_or_reported_state(one: Light, on: boo
     (light(50.0), 10.0, 60.0), (light(50.0), -1.0, 49.0), (light(95.0), 10.0, 100.0),
     (light(5.0), -10.0, 0.0), (light(100.0), 10.0, 100.0), (light(0.0), -1.0, 0.0),
     (light(33.3), 1.0, 34.3),
-    # The agreed brightness counts, though a hot light shines less; a request counts more.
+    # The agreed brightness counts, even if a hot light shines less; a request takes precedence.
     (light(80.0, brightness=40.0), 10.0, 90.0),
     (light(80.0, {'brightness': 60.0}, brightness=80.0), -10.0, 50.0),
     (light(brightness=40.0), 10.0, 50.0)])

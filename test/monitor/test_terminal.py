@@ -28,7 +28,7 @@ from support.fork_server import prepare_child
 from support.processes import environment, ROOT
 from support.waiting import PATIENCE
 
-# The rest of the job stops in os.kill(), which returns after the job has been continued.
+# os.kill() stops the rest of the job, and returns after the job has been continued.
 STOPS_ITS_JOB = """
 import os, sys
 from illuminator_ros.cli.monitor import terminal
@@ -47,7 +47,7 @@ terminal.suspend(job=False)
 
 
 class Ended(Exception):
-    """The terminal is gone."""
+    """The terminal has been closed."""
 
 
 def end() -> None:
@@ -73,7 +73,7 @@ def test_keyboard_returns_a_key_at_once_and_nothing_after_the_timeout(
         assert keyboard.read(30.0, end) == b'q'
         assert keyboard.read(0.0, end) == b''
 
-        # The pipe to wake it must not fill up.
+        # The pipe that wakes the reader must not fill up.
         for _ in range(100_000):
             keyboard.wake()
         assert keyboard.read(30.0, end) == b''

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Which source may command a device.
+The arbiter decides which source may command a device.
 
 test/gimbal/test_manager_control.py has each pair of holder and event under each policy.
 """
@@ -44,7 +44,7 @@ def test_priority_does_not_take_the_device_from_a_source_of_the_same_rank() -> N
     assert one.holder == 'first'
 
 
-# How a claim ends: what happens to the arbiter in which 'high' holds.
+# The ends of the claim of 'high', which holds the arbiter.
 ENDS: dict[Cause, Callable[[Arbiter[str]], HolderChanged[str] | None]] = {
     Cause.RELEASE: lambda one: one.release('high', 2.5),
     Cause.SILENCE: lambda one: one.poll(LEASE),

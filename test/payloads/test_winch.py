@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A winch beside a light: one link, one address, no change to what payloads share."""
+"""A winch beside a light: one link, one address, unchanged shared modules."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ BRIDGE, LIGHT, DECK = Address(1, 194), Address(1, 243), Address(1, 169)
 
 
 def simulated(*arguments: str, file: object = None) -> SimulatedComponents[Any]:
-    """Return what ``simulator --payload illuminator,winch`` simulates with more arguments."""
+    """Return the components of ``simulator --payload illuminator,winch`` with more arguments."""
     args = ['--payload', 'illuminator,winch', *arguments]
     types = payload_types(args, PAYLOAD_TYPES)
     options = parser(types, PAYLOAD_TYPES).parse_args(args)

@@ -60,14 +60,14 @@ def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
         enabled = ros.subscribe(Bool, '/illuminator/enabled')
         length = ros.subscribe(Float32, '/winch/line_length')
         enabled.wait_value(False)
-        # By the clock of the machine, which may stand still for longer than a confirmation takes.
+        # Retry: the clock of the machine may pause for longer than a confirmation takes.
         eventually(lambda: ros.enable(True).success)
         enabled.wait_value(True)
         publisher = ros.node.create_publisher(Float32, '/winch/cmd/release', 10)
         length.wait_value(0.0)
 
         def is_released() -> bool:
-            # The first message may come before the node has found the publisher.
+            # The first message may precede the discovery of the publisher.
             publisher.publish(Float32(data=2.5))
             return bool(length.values[-1] >= 2.5)
 

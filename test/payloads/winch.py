@@ -218,7 +218,7 @@ class SimulatedWinch(simulated.SimulatedDevice):
         return simulated.CommandReply(mav.MavResult.ACCEPTED, partial(self.set_length, length))
 
     def set_length(self, length: float) -> None:
-        """Release or wind in until so much of the line is released, m."""
+        """Release or wind in until this length of line is released, m."""
         self.line_length = length
 
     def snapshot(self, now: float) -> simulated.Snapshot:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The checks of a winch: what a second payload adds to those of every component."""
+"""The checks that the winch adds to those of every component."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTR
 
 
 class WinchTester:
-    """Releases line, and winds in as much at the end."""
+    """Releases line, and winds it in at the end."""
 
     def __init__(self, session: Session, conditions: base.Conditions) -> None:
         self.session = session

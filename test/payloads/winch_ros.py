@@ -24,7 +24,7 @@ from std_msgs.msg import Float32
 
 
 class WinchNode(ServedPayload):
-    """Serves all winches of a link with one node; a winch stays as it is at the end."""
+    """Serves all winches of a link with one node; at the end the winch stays as it is."""
 
     def __init__(self, client: WinchClient, host: Host) -> None:
         self._client = client

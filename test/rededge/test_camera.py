@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The client's side of a camera: liveness, PING and captures, message by message."""
+"""The client of a camera: liveness, PING and captures, message by message."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from illuminator_ros.rededge.client import RedEdgeClient, Settings
 import pytest
 
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
-# As real ones send it: neither a camera's type nor an autopilot of a payload.
+# The heartbeat of real cameras; its type and autopilot do not identify a camera.
 BEAT = Heartbeat(0, 1, 2, 3, 4, 3)
 CLOSED_LOOP, OPEN_LOOP = 3, 4
 

@@ -30,7 +30,7 @@ from support.virtual_link import START
 
 UTC = 1.7e9
 CAMERA = Address(255, 100)
-# Without images there is nothing to count.
+# Without images the index cannot be checked.
 WITHOUT_CONSENT = {one.name for one in REQUIREMENTS if not one.needs_consent} - {'capture-index'}
 CAPTURES = {one.name for one in REQUIREMENTS if one.needs_consent}
 PINGS = {'ping', 'ping-sequence', 'ping-once', 'ping-target', 'system-id'}
@@ -58,7 +58,7 @@ SEEDED = {
     'stale': {'validity'},
     'extension': {'lengths'},
 }
-# Fault -> a requirement, and what its result says of the deviation.
+# Fault -> a requirement, and the text of its result.
 DETAILS = {
     'ping-sequence': ('ping-sequence', 'answers sequence number 0 with 1'),
     'ping-target': ('ping-target', 'to 0/0 instead of 255/190'),

@@ -63,7 +63,7 @@ def error(one: Rotation, other: Rotation) -> float:
 
 
 def mount(gimbal_pitch: float, gimbal_yaw: float) -> Quaternion:
-    """Return a mount as ROS has it: pitch up and yaw right of a gimbal, degrees."""
+    """Return a mount in ROS from a gimbal's pitch up and yaw right, degrees."""
     return quaternion(FLU_TO_FRD * Rotation.from_euler(
         'ZYX', [gimbal_yaw, gimbal_pitch, 0], degrees=True) * FLU_TO_FRD)
 

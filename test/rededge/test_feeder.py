@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages that the camera gets, and above all inputs that it must not get."""
+"""Messages that the camera gets, and inputs that it must not get."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Rig:
         return sent
 
     def run(self, seconds: float) -> list[Message]:
-        """Let time pass; return what is sent by itself."""
+        """Let time pass; return the messages that the feeder sends meanwhile."""
         end = self.now + seconds
         while (due := self.feeder.next_deadline()) <= end:
             self.now = max(self.now, due)
@@ -330,7 +330,7 @@ def test_a_mount_that_moves_is_sent_with_the_attitude_of_the_same_instant_re_26(
         if step % 4 == 0:
             sent += rig.imu(turned(rig.now - 0.004), 0.004)
         if step % 11 == 3:
-            # It counter-rotates: together they look to the same direction.
+            # The gimbal counter-rotates, so that the camera keeps its direction.
             sent += rig.mount(turned(rig.now - 0.03).inverse() * NADIR, 0.03)
     pairs = list(zip(sent[::2], sent[1::2], strict=True))
     assert len(pairs) > 15
@@ -365,7 +365,7 @@ def test_a_mount_in_an_unknown_frame_is_refused_and_frames_are_not_mixed() -> No
         'base_link_stabilized, map')
     rig.mount(age=0.1)
     rig.run(0.1)
-    # Between two mounts in different frames, none is known.
+    # The mount is unknown between two mounts in different frames.
     rig.mount(frame_id='map')
     assert rig.imu(age=0.05) == []
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A flight of a minute in no time: client, MAVLink 1 bytes, simulated camera, and the truth."""
+"""A flight of a minute in simulated time: client, MAVLink 1 bytes, camera, and the truth."""
 
 from __future__ import annotations
 

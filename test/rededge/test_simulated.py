@@ -82,7 +82,7 @@ class Camera:
         self.now = START
 
     def tell(self, *messages: Message, source: Address = HOST) -> list[tuple[Address, Any]]:
-        """Give messages to the camera, and return what it sends at once."""
+        """Give messages to the camera, and return the messages that it sends at once."""
         for message in messages:
             self.endpoint.receive(source, message, self.now)
         return self.sent()
@@ -93,7 +93,7 @@ class Camera:
         return sent
 
     def wait(self, seconds: float) -> list[tuple[Address, Any]]:
-        """Let time pass, and return what the camera sends, besides heartbeats."""
+        """Let time pass, and return the camera's messages except heartbeats."""
         until = self.now + seconds
         while (due := self.endpoint.next_deadline()) <= until:
             self.now = due
@@ -102,7 +102,7 @@ class Camera:
         return [(source, one) for source, one in self.sent() if not isinstance(one, Heartbeat)]
 
     def image(self, *messages: Message, wait: float = 0.0) -> Image:
-        """Return an image that is taken so long after messages (s)."""
+        """Return an image that is taken ``wait`` s after messages."""
         self.tell(*messages)
         self.wait(wait)
         self.tell(control(1))
@@ -234,7 +234,7 @@ def test_global_position_implies_a_fix_and_has_speed_and_course_re_18() -> None:
 
 def test_images_at_an_interval_have_its_times_and_what_was_known_then() -> None:
     camera = Camera(interval=1.0)
-    # The poll is late: a message comes first that is newer than the image.
+    # The poll is late: a message that is newer than the image comes first.
     camera.now = START + 1.2
     camera.tell(FIX)
 

@@ -32,7 +32,7 @@ NOW = 100.0
 
 
 class Answers:
-    """The answers of a queue, by the order of their requests."""
+    """The answers of a queue, numbered in the order of their requests."""
 
     def __init__(self, clients: int, requests: int) -> None:
         self.queue = AnswerQueue()

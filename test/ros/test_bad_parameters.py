@@ -91,7 +91,7 @@ def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
     ros: Ros, tmp_path: Path,
 ) -> None:
     file = tmp_path / 'shared.yaml'
-    # Values that rcl reads as text, and PyYAML not at all.
+    # Values that rcl reads as text, and that PyYAML cannot read.
     file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false,\n'
                     '  day: 2026-02-30, equal: =, angle: !degrees 3, 12: 1, left.wheel: 1,\n'
                     '  qos_overrides: {/tf: {publisher: {depth: 1}}}}}\n'
@@ -103,7 +103,8 @@ def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
                     'belly: {ros__parameters: {brightness: 40}}')
     misspelt = {'brightnes': 'brightness', 'conection_url': 'connection_url',
                 'target_sytem': 'target_system', 'strobe_periode': 'strobe_period'}
-    # Without a similar name: on the command line, in our section, and beside one of ours.
+    # Names without a similar one: on the command line, in a section of the bridge, and in a
+    # section with a parameter of the bridge.
     unknown = ('zoom', 'elevation', 'azimuth')
     given = {'names': '[1/244=belly]', **dict.fromkeys([*misspelt, 'zoom'], 1)}
     with running_bridge(ros.domain, free_port(), '--params-file', str(file),

@@ -57,12 +57,12 @@ def test_beam_is_a_cone_along_x_that_is_deleted_while_the_light_is_off_or_lost(
     assert (marker.scale.x, marker.scale.y, marker.scale.z) == (1.0, 1.0, 1.0)
     assert marker.color.a == pytest.approx(0.3)
     assert {point.x for point in marker.points} == {0.0, 20.0}
-    # A viewer draws it where the frame is now.
+    # Viewers draw the beam at the present position of the frame.
     assert marker.frame_locked
     assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (0, 0)
     assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
     assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-    # It is published again before viewers drop it.
+    # The node publishes the beam again before viewers drop it.
     assert marker.lifetime.sec == 5
     assert shown(ros.subscribe(Marker, '/illuminator/beam', STREAM).wait())
 

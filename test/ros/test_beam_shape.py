@@ -69,7 +69,7 @@ def test_cone_is_closed_with_its_apex_at_the_origin_and_normals_pointing_outward
        (pytest.approx(0.4 * MAX_ALPHA), False)) for nonsense in (
         {'enable': 7}, {'brightness': math.nan}, {'brightness': 500.0},
         {'strobe_period': -1.0}, {'strobe_duty_cycle': math.inf})),
-    # A strobe is drawn as bright as it is on average; another signal's strobe is not known.
+    # A strobe is drawn at its mean brightness; the strobe of an external signal is unknown.
     *(([strobe(period, duty)], (MAX_ALPHA, False))
       for period, duty in ((0.0, 50.0), (1.0, 100.0))),
     ([strobe(1.0, 10.0, mode=EXTERNAL_SYNC)], (MAX_ALPHA, False)),

@@ -72,7 +72,7 @@ def drawn(data: st.DataObject, name: str, order: str, body: bytearray) -> None:
 
 
 def text(type_name: str, value: object) -> str:
-    """Return the values of a message, of rclpy or of ours; NaN is equal to NaN."""
+    """Return the values of a message of rclpy or of this package; NaN is equal to NaN."""
     if array := re.fullmatch(r'(.+)\[\d+\]', type_name):
         assert isinstance(value, Iterable)
         return str([text(array[1], one) for one in value])

@@ -32,7 +32,7 @@ def test_newest_enable_message_wins_while_the_light_is_being_switched(
     light.fake.held[ON_OFF] = []
     ros.publish(Bool, ENABLE, *[True] * 50, False)
     light.wait_for(ON_OFF)
-    # The node has taken what came before it answers.
+    # The node takes earlier messages before it answers.
     parameters.get('frame_id')
 
     light.release(ON_OFF)

@@ -26,7 +26,7 @@ from support.slow import CLOCK
 
 INFORMATION = 396
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
-# The values that are text; all others are one number, or true or false.
+# The values that are text; each other value is one number, true or false.
 TEXTS = {'url', 'address', 'mode', 'agreed', 'holder', 'vendor', 'model', 'software_version',
          'hardware_version', 'serial_number', 'node'}
 
@@ -36,7 +36,7 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
 
 
 def complete(array: DiagnosticArray) -> bool:
-    """Return whether an array has a lamp, too: the light's first status has come."""
+    """Return whether an array has a lamp, too: the light's first status has arrived."""
     return len(array.status) == 2
 
 
@@ -51,7 +51,7 @@ def test_array_is_published_once_in_each_diagnostics_period(
             recorder.wait(count=count)
         own_ros.synchronize()
 
-        # The level of the beginning may be among them, which is published at once.
+        # The initial level, which is published at once, may be among them.
         assert len(recorder.messages) <= 5
 
 
@@ -77,7 +77,7 @@ def test_hardware_id_of_a_light_without_serial_number_is_its_address_and_never_c
 def test_statuses_have_the_keys_of_the_protocol_page_and_a_change_of_level_comes_at_once(
     own_ros: Ros, port: int,
 ) -> None:
-    # So rarely that only changes of level are seen soon.
+    # The period is so long that only changes of level are published soon.
     with running_bridge(own_ros.domain, port, diagnostics_period=60.0,
                         sources="['safety']"), ServedLight(port) as light:
         recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)

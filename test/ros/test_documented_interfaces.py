@@ -69,12 +69,12 @@ STATUSES = {
 @dataclass(frozen=True)
 class Node:
     """
-    A node, with everything that makes it do more.
+    A node with all options of its interface.
 
-    :param page: that describes it.
-    :param headings: of the tables with its topics and services.
-    :param parameters: that it is started with.
-    :param operator: the node that its policy lets use it.
+    :param page: the page that describes it.
+    :param headings: the headings of the tables with its topics and services.
+    :param parameters: the parameters that it is started with.
+    :param operator: the node that its policy permits to use it.
     """
 
     page: str
@@ -112,7 +112,7 @@ each_node = pytest.mark.parametrize('name', NODES)
 
 @dataclass(frozen=True)
 class Running:
-    """The interfaces of all nodes, what they report, and the QoS of what they publish."""
+    """The interfaces of all nodes, their diagnostics, and the QoS of their publishers."""
 
     interfaces: dict[str, Interface]
     reported: dict[str, set[str]]
@@ -181,7 +181,7 @@ def test_page_has_the_topics_and_services_of_the_node(name: str, running: Runnin
 
 
 def permitted(policy: str, node: str, element: str, action: str) -> list[str]:
-    """Return the names in full of what a policy lets a node do."""
+    """Return the full names that a policy permits a node to use."""
     root = ET.parse(CONFIG / 'sros2' / f'{policy}.policy.xml').getroot()
     [profile] = [one for one in root.iter('profile') if one.attrib['node'] == node]
     rules = [rule for rule in profile if action in rule.attrib]
@@ -203,7 +203,7 @@ def test_policy_permits_the_operator_all_that_the_node_offers_but_its_internals(
     running: Running, name: str,
 ) -> None:
     offered, operator = running.interfaces[name], NODES[name].operator
-    # Topics of the manager are those of the vehicle and of the driver of its gimbal.
+    # The vehicle and the driver of the gimbal use the topics of the manager.
     others = OF_OPERATOR | {row[1].replace('~', f'/{name}') for row in NODES[name].rows
                             if row[0] == 'topic of the manager'}
 
@@ -266,7 +266,7 @@ def test_plotjuggler_layout_selects_and_plots_published_numbers(running: Running
 
     for curve in CURVES:
         if curve.startswith('/diagnostics/'):
-            # PlotJuggler calls them TOPIC/HARDWARE_ID/NAME/KEY.
+            # PlotJuggler names the values TOPIC/HARDWARE_ID/NAME/KEY.
             _, _, key = curve.rpartition('/illuminator: ')
             assert f'illuminator: {key}' in diagnosed
         else:
@@ -295,7 +295,7 @@ def test_joystick_commands_are_topics_of_the_bridge_and_the_axis_covers_0_to_100
 
 def groups(status: str) -> list[str]:
     """Return the groups of the aggregator that take a status."""
-    # As GenericAnalyzer::match does with the names as they are published.
+    # GenericAnalyzer::match compares the published names in this way.
     return [name for name, one in ANALYZERS.items()
             if any(re.fullmatch(pattern, status) for pattern in one['regex'])]
 
@@ -309,5 +309,5 @@ def test_aggregator_takes_each_status_of_all_devices_and_no_others(running: Runn
         'illuminator_driver: link', 'illuminator: battery', 'my illuminator: lamp')))
     for analyzer in ANALYZERS.values():
         assert analyzer['type'] == 'diagnostic_aggregator/GenericAnalyzer'
-        # A status of the default period, 1 s, is not stale between two.
+        # A status is not stale between two publications with the default period, 1 s.
         assert analyzer['timeout'] > 3.0

@@ -31,7 +31,7 @@ YIELD = 'yield'
 
 
 class Steps:
-    """The interface of a node that notes the topics on which it publishes."""
+    """The interface of a node; it notes the topics on which it publishes."""
 
     def __init__(self) -> None:
         self.taken: list[str] = []
@@ -49,7 +49,7 @@ class Steps:
         return publish
 
     def get_clock(self) -> None:
-        """Return no clock: no stamp is needed."""
+        """Return None, since the test needs no stamp."""
 
 
 def test_processor_is_yielded_after_the_first_and_the_last_topic_of_a_status(

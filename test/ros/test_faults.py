@@ -81,7 +81,7 @@ class Fault:
 
 
 def assert_works(ros: Ros) -> None:
-    """Check that services, parameters and the link still do what they should."""
+    """Check that services, parameters and the link still work."""
     assert ros.enable().success
     assert Parameters(ros).set(brightness=55.0)[0].successful
 

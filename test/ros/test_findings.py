@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The findings of ``/diagnostics``: levels and texts, as they follow from received frames."""
+"""The findings of ``/diagnostics``: levels and texts that follow from received frames."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def test_light_that_is_missed_found_changed_by_others_lost_and_restarted_is_logg
             assert parameters.set(brightness=80.0)[0].successful
             events = parameters.events()
             light.forget()
-            # Float32 carries 80.1 as 80.099998; heat and values without a meaning change nothing.
+            # Float32 rounding, heat and implausible values do not change parameters.
             for report in ({'brightness': 80.000003}, {'brightness': 40.0, 'error_status': 1},
                            {'brightness': float('nan'), 'error_status': 0}, {'mode': 0}):
                 light.report(**report)
@@ -163,7 +163,7 @@ def test_flood_of_frames_is_not_a_flood_of_lines(
                 light.fake.send(message(light, now, step))
 
         light.do(send)
-        # The flood may push out a frame of the refresh, which is then sent again.
+        # The flood may displace a frame of the refresh, which is then sent again.
         refresh = own_ros.start(Trigger, '/illuminator/refresh', Trigger.Request())
         pass_time_until(lambda: refresh.answered)
         own_ros.synchronize()
@@ -182,12 +182,12 @@ def test_tcp_server_that_closes_each_connection_after_a_frame_causes_no_flood_of
             for number in range(30):
                 connection, _ = server.accept()
                 with connection:
-                    # Unread data would make the close reset the connection.
+                    # With unread data close() would reset the connection.
                     assert connection.recv(1000)
                     connection.sendall(heartbeat_frame(sequence=number))
                     connection.shutdown(socket.SHUT_WR)
 
-            # The limit is one of real time.
+            # The limit counts real time.
             periods = 1 + int(elapsed() / PERIOD)
             assert 0 < bridge.count('link lost') <= periods * (BURST + 1)
             assert len(bridge.lines) < periods * 40

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Several lights on one link: a node for each, none waits for another, and all at once."""
+"""Several lights on one link: a node for each, independent, and requests to all of them."""
 
 from collections.abc import Iterator
 import contextlib
@@ -29,7 +29,7 @@ from support.slow import pass_time_until
 
 # s; the default.
 HEARTBEAT_TIMEOUT = 3.0
-# The first node serves the light that the target selects, in whatever order they are heard.
+# The first node serves the light that the target selects, in whatever order lights are heard.
 NODES = {'/illuminator': Address(1, 244), '/illuminator_1_243': Address(1, 243),
          '/belly': Address(7, 243)}
 FOR_ALL_LIGHTS = {'/enable_all', '/cmd/enable_all'}
@@ -108,7 +108,7 @@ def test_parameter_events_of_each_light_name_its_node(ros: Ros, lights: Group) -
     for number, node in enumerate(NODES):
         assert Parameters(ros, node).set(brightness=40.0 + number)[0].successful
     for number, node in enumerate(NODES):
-        # The first status may have caused an event, too, with 100 %.
+        # The first status may have caused an event with 100 %, too.
         event = events[node].wait(lambda event: any(
             one.name == 'brightness' and one.value.double_value < 100.0
             for one in event.changed_parameters))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The monitor in a ROS graph: which lights it finds, what it shows and asks of them."""
+"""The monitor in a ROS graph: the lights that it finds, their values, and its requests."""
 
 from collections.abc import Iterator
 

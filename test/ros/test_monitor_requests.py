@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which requests of the monitor wait for which, with services that answer when a test says so."""
+"""The order of the monitor's requests, with services that answer when a test lets them."""
 
 from typing import Any, cast
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameters given at the start: which file wins, and how the light gets them."""
+"""Parameters given at the start: the precedence of files, and their way to the light."""
 
 import json
 from pathlib import Path

@@ -38,7 +38,7 @@ def start(ros: Ros, light: ServedLight, parameters: Parameters) -> None:
     """Have every test begin with the same configuration."""
     light.report(mode=1, brightness=80.0, strobe_period=0.0, strobe_duty_cycle=0.0)
     parameters.wait(**START)
-    # The event of this change is none of the test's.
+    # The test must not receive the event of this change.
     ros.synchronize()
     light.forget()
 
@@ -126,9 +126,9 @@ def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
     light.fake.results[CONFIGURE] = MavResult.DENIED
 
     listed = parameters.set(brightness=30.0, strobe_duty_cycle=1.0)
-    # A parameter that the node keeps itself is set first, and taken back.
+    # A parameter of the node itself is set first, and restored.
     call = parameters.start_set(atomically=True, use_sim_time=True, brightness=30.0)
-    # The second refusal could be a late copy of the first until a status is asked for.
+    # The second refusal may be a late copy of the first one until a status is requested.
     pass_time_until(lambda: call.answered, step=0.1)
     atomic = call.result().result
     light.behave()
@@ -159,7 +159,7 @@ def test_set_that_the_light_does_not_answer_or_apply_is_refused_within_0_9_s(
     light.wait_for(CONFIGURE)
     if result is None:
         calls.append(parameters.start_set(atomically=atomically, brightness=31.0))
-        # Both are under way when other questions are answered.
+        # Both sets are in progress when another request is answered.
         parameters.get('frame_id')
     else:
         # A status of the same millisecond as the one before may be older than the command.

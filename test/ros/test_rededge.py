@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node over a serial line, against a camera that is none of ours."""
+"""The node over a serial line, with a camera that runs on pymavlink."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ EXACT_LENGTHS = {0: 9, 2: 12, 4: 14, 24: 30, 25: 101, 30: 28, 33: 28, 155: 13, 1
 def running_node(
     ros: Ros, camera: FakeCamera, start: Callable[..., Program] = python, **parameters: Any,
 ) -> Iterator[Program]:
-    """Run the node; it must end as it promises."""
+    """Run the node; see :func:`ended` for its end."""
     given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
     with ended(start(MODULE, f'serial://{camera.device}:57600', '--ros-args', *given,
                      env={'ROS_DOMAIN_ID': str(ros.domain)})) as node:
@@ -58,7 +58,7 @@ def running_node(
 
 
 class Robot:
-    """Publishes what a robot knows, each 50 ms, in a thread of its own."""
+    """Publishes the state of a robot each 50 ms, in a thread of its own."""
 
     def __init__(self, ros: Ros) -> None:
         self.clock = ros.node.get_clock()
@@ -86,11 +86,11 @@ class Robot:
                 self.publish('satellites', UInt32(data=9))
             self.publish('fix', NavSatFix(
                 header=header, status=NavSatStatus(status=0), **self.position))
-            # Nose to the north-west, rolled to the right.
+            # The nose points to the north-west.
             self.publish('imu', Imu(header=header, orientation=geometry.Quaternion(
                 w=0.3826834, x=0.0, y=0.0, z=0.9238795)))
             if 'mount' in self._publishers:
-                # It looks ahead and 45 degrees down.
+                # The camera looks ahead and 45 degrees down.
                 mount = geometry.Quaternion(
                     w=math.cos(math.pi / 8), x=0.0, y=math.sin(math.pi / 8), z=0.0)
                 self.publish('mount', geometry.QuaternionStamped(header=header, quaternion=mount))
@@ -131,7 +131,7 @@ def test_the_camera_gets_all_that_ros_knows_in_frames_of_mavlink_1_re_1_re_2_re_
     with (running_camera() as camera,
           running_node(own_ros, camera, send_gps_status='true', geoid_separation=48.0),
           Robot(own_ros) as robot):
-        # Whatever it receives: noise, and MAVLink 2.
+        # The node sends MAVLink 1 even if it receives noise and MAVLink 2.
         camera.send(random.Random(1).randbytes(500) + heartbeat_frame(Address(9, 100)))
         position = camera.wait('GPS_RAW_INT', lambda one: one.satellites_visible == 9)
         attitude, gps_status = camera.wait('ATTITUDE'), camera.wait('GPS_STATUS')
@@ -184,7 +184,7 @@ def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) ->
         [found, _] = fix.messages
         assert (found.latitude, found.longitude, found.altitude) == (47.0, 8.0, 500.0)
         [turned, _] = (one.quaternion for one in attitude.messages)
-        # It looks down, and the top of the image is to the east.
+        # The camera looks down, and the top of the image is to the east.
         assert attitude.messages[0].header.frame_id == 'map'
         assert [abs(round(value, 3)) for value in (turned.w, turned.x, turned.y, turned.z)] == [
             0.707, 0.0, 0.707, 0.0]
@@ -222,12 +222,12 @@ def test_fixed_mount_is_set_at_run_time_and_gives_way_to_the_topic_re_23_re_27(
         own_ros.synchronize('/rededge')
 
         def is_fed_no_angles() -> bool:
-            """Return whether an interval of heartbeats has no mount and no attitude."""
+            """Return whether no mount and no attitude arrives between two heartbeats."""
             camera.frames.clear()
             camera.wait('HEARTBEAT')
             return {one.message_id for one in camera.frames} <= {0, 4, 24}
 
-        # The line may still have had some to carry.
+        # Some may still have been on the line.
         assert is_fed_no_angles() or is_fed_no_angles()
 
 
@@ -237,7 +237,7 @@ def test_simulated_time_is_no_utc_until_a_reference_tells_it_re_14(own_ros: Ros)
         clock = own_ros.publisher(Clock, '/clock', '/rededge')
         reference = own_ros.publisher(TimeReference, '/rededge/time_reference', '/rededge')
         newest, steps, now = findings(own_ros), itertools.count(), Time()
-        # A recording, and what it begins with when it starts again.
+        # The time at which the recording begins, and begins again.
         begin = 100
 
         def stamp() -> Time:

@@ -68,7 +68,7 @@ class Rig:
         self.jumps += 1
 
     def run(self, seconds: float, step: float = 0.0) -> Stamp:
-        """Let time pass, and the clock step; return the stamp of a message made 0.25 s ago."""
+        """Let time pass, and step the clock; return the stamp of a message made 0.25 s ago."""
         self.steady += seconds
         self.clock.seconds += seconds + step
         made, rest = divmod(self.clock.seconds - 0.25, 1)

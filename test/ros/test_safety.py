@@ -84,7 +84,7 @@ def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
         assert [command.param1 for command in light.commands(ON_OFF)] == [0.0]
         assert light.commands(CONFIGURE) == []
 
-        # The requests waited: the operator's, then the plain interface's, then autonomy's.
+        # The kept requests follow: of operator, then of the plain interface, then of autonomy.
         assert release('safety') == 'held by operator'
         parameters.wait(brightness=40.0)
         assert release('operator') == 'held by default'

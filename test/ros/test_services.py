@@ -102,7 +102,7 @@ def test_other_services_and_topics_go_on_while_an_enable_waits(
 
 
 def no_light_messages(ros: Ros) -> set[str]:
-    """Call both services and set a parameter; return the reasons for which all of them fail."""
+    """Call both services and set a parameter; return the reasons why they fail."""
     calls = [ros.start_enable(), ros.start(Trigger, '/illuminator/refresh', Trigger.Request())]
     responses = [call.result() for call in calls]
     [result] = Parameters(ros).set(brightness=30.0)
@@ -228,7 +228,7 @@ def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_a
     callers = [clients('slow') for _ in range(answer_queue.MAX_UNSPACED + 1)]
     eventually(lambda: node.count_clients('~/slow') == len(callers))
     calls = []
-    # One after the other: the clients are counted after the first answer, so the third one waits.
+    # Call in turn: the node counts the clients after the first answer, so the third one waits.
     for count, caller in enumerate(callers[:3], 1):
         calls.append(Call(caller.call_async(Trigger.Request())))
         waiting.wait_for(lambda one: True, count=count)

@@ -64,7 +64,7 @@ def test_camera_answers_in_mavlink_1_only_and_writes_each_image_at_once_re_1_re_
 def test_console_and_view_show_the_images() -> None:
     with ended(python('illuminator_ros.simulator', '--payload', 'rededge', 'pty://',
                       '--interval', '0.2', '--own-gps', 'none')) as simulator:
-        # A line for each number that the view meets: a busy machine leaves some out.
+        # The view prints a line for each number that it sees; a busy machine skips some.
         simulator.wait_for(' images  time none  position none', count=3)
 
 

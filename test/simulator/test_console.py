@@ -27,7 +27,7 @@ from support.simulated_lights import describe
 
 
 class Console:
-    """Two lights, ``bow`` and 1/244, and what a person types."""
+    """Two lights, ``bow`` and 1/244, and the lines that a user types."""
 
     def __init__(self) -> None:
         self.lights = SimulatedComponents((

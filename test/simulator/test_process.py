@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The simulator as a process: its output is blocked, closed, full or of another encoding."""
+"""The simulator as a process: blocked, closed or full output, or another encoding."""
 
 from collections.abc import Callable
 import contextlib
@@ -34,7 +34,7 @@ SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
 def assert_served(*command: str, stdout: int | None, stderr: int | None) -> None:
     """Assert that a simulator obeys a bridge, and ends on SIGTERM without delay."""
     port = free_port()
-    # By the clock of the machine, which may stand still for longer than a confirmation takes.
+    # Retry: the clock of the machine may pause for longer than a confirmation takes.
     with Bridge(f'udpin:127.0.0.1:{port}') as bridge, subprocess.Popen(
             [*command, f'udpout://127.0.0.1:{port}'], env=environment(), cwd=ROOT, stdout=stdout,
             stderr=stderr, stdin=subprocess.DEVNULL, preexec_fn=prepare_child) as process:

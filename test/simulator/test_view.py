@@ -49,7 +49,7 @@ def press(component: Light, now: float, **changes: Any) -> None:
 
 
 class Terminal(io.StringIO):
-    """A terminal as far as the view uses one: what stands on the screen."""
+    """The screen of a terminal, as far as the view uses one."""
 
     def screen(self) -> list[str]:
         rows: dict[int, str] = {}

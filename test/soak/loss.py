@@ -16,11 +16,11 @@
 """
 Sends commands to simulated lights over faulty lines, and compares each outcome with the light.
 
-Each run of 400 commands draws what the line does to frames in each direction (loss, repetition,
-reordering, delay, corruption), how the lights behave, and whether users wait for answers. Time is
-simulated, so 500 outcomes take a second. An outcome is untrue if a success was not acknowledged
-or never done, if a failure gives a wrong reason, or if there is not exactly one; and the state
-shown at the end must be the state of the light.
+Each run of 400 commands draws the faults of the line in each direction (loss, repetition,
+reordering, delay, corruption), the behaviour of the lights, and whether users wait for answers.
+Time is simulated, so 500 outcomes take a second. An outcome is untrue if a success was not
+acknowledged or not executed, if a failure gives a wrong reason, or if a command does not have
+exactly one outcome. The state shown at the end must be the state of the light.
 
     python3 test/soak/loss.py --outcomes 600000
     python3 test/soak/loss.py --outcomes 1 --seed 17     the one run of a seed

@@ -16,10 +16,10 @@
 """
 Runs the bridge, simulated lights and a gimbal over a faulty line for a given time.
 
-Frames are lost, repeated, reordered, delayed and spoilt, the line is cut, the router between
-them is restarted, and so is one of two lights, while services, parameters and setpoints are used
-all the time. Every request must be answered in time. At the end the bridge must serve as at the
-beginning, with no more memory, threads and descriptors than after its warm-up.
+The line loses, repeats, reorders, delays and corrupts frames and is cut, and the router between
+them and one of two lights are restarted, while services, parameters and setpoints are in use.
+Every request must be answered in time. At the end the bridge must serve as at the beginning, with
+no more memory, threads and descriptors than after its warm-up.
 
     python3 test/soak/run.py --seconds 3600 --seed 1
 
@@ -56,7 +56,7 @@ from support.ros import bridge_arguments, own_domain, Parameters, Ros  # noqa: E
 MAX_GROWTH = (6.0, 0, 4)
 # s; the slowest request is a refresh (5 s), behind others of its kind.
 ANSWER_LIMIT = 30.0
-# s; a light that has just restarted gets its configuration back before it is asked for more.
+# s after the faults in which a light that has just restarted gets its configuration back.
 CALM = 4.0
 REPORT_INTERVAL = 30.0
 GIMBAL = '/gimbal_manager'
@@ -122,7 +122,7 @@ class Soak:
             'illuminator_ros.simulator', f'udpout://127.0.0.1:{self.proxy.port}', *arguments)
 
     def close(self) -> None:
-        """End it all."""
+        """End all programs."""
         self.client.close()
         for program, name in ((self.bridge, 'bridge'), (self.light, 'simulator'),
                               (self.restarted, 'simulator'), (self.gimbal, 'gimbal')):
@@ -136,7 +136,7 @@ class Soak:
         self.proxy.close()
 
     def usages(self) -> dict[str, Usage]:
-        """Return what the two programs take that run from the beginning to the end."""
+        """Return the resources of the two programs that run from the beginning to the end."""
         return {'bridge': Usage.of(self.bridge.pid), 'simulator': Usage.of(self.light.pid)}
 
     def disturb(self) -> None:
@@ -220,7 +220,7 @@ class Soak:
         """Check that light and gimbal can be commanded as at the beginning."""
         for on in (True, False):
             until = time.monotonic() + ANSWER_LIMIT
-            # On a machine that stands still meanwhile, a confirmation may come too late.
+            # A confirmation may be too late if the machine pauses.
             while not (answer := self.client.enable(on)).success and time.monotonic() < until:
                 pass
             if not answer.success:
@@ -235,7 +235,7 @@ class Soak:
 
 
 def soak(seconds: float, seed: str) -> int:
-    """Run it, print what was found, and return the exit status."""
+    """Run the soak, print the findings, and return the exit status."""
     warm_up = min(max(seconds / 4, 3.0), 120.0)
     with own_domain() as domain, contextlib.ExitStack() as stack:
         one = Soak(seed, domain)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The drone's side and the light's side of a link under attack, and what must hold meanwhile."""
+"""Both sides of a link under attack, and the conditions that must hold meanwhile."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ class AttackedLink:
         raise NotImplementedError
 
     def get_ready(self) -> None:
-        """Do what comes before the attack."""
+        """Prepare the attack."""
 
     def busy(self) -> None:
-        """Do something honest in the middle of it."""
+        """Send honest requests during the attack."""
         raise NotImplementedError
 
     def sizes(self) -> dict[str, int]:
@@ -107,7 +107,7 @@ class AttackedLink:
         assert {name: sizes[name] for name, bound in BOUNDS.items() if sizes[name] > bound} == {}
 
     def attack(self) -> None:
-        """Send the next datagrams, and now and then do something honest."""
+        """Send the next datagrams, and sometimes honest requests."""
         self.last = self.attacker.datagrams(self.link.now)
         self.link.receive(*self.last)
         self.inputs += len(self.last)
@@ -118,16 +118,16 @@ class AttackedLink:
             self.check_bounds()
 
     def check_service(self) -> None:
-        """Check that all is as before once the attack is over."""
+        """Check that the service is as before after the attack."""
         raise NotImplementedError
 
     def close(self) -> None:
-        """End it."""
+        """End the link."""
         self.link.stop()
 
 
 class AttackedBridge(AttackedLink):
-    """The drone's side, with a genuine light that it is to serve all the time."""
+    """The bridge's side, with a genuine light that it must serve at any time."""
 
     def make_endpoint(self) -> Any:
         self.results: list[list[Result]] = []
@@ -135,7 +135,7 @@ class AttackedBridge(AttackedLink):
 
     @property
     def controller(self) -> Client:
-        """Return what is attacked."""
+        """Return the client that is attacked."""
         return cast(Client, self.link.endpoint)
 
     def get_ready(self) -> None:
@@ -161,7 +161,7 @@ class AttackedBridge(AttackedLink):
             self.link.socket.inbox.append((frame, GENUINE_PEER))
 
     def genuine(self, seconds: float) -> None:
-        """Let time pass with the genuine light, and with what else is in the inbox."""
+        """Let time pass with the genuine light and the other frames in the inbox."""
         until = self.link.now + seconds
         while self.link.now < until:
             self._light.poll(self.link.now)
@@ -209,7 +209,7 @@ class AttackedBridge(AttackedLink):
         self._check_command()
 
     def _check_command(self) -> None:
-        """Check that the genuine light can be commanded, and is told apart from its copies."""
+        """Check that the genuine light can be commanded, and is distinguished from its copies."""
         light = self.controller.lights[GENUINE]
         assert light.connected
         for on, brightness in ((True, 40.0), (False, 70.0)):
@@ -231,7 +231,7 @@ class AttackedBridge(AttackedLink):
 
 
 class AttackedLights(AttackedLink):
-    """Simulated lights, with a genuine drone that they are to obey all the time."""
+    """Simulated lights, with a genuine client that they must obey at any time."""
 
     def make_endpoint(self) -> Any:
         return simulated_lights(

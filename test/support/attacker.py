@@ -32,10 +32,10 @@ MESSAGES: tuple[type[mav.Message], ...] = (
     mav.CommandAck, mav.CommandAck, mav.CommandLong, mav.CommandInt)
 FLOATS = (0.0, -0.0, 1.0, 50.0, 100.0, 100.00001, -1.0, -1e-30, 1e-45, 3.4e38, -3.4e38, 25.5,
           math.nan, -math.nan, math.inf, -math.inf, 440.0, 396.0, 1e6, 0.05, 3600.5)
-# Values of fields that decide how far a message gets.
+# Values of fields that decide about the processing of a message.
 TELLING = {'command': (405, 406, 511, 512, 80, 0, 65535), 'result': (*range(11), 255),
            'type': (mav.MavType.ILLUMINATOR, mav.MavType.ILLUMINATOR, 0, 18, 255)}
-# Every length that is of interest: too short, right, extended, the longest.
+# Lengths of payloads: too short, right, extended, the longest.
 LENGTHS = (0, 1, 2, 3, 9, 10, 30, 33, 34, 35, 36, 38, 160, 161, 200, 254, 255)
 Datagrams = list[tuple[bytes, Any]]
 
@@ -54,8 +54,8 @@ class Attacker:
     """
     Makes datagrams, the same ones for the same seed.
 
-    :param key: that signs some of the frames rightly.
-    :param sources: addresses worth claiming to be.
+    :param key: the key that signs some of the frames correctly.
+    :param sources: addresses that the attacker impersonates.
     """
 
     def __init__(self, seed: object, key: bytes, sources: list[mav.Address]) -> None:
@@ -144,7 +144,7 @@ class Attacker:
         frame = raw_v2(message_id, payload, incompat=1, sequence=sequence, source=source)
         fresh = ticks(1.7e9 + now) + self._draw.randrange(1000)
         stamp = self._draw.choice((fresh, fresh, fresh, 0, MAX_TICKS, fresh - 10**8))
-        # Only the owner of the key can make a time stamp of the far future count.
+        # A time stamp of the far future is accepted only from the owner of the key.
         genuine = self._draw.random() < 0.5 and stamp <= fresh
         frame += bytes((self._draw.randrange(256),)) + stamp.to_bytes(6, 'little')
         return frame + (signature(self._key, frame) if genuine else self._draw.randbytes(6))

@@ -38,7 +38,7 @@ from support.simulated_lights import simulated_lights
 
 BRIDGE = mav.Address(1, 194)
 ONE_LIGHT = (IlluminatorProperties(),)
-# s on the clock of a pair at its beginning: not 0, so that 0 as a time is found out.
+# s; the initial time of a pair: not 0, so that a wrong use of 0 as a time shows.
 START = 1000.0
 # Turns at one moment: more of them mean that a link's thread would spin.
 MAX_TURNS = 100
@@ -81,8 +81,8 @@ class Pair:
 
     :param lights: what to simulate, or an endpoint such as a
         :class:`~support.fake_light.FakeLight`.
-    :param there: what the line does towards the lights.
-    :param back: what it does towards the controller; None is the same as there.
+    :param there: the faults of the line towards the lights.
+    :param back: its faults towards the controller; None means the same as ``there``.
     :param uptime: s for which simulated lights have been on at the beginning.
     :ivar now: s.
     """
@@ -131,7 +131,7 @@ class Pair:
 
     @property
     def recorder(self) -> Recorder:
-        """Return what the observer of that light was told."""
+        """Return the events of that light."""
         return self.recorders[self.light.address]
 
     @property
@@ -158,7 +158,7 @@ class Pair:
                    self.near.wire.next_arrival(), self.far.wire.next_arrival())
 
     def step(self, until: float = math.inf) -> bool:
-        """Let the next thing happen; return False, and stand at ``until``, if it is later."""
+        """Advance to the next event, but to ``until`` at most; return whether there was one."""
         due = self.next_deadline()
         if due > until:
             self.now = max(self.now, until)
@@ -189,20 +189,20 @@ class Pair:
             pass
 
     def run_until(self, condition: Callable[[], Any], *, within: float = 60.0) -> None:
-        """Let time pass until something is so; an error if that takes too long (s)."""
+        """Let time pass until a condition holds; raise an error after ``within`` s."""
         until = self.now + within
         while not condition():
             assert self.step(until), f'not so within {within} s'
 
     def settle(self, seconds: float = 3.5) -> Pair:
-        """Let both sides get to know each other, and end where nothing is on its way."""
+        """Let both sides discover each other, until the line is empty."""
         self.run(seconds)
         return self
 
     # The line
 
     def mend(self) -> None:
-        """Let the line do no harm any more."""
+        """End the faults of the line."""
         for end in (self.near, self.far):
             end.wire.faults = Faults()
 
@@ -214,7 +214,7 @@ class Pair:
         self.turn()
 
     def close(self) -> None:
-        """Lose the line, and what is on it."""
+        """Close the line; frames on it are lost."""
         self._switch(is_open=False)
         self.controller.link_closed(self.now, 'closed')
         self.other.link_closed(self.now, 'closed')
@@ -242,23 +242,23 @@ class Pair:
         return answer
 
     def ask_refresh(self) -> Answer:
-        """Begin to ask for status and identity."""
+        """Begin to request status and identity."""
         answer = Answer(self.now)
         self.light.refresh(self.now, answer)
         self.turn()
         return answer
 
     def wait_for(self, answer: Answer) -> Result:
-        """Return the result of a request once it is there."""
+        """Wait for the result of a request, and return it."""
         self.run_until(lambda: answer.results)
         return answer.result
 
     def enable(self, on: bool) -> Result:
-        """Switch the light on or off and return what became of it."""
+        """Switch the light on or off and return the result."""
         return self.wait_for(self.ask_enable(on))
 
     def configure(self, **changes: Any) -> Result:
-        """Configure the light and return what became of it."""
+        """Configure the light and return the result."""
         return self.wait_for(self.ask_configure(**changes))
 
     # Sent messages

@@ -72,7 +72,7 @@ class ChecksRun:
         await self.runner.run(missing)
 
     def finish(self: R) -> R:
-        """Let the run end."""
+        """Run the checks to their end."""
         self.link.run_until(lambda: not self.session.runner.running, within=3600.0)
         return self
 

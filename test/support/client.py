@@ -25,7 +25,7 @@ from illuminator_ros.mavlink.messages import Address
 
 class Client(Component):
     """
-    The drone's side of a link to lights.
+    The bridge's side of a link to lights.
 
     :param options: as for :class:`IlluminatorClient`.
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A command sender with a clock that jumps and a target that does what a test says."""
+"""A command sender with a clock that jumps and a target that a test controls."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ OURS = Address(1, 194)
 LIGHT = Address(1, 243)
 # s from a frame to its acknowledgement.
 DELAY = 0.02
-# s after which whatever was started has ended.
+# s after which every command has ended.
 LONG = 60.0
 
 
@@ -38,7 +38,7 @@ class Run:
     """
     A command that was started: its frames, and its outcomes, of which there should be one.
 
-    Its frames are known by param7, which has the number of the run.
+    The number of the run in param7 identifies its frames.
     """
 
     command: command_sender.Command
@@ -91,7 +91,7 @@ class Rig:
     def start(self, command: int = 405, target: Address = LIGHT, *,
               params: tuple[float, ...] | None = None, limit: float = math.inf,
               overtake: bool = False) -> Run:
-        """Start a command; the limit is s from now. With params its frames are not told apart."""
+        """Start a command; the limit is s from now. With params its frames are not identified."""
         number = len(self.runs) + 1.0
         run = Run(command_sender.Command(
             target, command, (0.0,) * 6 + (number,) if params is None else params))
@@ -108,7 +108,7 @@ class Rig:
         return run
 
     def run(self, seconds: float) -> None:
-        """Let time pass, acknowledging and polling at the moments when that is due."""
+        """Let time pass; acknowledge and poll when that is due."""
         end = self.now + seconds
         while (due := min(self.sender.next_deadline(), self._next_ack())) <= end:
             self.now = max(self.now, due)
@@ -135,7 +135,7 @@ class Rig:
         self.flush()
 
     def flush(self) -> None:
-        """Take what was sent."""
+        """Take the sent messages."""
         while self.sender.outgoing:
             self._send(self.sender.outgoing.popleft()[1])
 
@@ -164,12 +164,12 @@ class Rig:
 
     @property
     def messages(self) -> list[Any]:
-        """Return what was sent."""
+        """Return the sent messages."""
         return [message for _, message in self.frames]
 
     @property
     def idle(self) -> bool:
-        """Whether nothing is under way or waiting."""
+        """Whether no command is in progress or waiting."""
         return self.sender.next_deadline() == math.inf
 
 

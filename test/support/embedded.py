@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bridge in the test's own process, where its parts can be reached and made to fail."""
+"""The bridge in the test's own process, where a test can make its parts fail."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def embedded_bridge(domain: int, port: int, **parameters: object) -> Iterator[Br
 
 
 def refusal(context: Context, **parameters: object) -> str:
-    """Return why a bridge cannot start with these parameters."""
+    """Return the reason why a bridge cannot start with these parameters."""
     node = _node(context, parameters)
     try:
         Bridge(node, [], PAYLOADS, 'illuminator')

@@ -40,9 +40,9 @@ class FakeCamera:
     """
     Answers PING and DIGICAM_CONTROL, and keeps all frames.
 
-    :param answers: whether it does.
+    :param answers: whether it answers.
     :ivar device: the terminal that the node opens.
-    :ivar fault: why the bytes that it received are not MAVLink 1.
+    :ivar fault: the reason why the received bytes are not MAVLink 1.
     """
 
     answers: bool = True
@@ -78,9 +78,9 @@ class FakeCamera:
         self.send(message.pack(MAVLINK_1.MAVLink(None, srcSystem=system, srcComponent=100)))
 
     def run(self, stop: int) -> None:
-        """Be a camera until something is written to the other end of ``stop``."""
+        """Act as a camera until a byte is written to the other end of ``stop``."""
         rest, system = b'', 255
-        # As real ones send it.
+        # The heartbeat of real cameras.
         beat = MAVLINK_1.MAVLink_heartbeat_message(0, 1, 2, 3, 4, 3)
         while True:
             ready = select.select([self._far, stop], [], [], HEARTBEAT_INTERVAL)[0]

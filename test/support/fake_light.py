@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A light that does to commands what a test says."""
+"""A light whose response to commands a test sets."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DEFAULT_STATUS = {
 
 
 def status_message(uptime_ms: int = 100_000, **fields: Any) -> Any:
-    """Return an ILLUMINATOR_STATUS, some fields other than usual."""
+    """Return an ILLUMINATOR_STATUS; ``fields`` replace the usual values."""
     return IlluminatorStatus(uptime_ms=uptime_ms, **{**DEFAULT_STATUS, **fields})
 
 
@@ -42,8 +42,8 @@ class FakeLight(Endpoint):
     """
     One light whose behaviour is a set of attributes, which a test changes as it goes.
 
-    :ivar results: what commands are answered with, MAV_RESULT_ACCEPTED if not said otherwise;
-        None is silence. A list is used up from its front, the last one for good.
+    :ivar results: the answers to commands by MAV_CMD, by default MAV_RESULT_ACCEPTED; None means
+        no answer. A list is used up from its front; its last entry is kept.
     :ivar applies: whether an accepted command changes the light.
     :ivar apply_after: s from the acknowledgement to the change.
     :ivar stream: s between statuses, 0 for none.
@@ -51,7 +51,7 @@ class FakeLight(Endpoint):
     :ivar pushes: whether a change is followed by a status.
     :ivar targeted: whether acknowledgements carry their target.
     :ivar boot: when it was started; None if its uptime is always 0.
-    :ivar fields: what it reports.
+    :ivar fields: the values that it reports.
     :ivar shone: the brightness at each ON, %.
     """
 
@@ -91,7 +91,7 @@ class FakeLight(Endpoint):
         self._status_due = self.heartbeat.due = now
 
     def delay_status(self, seconds: float) -> None:
-        """Have the statuses of the stream come later."""
+        """Delay the statuses of the stream."""
         self._status_due += seconds
 
     def receive(self, source: mav.Address, message: Any, now: float) -> None:
@@ -137,7 +137,7 @@ class FakeLight(Endpoint):
             self.send(self.status(now))
 
     def uptime_ms(self, now: float) -> int:
-        """Return what it reports as its uptime."""
+        """Return the uptime that it reports."""
         return 0 if self.boot is None else int((now - self.boot) * 1000) % 2 ** 32
 
     def status(self, now: float) -> Any:
@@ -152,7 +152,7 @@ class FakeLight(Endpoint):
             one.hardware_version.encode(), one.serial_number.encode())
 
     def send(self, message: Any) -> None:
-        """Send anything."""
+        """Send any message."""
         self.outgoing.append((self.source, message))
 
     def poll(self, now: float) -> None:

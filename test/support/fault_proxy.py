@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A UDP router on loopback between lights and a bridge, which loses, delays and spoils frames."""
+"""A UDP router on loopback between lights and a bridge that loses and corrupts frames."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NO_FAULTS = Faults(latency=0.0)
 
 
 class _Lane:
-    """The way of one light: its address, a socket of its own towards the bridge, two wires."""
+    """The path of one light: its address, a socket of its own towards the bridge, two wires."""
 
     def __init__(self, light: Any, faults: Faults, seed: int) -> None:
         self.light = light
@@ -44,8 +44,8 @@ class FaultProxy:
     """
     Forwards datagrams, in a thread of its own, with faults that can be changed at any time.
 
-    :param bridge_port: where the bridge listens.
-    :ivar port: where lights send to.
+    :param bridge_port: the port on which the bridge listens.
+    :ivar port: the port to which lights send.
     """
 
     def __init__(self, bridge_port: int, seed: int = 0) -> None:
@@ -61,21 +61,21 @@ class FaultProxy:
         self._thread.start()
 
     def set(self, faults: Faults) -> None:  # noqa: A003
-        """Have other faults from now on."""
+        """Set the faults."""
         with self._lock:
             self._faults = faults
             for lane in self._lanes.values():
                 lane.to_bridge.faults = lane.to_light.faults = faults
 
     def restart(self) -> None:
-        """Forget all lights, as a restarted router does: they get other ports."""
+        """Forget all lights, as a restarted router does; they then get other ports."""
         with self._lock:
             for lane in self._lanes.values():
                 lane.socket.close()
             self._lanes.clear()
 
     def close(self) -> None:
-        """End it."""
+        """Stop the proxy."""
         self._ended = True
         self._thread.join(5.0)
         self.restart()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A line that loses, repeats, delays and corrupts frames, the same ones each time."""
+"""A line that loses, repeats, delays and corrupts the same frames in each run."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ import heapq
 import math
 import random
 
-# s; what is reordered is overtaken by what follows it within this time.
+# s; later frames within this time overtake a reordered frame.
 OVERTAKEN_WITHIN = 0.05
 
 
 @dataclass(frozen=True)
 class Faults:
     """
-    What a line does to frames: shares (0..1) of them, each drawn by itself.
+    The faults of a line: shares (0..1) of the frames, each drawn independently.
 
     :param latency: s, for every frame.
     :param longest_delay: s; a delayed frame takes up to this much longer.
@@ -45,9 +45,9 @@ class Faults:
 
 class FaultyWire:
     """
-    One direction of a line. No clock: time is passed in.
+    One direction of a line; the caller passes the time.
 
-    :ivar is_open: whether what is sent goes anywhere.
+    :ivar is_open: whether sent frames are delivered.
     """
 
     def __init__(self, faults: Faults, seed: int | str) -> None:
@@ -73,26 +73,26 @@ class FaultyWire:
             heapq.heappush(self._travelling, (arrival, self._count, data))
 
     def receive(self, now: float) -> list[bytes]:
-        """Return what has arrived, in the order of arrival."""
+        """Return the frames that have arrived, in the order of arrival."""
         arrived = []
         while self._travelling and self._travelling[0][0] <= now:
             arrived.append(heapq.heappop(self._travelling)[2])
         return arrived
 
     def next_arrival(self) -> float:
-        """Return when something arrives next, infinity if nothing is on its way."""
+        """Return when the next frame arrives, infinity if the line is empty."""
         return self._travelling[0][0] if self._travelling else math.inf
 
     def switch(self, *, is_open: bool) -> None:
-        """Open or cut the line; what is on its way is lost."""
+        """Open or cut the line; frames on it are lost."""
         self.is_open = is_open
         self._travelling.clear()
 
     def _happens(self, share: float) -> bool:
-        # No draw for what cannot happen: more kinds of faults then change no old seed's run.
+        # Do not draw for a share of 0: new kinds of faults then do not change old runs.
         return share > 0 and self._random.random() < share
 
     def _corrupted(self, frame: bytes) -> bytes:
-        # One wrong byte is a burst that a 16-bit CRC always finds: none gets through by luck.
+        # Change one byte: a 16-bit CRC always detects a burst of 8 bits.
         at = self._random.randrange(len(frame))
         return frame[:at] + bytes([frame[at] ^ self._random.randrange(1, 256)]) + frame[at + 1:]

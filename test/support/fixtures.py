@@ -36,7 +36,7 @@ def private_home() -> None:
 
 @pytest.fixture(scope='module', autouse=True)
 def log_routes() -> Iterator[None]:
-    """Undo what a bridge in the test's own process does to logging: others look at their logs."""
+    """Undo the changes that a bridge in the test's own process makes to logging."""
     logger = logging.getLogger('illuminator_ros')
     handlers, propagate = list(logger.handlers), logger.propagate
     yield
@@ -99,7 +99,7 @@ def bridge(shared_bridge: tuple[Program, ServedLight]) -> Program:
 
 @pytest.fixture
 def light(shared_bridge: tuple[Program, ServedLight]) -> Iterator[ServedLight]:
-    """Return the module's light, which does as it is told unless a test has it do otherwise."""
+    """Return the module's light, which obeys unless a test changes its behaviour."""
     light = shared_bridge[1]
     light.forget()
     yield light

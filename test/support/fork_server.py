@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Programs of ours as forks of one process that has imported their modules.
+Programs of this package as forks of one process that has imported their modules.
 
 Such a program starts in 0.1 s in place of 0.6 s, and shares nothing with the others: it has its
 own arguments, environment, directory and standard streams, and ends as any interpreter does.
@@ -39,13 +39,13 @@ import sys
 import threading
 import time
 
-# Looked up here: after a fork as little as possible must happen.
+# Look it up here, since as little code as possible must run after a fork.
 LIBC = ctypes.CDLL(None)
 PRCTL = LIBC.prctl
 PR_SET_PDEATHSIG = 1
 PR_SET_CHILD_SUBREAPER = 36
 _LOCK = threading.Lock()
-# Here and not when they are needed: tests count the descriptors that are left open.
+# Open them here and not on demand: tests count the open descriptors.
 _REQUESTS, _SERVER_END = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 MAX_REQUEST = 1 << 17
 MODULES = (
@@ -185,7 +185,7 @@ def serve(descriptor: int) -> None:
     sys.stdin = os.fdopen(0, closefd=False)
     sys.stdout = os.fdopen(1, 'w', closefd=False)
     sys.stderr = os.fdopen(2, 'w', 1, errors='backslashreplace', closefd=False)
-    # Libraries would stop threads that only the server has.
+    # Libraries would try to stop threads that only the server has.
     LIBC.on_exit(LIBC._exit, None)
     os.environ.clear()
     os.environ.update(variables)

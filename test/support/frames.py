@@ -25,13 +25,13 @@ from illuminator_ros.mavlink.signing import Signing
 from support.messages import decode_payload, HANDLED, STATUS
 
 LIGHT = mav.Address(1, 243)
-# Never the beginning of a frame, and long enough to end the wait for the rest of any.
+# Bytes that do not begin a frame, and that are long enough to complete any frame.
 FILLER = bytes(300)
 
 
 def frame_of(message: mav.Message = STATUS, sequence: int = 0, source: mav.Address = LIGHT, *,
              signed: bool = False, version: int = 2) -> bytes:
-    """Return a frame of ours, without the signature that a signed one still needs."""
+    """Return a frame of this package, without the signature that a signed one still needs."""
     payload = mav.encode_payload(message)
     return encode_frame(
         message.id, payload if version == 2 else payload[:message.base_size], sequence=sequence,
@@ -73,7 +73,7 @@ class Codec:
 
 def raw_v2(message_id: int, payload: bytes, *, crc_extra: int | None = None, incompat: int = 0,
            compat: int = 0, sequence: int = 0, source: mav.Address = LIGHT) -> bytes:
-    """Return a MAVLink 2 frame as it is not written by us: any flags, any length, any seed."""
+    """Return a MAVLink 2 frame with any flags, length and CRC_EXTRA."""
     header = bytes((len(payload), incompat, compat, sequence, *source))
     return _raw(0xFD, message_id, header + message_id.to_bytes(3, 'little') + payload, crc_extra)
 
@@ -104,5 +104,5 @@ def only(data: bytes) -> Frame:
 
 
 def decoded(data: bytes) -> list[Frame]:
-    """Return the frames that a stream holds which ends with the data."""
+    """Return the frames of a stream that ends with the data."""
     return Decoder().feed(data + FILLER)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gimbal manager with a clock that jumps, a device, and players that say what a test wants."""
+"""A gimbal manager with a clock that jumps, a device, and players that a test controls."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ T = TypeVar('T')
 
 
 def information(capabilities: Capabilities = FULL, **ranges: Any) -> GimbalDeviceInformation:
-    """Return the information of a device that can turn by half a rad, except as given."""
+    """Return the information of a device that can turn by half a rad, unless given otherwise."""
     return replace(GimbalDeviceInformation(
         0, b'maker', b'model', b'', 1, 1, 7, int(capabilities), 0, -0.5, 0.5, -0.5, 0.5, -0.5,
         0.5), **ranges)
@@ -71,10 +71,10 @@ class ManagerRig:
     """
     A manager, and what it sends.
 
-    :param draws: the random numbers that the manager draws, the last of them again and again.
+    :param draws: the random numbers that the manager draws; the last one is repeated.
     :ivar now: s.
     :ivar sent: everything that it has sent, with the time.
-    :ivar device_information: what the device answers with; None for no device.
+    :ivar device_information: the answer of the device; None for no device.
     :ivar heading: of the vehicle, as the device reports it.
     """
 
@@ -154,7 +154,7 @@ class ManagerRig:
     # Players
 
     def heartbeats(self, *players: mav.Address) -> Callable[[], None]:
-        """Return what sends a heartbeat of each player."""
+        """Return a function that sends a heartbeat of each player."""
         def send() -> None:
             for player in players:
                 self.component.receive(player, mav.heartbeat(mav.MavType.GCS), self.now)
@@ -174,7 +174,7 @@ class ManagerRig:
         return self.result(player, configure(*player))
 
     def points(self, player: mav.Address, pitch: float = 0.1, yaw: float = 0.0) -> list[Any]:
-        """Return what the device is sent when a player sets angles, rad."""
+        """Return the messages to the device when a player sets angles, rad."""
         return of(GimbalDeviceSetAttitude, self.give(player, pitch_yaw(pitch, yaw)))
 
     def messages(self, cls: type[T], since: float = 0.0) -> list[T]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gimbal client beside gimbal managers that do what a test says, on one simulated clock."""
+"""A gimbal client and gimbal managers that a test controls, on one simulated clock."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ class FakeManager:
     :ivar announces: whether it answers requests for GIMBAL_MANAGER_INFORMATION.
     :ivar reports: whether it sends GIMBAL_MANAGER_STATUS.
     :ivar streams: whether it does so without a request.
-    :ivar applies: whether it does what it accepts.
+    :ivar applies: whether it executes the commands that it accepts.
     :ivar answers: whether it acknowledges commands.
-    :ivar received: the setpoints that came.
+    :ivar received: the received setpoints.
     """
 
     address: mav.Address = AUTOPILOT
@@ -100,7 +100,7 @@ class FakeManager:
             number if self.attitude_number is None else self.attitude_number)
 
     def sent_each(self, tenth: int) -> list[tuple[mav.Address, mav.Message]]:
-        """Return what it sends in a tenth of a second: heartbeats 1 Hz, statuses 5 Hz."""
+        """Return its messages of a tenth of a second: heartbeats 1 Hz, statuses 5 Hz."""
         sent: list[tuple[mav.Address, mav.Message]] = []
         if self.alive and tenth % 10 == 0:
             sent.append((self.address, mav.Heartbeat(2, self.autopilot, 0, 0, 4, 3)))
@@ -226,7 +226,7 @@ class Rig:
         return self
 
     def _exchange(self) -> None:
-        # As the link does, so that a missing deadline shows.
+        # Poll at deadlines only, as the link does, so that a missing deadline shows.
         if self.now >= self.component.next_deadline():
             self.component.poll(self.now)
         outgoing = self.component.outgoing
@@ -279,7 +279,7 @@ def keys(rig: Rig) -> Sequence[GimbalKey]:
 
 
 def in_control(**fields: Any) -> Rig:
-    """Return a client that controls a gimbal; ``fields`` are of its settings."""
+    """Return a client that controls a gimbal; ``fields`` are those of its settings."""
     rig = Rig(FakeManager(primary=OURS), **fields).run(4.0)
     assert rig.gimbal.in_control
     return rig

@@ -38,9 +38,9 @@ class Interface:
 
 def interface(ros: Ros, node: str, last: Sequence[str]) -> Interface:
     """
-    Return what a node in the root namespace has.
+    Return the interface of a node in the root namespace.
 
-    :param last: the names with which all of it is known.
+    :param last: the names whose discovery completes it.
     """
     def found() -> Interface | None:
         graph = ros.node

@@ -44,7 +44,7 @@ T = TypeVar('T')
 
 class _Recorder(FakeLight):
     """
-    A fake light that keeps what it got, and can answer late.
+    A fake light that keeps received messages, and can answer late.
 
     :ivar held: commands that are not taken until they are released, by MAV_CMD.
     """
@@ -71,11 +71,11 @@ class _Recorder(FakeLight):
 
 class ServedLight:
     """
-    A light that does what a test says, over real UDP, by the slow clock of :mod:`support.slow`.
+    A light that a test controls, over real UDP, by the slow clock of :mod:`support.slow`.
 
     The attributes of ``fake`` (see :class:`~.fake_light.FakeLight`) may be set at any time.
 
-    :param link: what it is served by, a plain Link for a light that lives by the usual clock.
+    :param link: the class of its link; a plain Link uses the clock of the machine.
     """
 
     def __init__(self, port: int, source: Address = LIGHT, *, link: type[Link] = SlowLink,
@@ -93,19 +93,19 @@ class ServedLight:
         self.vanish()
 
     def serve(self) -> None:
-        """Come within hearing."""
+        """Open the link."""
         if self._link is None:
             self._link = EndpointLink(
                 f'udpout://127.0.0.1:{self.port}', self.fake, kind=self._kind)
 
     def vanish(self) -> None:
-        """Go, as a light whose cable is pulled."""
+        """Close the link, as when a cable is pulled."""
         if self._link is not None:
             self._link.stop()
             self._link = None
 
     def behave(self) -> None:
-        """Do from now on what a good light does."""
+        """Accept and apply all commands from now on."""
         self.fake.results.clear()
         self.fake.held.clear()
         self.fake.applies = True
@@ -116,15 +116,15 @@ class ServedLight:
         self.fake.stream = STREAM
 
     def do(self, action: Callable[[float], T]) -> T:
-        """Have ``action(now)`` called in the light's thread and return what it returns."""
+        """Call ``action(now)`` in the light's thread, and return its result."""
         assert self._link is not None
         return self._link.ask(action)
 
     def report(self, **fields: Any) -> float:
         """
-        Send one status, some fields of which have changed without anybody asking.
+        Send one status with fields that have changed without a command.
 
-        Return its uptime, s; that of no status before is the same.
+        :return: its uptime, s, which differs from that of every earlier status.
         """
         def act(now: float) -> float:
             self.fake.fields |= fields
@@ -141,11 +141,11 @@ class ServedLight:
     def acknowledge(
         self, command: int, result: int, *, progress: int = 0, source: Address = LIGHT,
     ) -> None:
-        """Send an acknowledgement of its own accord."""
+        """Send an acknowledgement without a command."""
         self.send(CommandAck(command, result, progress, 0, 0, 0), source)
 
     def release(self, command: int) -> None:
-        """Take now what ``fake.held`` has, and hold back no more."""
+        """Take the held commands of this kind, and hold back no further ones."""
         self.do(lambda now: self.fake.release(command, now))
 
     def forget(self) -> None:
@@ -153,11 +153,11 @@ class ServedLight:
         self.fake.received.clear()
 
     def commands(self, command: int) -> list[Any]:
-        """Return those of the received commands that are of one kind."""
+        """Return the received commands of one kind."""
         return [message for message in list(self.fake.received) if message.command == command]
 
     def wait_for(self, command: int, count: int = 1) -> list[Any]:
-        """Wait until a command has come ``count`` times, and return its receptions."""
+        """Wait until a command has arrived ``count`` times, and return the received ones."""
         self.fake.received.wait_for(lambda message: message.command == command, count=count)
         return self.commands(command)
 

@@ -50,7 +50,7 @@ class Talker(Endpoint):
     :ivar heard: source and message, in order.
     :ivar receivers: the thread that each of them came in.
     :ivar announcements: when the link was opened or a new peer was heard, s.
-    :ivar turns: how often the link's thread has gone round.
+    :ivar turns: the number of turns of the link's thread.
     """
 
     messages = tuple(HANDLED.values())
@@ -88,10 +88,10 @@ class Talker(Endpoint):
 
 class EndpointLink(Generic[E]):
     """
-    A link and its events; as a context it ends with that.
+    A link and its events; as a context manager it stops the link at the end.
 
     :param on_event: called with each event, after it was noted.
-    :param kind: of the link, such as one that lives by another clock.
+    :param kind: the class of the link, such as one with another clock.
     :ivar events: the events that the link has reported.
     """
 
@@ -134,7 +134,7 @@ class EndpointLink(Generic[E]):
         return self.ask(self.link.snapshot)
 
     def stop(self) -> None:
-        """End it, and wait for its threads."""
+        """Stop the link, and wait for its threads."""
         self.link.stop(PATIENCE)
 
     def __enter__(self: L) -> L:
@@ -164,9 +164,9 @@ class Lights(EndpointLink[Any]):
 
 class Bridge(EndpointLink[Client]):
     """
-    The drone's side on a link, without ROS.
+    The bridge's side of a link, without ROS.
 
-    :param settings: such as how long a light is waited for.
+    :param settings: those of the client, such as the heartbeat timeout.
     :ivar lights: ``connected`` or ``lost``, and the light, in order.
     """
 
@@ -183,7 +183,7 @@ class Bridge(EndpointLink[Client]):
             self.lights.append((kind, self.endpoint.lights[event.address]))
 
     def wait_connected(self, count: int = 1) -> Light:
-        """Return the light that was connected the count-th time."""
+        """Wait for the count-th connection of a light, and return the light."""
         return self.lights.wait_for(lambda entry: entry[0] == 'connected', count=count)[1]
 
     def enable(self, on: bool, light: Light | None = None) -> Result:

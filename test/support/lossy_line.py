@@ -38,12 +38,12 @@ from support.records import Answer
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 COMMANDS = 400
-# s; more than the longest delay of a line, and then a status of each light.
+# s; more than the longest delay of a line, plus the period of statuses.
 QUIET = 6.0
-# s by which a sending time that is told from an uptime may be wrong here.
+# s by which a sending time that follows from an uptime may be wrong here.
 UPTIME_ERROR = 0.05
 CONFIRMED = 'confirmed'
-# The answers that a user may get, and texts that they contain. CONFIRMED is the one success.
+# The answers that a user may get, and texts that they contain. Only CONFIRMED is a success.
 OUTCOMES = {
     CONFIRMED: 'confirmed by ILLUMINATOR_STATUS',
     'not acknowledged': 'no acknowledgement',
@@ -107,7 +107,7 @@ class Request:
 
     @property
     def outcome(self) -> str:
-        """Return which of :data:`OUTCOMES` the answer is, '' if it is none of them."""
+        """Return the key of :data:`OUTCOMES` of the answer, '' for another answer."""
         name = next((name for name, text in OUTCOMES.items() if text in self.message), '')
         return name if self.answer.result.success is (name == CONFIRMED) else ''
 
@@ -120,9 +120,9 @@ class Request:
 
 class User:
     """
-    One user of one light: asks for something, waits for the answer, and asks again.
+    One user of one light, who sends a request, waits for the answer, and sends another one.
 
-    :ivar due: when it does the next thing, or later if it is still waiting then.
+    :ivar due: when it acts next, or later if it still waits then.
     """
 
     def __init__(
@@ -136,11 +136,11 @@ class User:
 
     @property
     def idle(self) -> bool:
-        """Whether it waits for no answer."""
+        """Whether it does not wait for an answer."""
         return not self.requests or not self._waits or bool(self.requests[-1].answer.results)
 
     def act(self) -> None:
-        """Ask for something."""
+        """Send a request."""
         if self.kind == ON_OFF:
             values: dict[str, Any] = {'enabled': self.draw.random() < 0.5}
             answer = self.pair.ask_enable(values['enabled'], self.light)
@@ -160,14 +160,14 @@ class Run:
     Users of two lights over a line, until there are enough requests, all answered.
 
     :param there: the faults of the line towards the lights; ``back`` towards the bridge.
-    :param impatience: the share of requests whose answer their user does not wait for.
+    :param impatience: the share of requests after which the user does not wait for the answer.
     """
 
     def __init__(
         self, there: Faults, back: Faults, seed: str, *, commands: int = COMMANDS,
         behaviour: IlluminatorBehaviour = FAULTLESS, impatience: float = 0.0,
     ) -> None:
-        # Lights that stay as bright as they are told: heat is the subject of another test.
+        # Disable heating, so that lights keep the commanded brightness.
         self.pair = pair = Pair(
             [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperties(rise=0.0),
                                    behaviour=behaviour) for one in (243, 244)],
@@ -193,7 +193,7 @@ class Run:
         return Counter(request.outcome for request in self.requests)
 
     def untruths(self) -> Iterator[str]:
-        """Mend the line, and yield what is not true in the answers and in the state shown."""
+        """Mend the line, and yield each untruth in the answers and in the shown state."""
         for request in self.requests:
             if wrong := self._untruth(request):
                 yield f'{wrong}: {request.light.address} {request.answer}'
@@ -207,7 +207,7 @@ class Run:
                 yield f'{address} is taken for a light that restarted, or for several'
 
     def _untruth(self, request: Request) -> str:
-        """Return what is not true in the answer to a request, '' if all is."""
+        """Return the untruth in the answer to a request, '' if it is true."""
         answer, outcome = request.answer, request.outcome
         matches = self._witnesses[request.light.address].matches(
             request.values, answer.asked_at - UPTIME_ERROR * (outcome != CONFIRMED),

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-One message of each kind that is handled.
+One message of each handled kind.
 
-No field is at its default, and float32 has each number exactly.
+No field has its default, and each number is exact in float32.
 """
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
@@ -38,10 +38,10 @@ EVERY_MESSAGE = (
     STATUS,
     INFORMATION,
 )
-# The classes of these, by message id.
+# The classes of these messages, by message id.
 HANDLED: dict[int, type[mav.Message]] = {message.id: type(message) for message in EVERY_MESSAGE}
 
 
 def decode_payload(message_id: int, payload: bytes) -> mav.Message:
-    """Return the message of a payload, of whichever class of :data:`HANDLED`."""
+    """Return the message of a payload; its class is the one of :data:`HANDLED`."""
     return messages.decode_payload(HANDLED[message_id], payload)

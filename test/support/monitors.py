@@ -31,7 +31,7 @@ from support.waiting import PATIENCE
 
 
 class Watching:
-    """A monitor that looks at the domain of a ROS client, by the slow clock."""
+    """A monitor in the domain of a ROS client, by the slow clock."""
 
     def __init__(self, ros: Ros) -> None:
         self._node = Node('monitor', context=ros.context, enable_rosout=False,
@@ -39,7 +39,7 @@ class Watching:
         self._monitor = Monitor(self._node, CLOCK)
 
     def close(self) -> None:
-        """End it."""
+        """End the monitor."""
         self._monitor.end()
         self._node.destroy_node()
 
@@ -49,27 +49,27 @@ class Watching:
         return [light.name for light in self._monitor.lights()]
 
     def light(self, name: str = '/illuminator') -> Light:
-        """Return what is known of a light."""
+        """Return the known state of a light."""
         [light] = [light for light in self._monitor.lights() if light.name == name]
         return light
 
     def wait(self, condition: Callable[[Light], Any], name: str = '/illuminator',
              timeout: float = PATIENCE) -> Light:
-        """Wait until a light is known, and as wanted; return it."""
+        """Wait until a light is known and the condition holds; return it."""
         eventually(lambda: name in self.names, within=timeout)
         eventually(lambda: condition(self.light(name)), within=timeout)
         return self.light(name)
 
     def wait_names(self, *names: str) -> None:
-        """Wait until these are the lights."""
+        """Wait until the monitor has exactly these lights."""
         eventually(lambda: self.names == sorted(names))
 
     def ask(self, ask: Ask, name: str = '/illuminator') -> None:
-        """Ask something of a light."""
+        """Send a request to a light."""
         self._monitor.graph.submit(name, ask)
 
     def outcome(self, text: str, outcome: Outcome, name: str = '/illuminator') -> str:
-        """Wait until a request has come out so, and return the answer."""
+        """Wait until a request has this outcome, and return the answer."""
         light = self.wait(lambda light: light.action and light.action.text == text
                           and light.action.outcome is outcome, name)
         assert light.action is not None

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A pytest plugin (``-p support.no_ros``) that makes the machine look as if it had no ROS."""
+"""A pytest plugin (``-p support.no_ros``) that simulates a machine without ROS."""
 
 from importlib.abc import MetaPathFinder
 import sys

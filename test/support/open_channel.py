@@ -46,7 +46,7 @@ class OpenChannel:
         return found
 
     def turn(self, patience: float = 0.0) -> list[tuple[Any, bytes]]:
-        """Do what there is to do, waiting for it so long at most (s); return what came."""
+        """Do the due work, waiting for ``patience`` s at most; return the received data."""
         found: list[tuple[Any, bytes]] = []
         for key, events in self.selector.select(patience):
             if events & selectors.EVENT_WRITE:
@@ -56,14 +56,14 @@ class OpenChannel:
         return found
 
     def receive_bytes(self, size: int) -> bytes:
-        """Wait for so many bytes, from anybody, and return them."""
+        """Wait for ``size`` bytes from any peer, and return them."""
         data = b''
         while len(data) < size:
             data += b''.join(piece for _, piece in self.receive())
         return data
 
     def broadcast(self, *frames: bytes, now: float = 0.0) -> None:
-        """Send frames to everybody."""
+        """Send frames to all peers."""
         self.channel.send(frames, self.channel.peers(now))
 
     def close(self) -> None:

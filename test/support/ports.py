@@ -22,21 +22,21 @@ import itertools
 import random
 import socket
 
-# Above the ports that Linux gives to sockets which are bound to none, or connected: nothing takes
-# one of these by chance between the moment that a test gets it and that a program binds it. The
-# ports of ROS domains lie below.
+# Ports above those that Linux assigns to sockets by itself: no other socket gets one of them
+# between the moments when a test claims it and when a program binds it. The ports of ROS domains
+# are below.
 FIRST, END = 61_000, 65_536
-# Ports for one process of tests; a port comes again after so many others.
+# Ports for one process of tests; a port is reused after so many others.
 BLOCK = 64
 # Domains up to 101 have ports below the ephemeral ones.
 DOMAINS = range(1, 102)
 
 
 def _claim(name: str) -> socket.socket:
-    """Return what holds a name for this process; an OSError if another one holds it."""
+    """Return a socket that claims a name; raise OSError if another process holds it."""
     claim = socket.socket(socket.AF_UNIX)
     try:
-        # A name in the kernel and not a file: it goes with the process, however that ends.
+        # The name is in the kernel and not a file, so it ends with the process in any case.
         claim.bind(f'\0illuminator_ros_test_{name}')
     except OSError:
         claim.close()
@@ -45,7 +45,7 @@ def _claim(name: str) -> socket.socket:
 
 
 def _shuffled(numbers: range) -> list[int]:
-    """Return numbers in any order: others have no reason to want the same first."""
+    """Return numbers in random order, so that processes try different ones first."""
     return random.SystemRandom().sample(numbers, len(numbers))
 
 
@@ -61,7 +61,7 @@ class _Block:
         raise RuntimeError('all ports for tests are claimed')
 
 
-# Here and not when it is needed: tests count the descriptors that are left open.
+# Open it here and not on demand: tests count the open descriptors.
 _BLOCK = _Block()
 
 

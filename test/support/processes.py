@@ -39,7 +39,7 @@ class Program:
     """
     A process whose output, standard output and error together, can be waited for.
 
-    :param forked: the command is the name of a module of ours and its arguments.
+    :param forked: whether the command is a module of this package and its arguments.
     """
 
     def __init__(self, *command: str, env: Mapping[str, str] | None = None,
@@ -62,7 +62,7 @@ class Program:
 
     @property
     def lines(self) -> list[str]:
-        """All complete lines printed until now, including lines not yet read."""
+        """Return all complete lines printed so far, including lines not yet read."""
         with self._grown:
             while self._take():
                 # The thread that reads gets none of it.
@@ -71,13 +71,13 @@ class Program:
 
     @property
     def log(self) -> str:
-        """All that was printed until now."""
+        """Return the complete output so far."""
         return ''.join(self.lines)
 
     def _read(self) -> None:
         going = True
         while going:
-            # Without the lock, which others want meanwhile.
+            # Wait without the lock, which other threads may need meanwhile.
             select.select([self._output], [], [])
             with self._grown:
                 going = self._take() or not self._ended
@@ -85,7 +85,7 @@ class Program:
         os.close(self._output)
 
     def _take(self) -> bool:
-        """Take what has been printed; return whether there was anything."""
+        """Take the printed output; return whether there was any."""
         if self._ended or not select.select([self._output], [], [], 0.0)[0]:
             return False
         data = os.read(self._output, 65536)
@@ -122,7 +122,7 @@ class Program:
         return self.wait()
 
     def kill(self) -> None:
-        """End it if it still runs, whatever it does."""
+        """Kill the process if it still runs."""
         if self._process.poll() is None:
             self._process.kill()
         self.wait()
@@ -174,7 +174,7 @@ def _can_be_forked(env: Mapping[str, str] | None) -> bool:
 
 
 def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
-    """Start a module of ours."""
+    """Start a module of this package."""
     if _can_be_forked(env):
         return Program(module, *arguments, env=env, forked=True)
     return start_interpreter(module, *arguments, env=env)
@@ -183,12 +183,12 @@ def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -
 def start_interpreter(
     module: str, *arguments: str, env: Mapping[str, str] | None = None,
 ) -> Program:
-    """Start a module of ours as users do: nothing is imported yet."""
+    """Start a module of this package in a new interpreter, as users do."""
     return Program(sys.executable, '-m', module, *arguments, env=env)
 
 
 def slow_python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
-    """Start a module of ours that lives by the tests' slow clock, see :mod:`support.slow`."""
+    """Start a module of this package by the tests' slow clock, see :mod:`support.slow`."""
     from support.slow import CLOCK
     return python('support.slow_program', module, *arguments,
                   env={**CLOCK.environment, **(env or {})})
@@ -199,9 +199,9 @@ def run(
     redirection: str = '',
 ) -> subprocess.CompletedProcess[str]:
     """
-    Run a module of ours to its end; return its exit status and output.
+    Run a module of this package to its end; return its exit status and output.
 
-    :param typed: what it reads from standard input.
+    :param typed: the text on its standard input.
     :param redirection: of a shell, such as ``> /dev/full``.
     """
     forked = _can_be_forked(env) and not redirection

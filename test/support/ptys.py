@@ -36,7 +36,7 @@ class PtyDevice:
         self.plug_in()
 
     def plug_in(self) -> None:
-        """Make the device appear, another one than before."""
+        """Make a new device appear."""
         far, near = os.openpty()
         name = os.ttyname(near)
         os.close(near)
@@ -60,7 +60,7 @@ class PtyDevice:
             data = data[os.write(self._far, data):]
 
     def read(self, patience: float = PATIENCE) -> bytes:
-        """Return what has been sent to the device; b'' if nothing comes."""
+        """Return the bytes sent to the device; b'' if none arrive in time."""
         if not select.select([self._far], [], [], patience)[0]:
             return b''
         try:

@@ -37,7 +37,7 @@ class Recorder(Log[Any]):
         return [message.data for message in self]
 
     def wait(self, wanted: Callable[[Any], Any] = lambda message: True, count: int = 1) -> Any:
-        """Wait until ``count`` messages are as wanted, and return the last of them."""
+        """Wait for ``count`` messages with a property, and return the last of them."""
         return self.wait_for(wanted, count=count)
 
     def wait_value(self, value: Any) -> None:
@@ -46,7 +46,7 @@ class Recorder(Log[Any]):
 
 
 class Call:
-    """A service call that is under way."""
+    """A service call in progress."""
 
     def __init__(self, future: Any) -> None:
         self._future = future

@@ -63,7 +63,7 @@ class Recorder:
 
 @dataclass
 class Answer:
-    """The results of a request, of which there should be one."""
+    """The results of a request, which should have exactly one."""
 
     asked_at: float
     results: list[Result] = field(default_factory=list)

@@ -15,8 +15,8 @@
 """
 pymavlink's generator as an oracle.
 
-It makes classes of the definitions below, which pymavlink's wheels lack, for their own parser and
-encoder.
+It generates classes from the definitions below, which pymavlink's wheels lack, for the parser and
+encoder of pymavlink.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Peer:
     """
     A component that runs on pymavlink alone.
 
-    :param key: 32 bytes, with which it signs and which it asks for; None for no signing.
+    :param key: 32 bytes; it signs with this key and requires it; None for no signing.
     :param timestamp: of the next frame that it signs.
     """
 
@@ -110,12 +110,12 @@ class Peer:
         return bytes(message.pack(self.mavlink, force_mavlink1=version == 1))
 
     def decode(self, data: bytes) -> list[Any]:
-        """Return the messages that it reads, those that it refuses as BAD_DATA."""
+        """Return the messages that it reads; a refused one is BAD_DATA."""
         return self.mavlink.parse_buffer(data) or []
 
 
 def twin(message: Any) -> Any:
-    """Return a message of ours as one of the :func:`reference` dialect."""
+    """Return a message of this package as one of the :func:`reference` dialect."""
     return reference().mavlink_map[message.id](**dataclasses.asdict(message))
 
 

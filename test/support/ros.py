@@ -46,7 +46,7 @@ def own_domain() -> Iterator[int]:
     """Yield a ROS domain that no other process on this machine uses."""
     with claimed_domain() as domain:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        # The first name is that of Fast DDS 2, which Jazzy has, the second that of Fast DDS 3.
+        # Fast DDS 2, which Jazzy has, reads the first name; Fast DDS 3 reads the second one.
         for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
             os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
@@ -76,7 +76,7 @@ class Ros(SpunNode):
         return recorder
 
     def _publishing_nodes(self, topic: str) -> list[str]:
-        """Return the full names of those who publish a topic; none while one is not known yet."""
+        """Return the full names of the publishers of a topic; none while one is unknown."""
         found = self.node.get_publishers_info_by_topic(topic)
         if any('UNKNOWN' in info.node_name for info in found):
             return []
@@ -99,14 +99,14 @@ class Ros(SpunNode):
 
     def meet(self, node: str) -> None:
         """
-        Make sure that a node knows what we have just created.
+        Make sure that a node has discovered the entities that this node has just created.
 
-        Discovery on our side does not prove that. Our entities are announced in order, so a node
-        that answers a client knows every entity created before it.
+        Discovery on this side does not prove that. Entities are announced in order, so a node that
+        answers a client has discovered every entity created before it.
         """
         client = self.node.create_client(srv.GetParameters, f'{node}/get_parameters')
         eventually(client.service_is_ready)
-        # The first questions may get lost: they may come before it is known where from.
+        # The first requests may get lost: they may precede the discovery of the client.
         while not Call(client.call_async(srv.GetParameters.Request())).answers_within(0.5):
             pass
         self.node.destroy_client(client)
@@ -115,7 +115,7 @@ class Ros(SpunNode):
         client, met = self._clients.get(service, (None, set()))
         now = self._incarnations(node)
         if client is None or not now or not now <= met:
-            # The old one is left alone: it may still wait for an answer.
+            # Keep the old client: it may still wait for an answer.
             client = self.node.create_client(type_, service)
             eventually(client.service_is_ready)
             self.meet(node)
@@ -123,7 +123,7 @@ class Ros(SpunNode):
         return client
 
     def _incarnations(self, node: str) -> set[bytes]:
-        """Return what tells the nodes of this name from one that had it before a restart."""
+        """Return ids that distinguish nodes of this name from those before a restart."""
         return {bytes(info.endpoint_gid)
                 for info in self.node.get_publishers_info_by_topic('/rosout')
                 if f'{info.node_namespace.rstrip("/")}/{info.node_name}' == node}
@@ -143,15 +143,15 @@ class Ros(SpunNode):
         return answer
 
     def refresh(self, node: str = '/illuminator') -> Trigger.Response:
-        """Have a light report again and return the answer."""
+        """Call ``~/refresh`` and return the answer."""
         answer: Trigger.Response = self.call(Trigger, f'{node}/refresh', Trigger.Request())
         return answer
 
     def catch_up(self, node: str = '/illuminator') -> None:
         """
-        Wait until a node has processed every message that its light has sent until now.
+        Wait until a node has processed every message that its light has sent so far.
 
-        All that it has published of them has been taken, too.
+        This client has then taken every resulting message, too.
         """
         answer = self.refresh(node)
         assert 'ILLUMINATOR_STATUS: received' in answer.message, answer.message
@@ -159,16 +159,16 @@ class Ros(SpunNode):
 
     def synchronize(self, node: str = '/illuminator') -> None:
         """
-        Wait until a node has taken what we have published, and we what it has published.
+        Wait until a node and this client have taken all messages that the other has published.
 
-        An executor may take an answer before a message that came just before it, therefore twice.
-        An empty set goes through the node's executor and the thread of its link.
+        An executor may take an answer before a message that arrived just earlier, so call twice.
+        An empty set passes through the node's executor and the thread of its link.
         """
         for _ in range(2):
             self.call(srv.SetParameters, f'{node}/set_parameters', srv.SetParameters.Request())
 
     def outlast(self, seconds: float, others: Iterable[str]) -> None:
-        """Let time pass so slowly that the lights of all these nodes are heard meanwhile."""
+        """Let time pass so slowly that the lights of all these nodes stay connected."""
         while seconds > 0:
             CLOCK.forward(min(seconds, 0.5))
             seconds -= 0.5
@@ -211,7 +211,7 @@ class Parameters:
         return [parameter_value_to_python(value) for value in response.values]
 
     def types(self, *names: str) -> list[int]:
-        """Return the types that get_parameter_types tells."""
+        """Return the types by get_parameter_types."""
         call = self.start(srv.GetParameterTypes, 'get_parameter_types', names=names)
         return list(call.result().types)
 
@@ -275,7 +275,7 @@ def start_slow_bridge(domain: int, port: int, *arguments: str, **parameters: Any
 def running_bridge(
     domain: int, port: int, *arguments: str, until: str = 'link open', **parameters: Any,
 ) -> Iterator[Program]:
-    """Run the bridge, by the slow clock; it must end as it promises, and have no traceback."""
+    """Run the bridge, by the slow clock; it must end with status 0 and without a traceback."""
     with ended(start_slow_bridge(domain, port, *arguments, **parameters)) as bridge:
         bridge.wait_for(until)
         yield bridge
@@ -283,6 +283,6 @@ def running_bridge(
 
 @contextlib.contextmanager
 def running_simulator(*arguments: str) -> Iterator[Program]:
-    """Run the simulator by the same clock, with the same promises for its end."""
+    """Run the simulator by the same clock, with the same conditions for its end."""
     with ended(slow_python('illuminator_ros.simulator', *arguments)) as simulator:
         yield simulator

@@ -94,9 +94,9 @@ class TwoDevices:
 
 class SharedAddress(Endpoint):
     """
-    Lights behind one component, as those of ArduSub: each reports, and the component answers.
+    Lights behind one component, as in ArduSub: each reports, and the component answers.
 
-    :param lights: all of the same address; commands reach all of them.
+    :param lights: lights with one address; commands reach all of them.
     :param offset: s by which the statuses of each come after those of the one before.
     """
 

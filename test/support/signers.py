@@ -45,6 +45,6 @@ def checker(mode: SigningMode = SigningMode.REQUIRE, *, timestamp: int = 0,
 
 
 def signed_frame(stamp: int, **options: Any) -> bytes:
-    """Return the bytes of such a frame."""
+    """Return the bytes of a signed frame."""
     frame = signed(stamp, **options)
     return frame.signed_part + (frame.signature or b'')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Simulated lights made of their properties, without the settings of the simulator."""
+"""Simulated lights from their properties, without the settings of the simulator."""
 
 from __future__ import annotations
 

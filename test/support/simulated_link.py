@@ -32,7 +32,7 @@ from illuminator_ros.mavlink.url import HostPort, UdpUrl
 
 Datagram = tuple[bytes, Any]
 URL = UdpUrl(HostPort('127.0.0.1', 0))
-# Turns of the link without anything coming in or time passing: more, and its thread would spin.
+# Turns of the link without input and without passing time; with more its thread would spin.
 MAX_IDLE_TURNS = 200
 
 
@@ -56,7 +56,7 @@ class _Socket:
 
 
 class _Selector(selectors.BaseSelector):
-    """Finds what is in the inbox, and lets time pass where there is nothing."""
+    """Finds data in the inbox, and lets time pass if it is empty."""
 
     def __init__(self, link: SimulatedLink) -> None:
         self._link = link
@@ -86,7 +86,7 @@ class _Selector(selectors.BaseSelector):
 
 
 class _FromZero(dict[Address, int]):
-    """Sequence numbers that begin with 0, so that the same run gives the same bytes."""
+    """Sequence numbers that begin with 0, so that equal runs give equal bytes."""
 
     def get(self, key: Address, default: Any = None) -> Any:
         return super().get(key, 0)
@@ -94,9 +94,9 @@ class _FromZero(dict[Address, int]):
 
 class SimulatedLink(Link):
     """
-    A link over UDP whose turns are taken one by one; a fault in it is raised, not logged.
+    A link over UDP with single turns; it raises an exception instead of logging it.
 
-    :param take: called with what it sends, and to whom.
+    :param take: called with each sent datagram and its peer.
     :ivar now: s.
     :ivar meanwhile: called once each when the link waits, as other threads would.
     """
@@ -130,7 +130,7 @@ class SimulatedLink(Link):
             self._run_once()
 
     def ask(self, function: Callable[[float], Any]) -> None:
-        """Have a function called as other threads do."""
+        """Call a function as other threads do."""
         self.call(function)
         self.until = self.now
         self._run_once()

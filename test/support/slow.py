@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Time that hardly passes by itself, for what runs in other processes too.
+A slow clock, which several processes share.
 
-Lights and bridges of the tests live by a clock that is slow, so that a machine which stands still
-for a second makes nothing time out; a test that wants something to time out sets it forward.
+Lights and bridges of the tests use this clock, so that a pause of the machine for a second does
+not cause a time-out. A test that needs a time-out sets the clock forward.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from support.waiting import eventually
 SPEED = 0.05
 # Real s after which a sleeping link looks at the clock again: it may have been set forward.
 LOOK_INTERVAL = 0.05
-# s on the clock at its beginning: 0 as a time is found out.
+# s; the initial time: not 0, so that a wrong use of 0 as a time shows.
 START = 1000.0
 VARIABLE = 'ILLUMINATOR_ROS_TEST_CLOCK'
-# Links at a time that live by the clock.
+# Links that use the clock at a time.
 LINKS = 256
 # Bytes of a number in the file.
 SIZE = 8
@@ -50,12 +50,12 @@ SIZE = 8
 
 class SlowClock:
     """
-    A clock that all who open the same file share.
+    A clock that all processes with the same file share.
 
     The file has the time by which the clock was set forward, and for each link a process id, 0
     for none, and the time up to which the link has done its work.
 
-    :ivar path: of the file.
+    :ivar path: the path of the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -71,7 +71,7 @@ class SlowClock:
 
     @property
     def ahead(self) -> float:
-        """Return by how much it was set forward, s."""
+        """Return the time by which it was set forward, s."""
         return self._ahead[0]
 
     def forward(self, seconds: float) -> None:
@@ -86,12 +86,12 @@ class SlowClock:
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """Return what tells another process of this clock."""
+        """Return the environment variables that give another process this clock."""
         return {VARIABLE: str(self.path)}
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:
-        # A lock of a file is one of the whole process.
+        # A file lock belongs to the whole process.
         with self._lock:
             fcntl.lockf(self._file, fcntl.LOCK_EX)
             try:
@@ -134,7 +134,7 @@ def _runs(pid: int) -> bool:
 def _open_clock() -> SlowClock:
     if path := os.environ.get(VARIABLE):
         return SlowClock(Path(path))
-    # A file in memory: it goes with the last process that has it, however that ends.
+    # A file in memory, which ends with the last process that has it open.
     descriptor = os.memfd_create('clock of tests')
     os.ftruncate(descriptor, SIZE * (1 + 2 * LINKS))
     return SlowClock(Path(f'/proc/{os.getpid()}/fd/{descriptor}'))
@@ -145,7 +145,7 @@ CLOCK = _open_clock()
 
 def pass_time_until(condition: Callable[[], Any], step: float = 1.0) -> None:
     """
-    Let time pass until something is so.
+    Let time pass until a condition holds.
 
     A step is over when all links have done the work that was due in it, and have received the
     frames that were sent before it. So a frame takes one step at most, however busy the machine
@@ -179,7 +179,7 @@ def time_passes() -> Iterator[None]:
 
 
 class _SlowSelector(selectors.DefaultSelector):
-    """Waits for real time in place of slow time, and tells the clock that a link waits."""
+    """Waits for real time in place of slow time, and notes in the clock that a link waits."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -205,7 +205,7 @@ class _SlowSelector(selectors.DefaultSelector):
 
 
 class SlowLink(Link):
-    """A link that lives by the slow clock."""
+    """A link that uses the slow clock."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, clock=CLOCK, **named)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Run a module of ours that lives by the clock of :mod:`support.slow`."""
+"""Run a module of this package by the clock of :mod:`support.slow`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ import signal
 import sys
 from typing import Any
 
-# Where each of them has what it makes that has a clock: a link, or a monitor.
+# Program -> the module that constructs its objects with a clock: links, or a monitor.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.bridge',
           'illuminator_ros.gimbal': 'illuminator_ros.ros.bridge',
           'illuminator_ros.rededge': 'illuminator_ros.ros.bridge',
@@ -33,8 +33,8 @@ PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.bridge',
 
 def main(module: str) -> None:
     """Run a module with the rest of the command line."""
-    # As the module does before its imports: no thread that starts meanwhile may take a
-    # signal.
+    # Block signals before the imports, as the module does: threads that start during the imports
+    # must not take them.
     signal.pthread_sigmask(signal.SIG_BLOCK, (
         signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT))
     from support.slow import CLOCK, SlowLink
@@ -44,7 +44,7 @@ def main(module: str) -> None:
         place.Link = SlowLink
     if hasattr(place, 'Monitor'):
         place.Monitor = partial(place.Monitor, clock=CLOCK)
-    # An orderly end on a busy machine may take longer.
+    # An orderly end may take longer on a busy machine.
     import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):
         place.OFF_LIMIT = PATIENCE / 2

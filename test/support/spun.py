@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A ROS node that is spun in a thread, so that whatever is waited for comes by itself."""
+"""A ROS node that is spun in a thread, so that tests can wait for its messages."""
 
 from __future__ import annotations
 

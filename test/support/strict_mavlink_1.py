@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A MAVLink 1 parser that accepts nothing else, and no length but the defined one.
+A MAVLink 1 parser that accepts nothing else, and only the defined lengths.
 
 pymavlink cannot see extension bytes in MAVLink 1 frames, which strict receivers drop.
 """

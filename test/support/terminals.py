@@ -71,11 +71,11 @@ class Terminal:
 
     @property
     def raw(self) -> str:
-        """All that was written so far."""
+        """Return the complete output so far."""
         return self._raw.decode('utf-8', errors='replace')
 
     def resize(self, lines: int, columns: int) -> None:
-        """Have another size."""
+        """Set the size of the terminal."""
         fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
 
     def type(self, text: str) -> None:  # noqa: A003
@@ -88,7 +88,7 @@ class Terminal:
             self._raw = b''
 
     def wait_for(self, pattern: str, timeout: float = PATIENCE) -> None:
-        """Wait until text like this has been written, spaces being as good as any number."""
+        """Wait until matching text has been written; a space matches any number of them."""
         def found() -> bool:
             return bool(re.search(pattern, ' '.join(_CONTROL.sub('', self.raw).split())))
 
@@ -100,7 +100,7 @@ class Terminal:
         self._process.send_signal(number)
 
     def hang_up(self) -> None:
-        """Be gone, as a window that is closed."""
+        """Hang up, as when a window is closed."""
         self._gone = True
         # The answer to the key ends the reader, which holds the terminal open.
         self.type('?')
@@ -114,7 +114,7 @@ class Terminal:
 
     @property
     def restored(self) -> bool:
-        """Whether the terminal behaves as it did before, and shows what it showed."""
+        """Whether the terminal has its former settings and its former screen."""
         now = termios.tcgetattr(self._slave)
         raw = self.raw
         # A missing sequence may still arrive.
@@ -135,6 +135,6 @@ class Terminal:
 
 
 def _own_terminal() -> None:
-    """Have the keys of the terminal send signals to this program, and end it with its parent."""
+    """Make this terminal the controlling one, and end the program with its parent."""
     prepare_child()
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)

@@ -24,7 +24,7 @@ from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import decode_payload
 from support.frames import Codec
 
-# s on the clock at the beginning: not 0, so that 0 as a time is found out.
+# s; the initial time: not 0, so that a wrong use of 0 as a time shows.
 START = 1000.0
 # Turns at one moment: more of them mean that a link's thread would spin.
 MAX_TURNS = 200
@@ -32,11 +32,11 @@ MAX_TURNS = 200
 
 class VirtualLink:
     """
-    Joins two endpoints as two links would.
+    Connects two endpoints as two links would.
 
     :param version: of MAVLink.
     :ivar now: s.
-    :ivar decoders: what each of them has received, first and second.
+    :ivar decoders: those of the first and the second endpoint.
     """
 
     def __init__(self, first: Endpoint, second: Endpoint, version: int = 2) -> None:
@@ -49,7 +49,7 @@ class VirtualLink:
             end.link_opened(self.now)
 
     def run_until(self, condition: Callable[[], Any], *, within: float) -> None:
-        """Let time pass until something is so; an error if that takes too long (s)."""
+        """Let time pass until a condition holds; raise an error after ``within`` s."""
         until = self.now + within
         while not condition():
             due = min(end.next_deadline() for end in self.ends)
@@ -68,7 +68,7 @@ class VirtualLink:
         self.now = until
 
     def turn(self) -> None:
-        """Do what both links' threads do in one turn."""
+        """Do the work of both links' threads in one turn."""
         for end in self.ends:
             if self.now >= end.next_deadline():
                 end.poll(self.now)

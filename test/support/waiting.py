@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Waiting for what other threads do, without sleeping."""
+"""Waiting for results of other threads, without sleeping."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from typing import Generic, TypeVar
 
 T = TypeVar('T')
 
-# s; only a broken promise takes that long, however busy the machine is.
+# s; longer than any wait of a passing test on a busy machine.
 PATIENCE = 30.0
 
 
 class Log(Generic[T]):
-    """A list that other threads append to and that can be waited for."""
+    """A list to which other threads append; a test can wait for its entries."""
 
     def __init__(self) -> None:
         self._entries: list[T] = []
@@ -59,7 +59,7 @@ class Log(Generic[T]):
         self, wanted: Callable[[T], object], *, count: int = 1, since: int = 0,
         within: float = PATIENCE,
     ) -> T:
-        """Return the count-th entry that is wanted, of those from a position on."""
+        """Return the count-th wanted entry from a position on."""
         def found() -> list[T]:
             return [entry for entry in self._entries[since:] if wanted(entry)]
 

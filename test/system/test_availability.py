@@ -38,7 +38,7 @@ from support.waiting import eventually, PATIENCE
 
 @contextlib.contextmanager
 def blocked_pipe() -> Iterator[int]:
-    """Yield the writing end of a full pipe that is never read."""
+    """Yield the write end of a full pipe that no program reads."""
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
     os.write(writing, bytes(4096))
@@ -53,7 +53,7 @@ def blocked_pipe() -> Iterator[int]:
 def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
     own_ros: Ros, port: int, light_answers: bool,
 ) -> None:
-    # Both by the clock of the machine: the bridge compares uptimes with its own time.
+    # Both use the clock of the machine: the bridge compares uptimes with its own time.
     with blocked_pipe() as output, ServedLight(port, link=Link) as light:
         process = subprocess.Popen(
             [sys.executable, '-m', 'illuminator_ros.bridge',
@@ -81,7 +81,7 @@ def test_bridge_whose_output_is_blocked_serves_and_ends_with_its_lights_off(
 def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> None:
     with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
         bridge.wait_for('connected')
-        # Each client is sent the answers to all, and keeps ten of them by default.
+        # Each client receives the answers to all clients, and keeps ten of them by default.
         clients = [own_ros.node.create_client(
             SetBool, '/illuminator/enable', qos_profile=STREAM) for _ in range(50)]
         eventually(lambda: all(client.service_is_ready() for client in clients))
@@ -90,7 +90,7 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
 
         calls = [Call(client.call_async(SetBool.Request(data=True))) for client in clients]
         light.wait_for(ON_OFF)
-        # Those for which there is no room are answered at once, the others when the light is.
+        # Calls beyond the limit are answered at once, the others when the light answers.
         eventually(lambda: any(call.answered for call in calls))
         assert 'requests are waiting' in next(
             call.result().message for call in calls if call.answered)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A bridge under attack and under load: it answers, it says what is wrong, and it ends in time."""
+"""A bridge under attack and under load: it answers, reports the cause, and ends in time."""
 
 from collections.abc import Iterator
 import signal
@@ -103,7 +103,7 @@ def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it
             for _ in range(3):
                 diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', ros.STREAM)
                 CLOCK.forward(5.0)
-                # The names are checked in the same turn.
+                # Housekeeping checks the names in the turn in which it publishes diagnostics.
                 diagnostics.wait(lambda array: str(port) in array.status[0].hardware_id)
         pass_time_until(lambda: bridge.count(went), step=5.0)
 
@@ -154,7 +154,7 @@ def test_thread_that_cannot_be_started_is_tried_again(own_ros: ros.Ros, port: in
             'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')):
         program.wait_for("can't start new thread: too many threads or processes; trying again")
         program.wait_for('light 1/243 connected')
-        # By the clock of the machine, which may stand still for longer than a confirmation takes.
+        # Retry: the clock of the machine may pause for longer than a confirmation takes.
         eventually(lambda: own_ros.enable().success)
 
 
@@ -168,5 +168,5 @@ def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: ros.Ros, p
         pass_time_until(lambda: bridge.count('light 1/244 was silent for long'), step=10.0)
 
         eventually(lambda: 'illuminator_1_244' not in own_ros.node.get_node_names())
-        # The jumps of the clock may have lost the other light until its next heartbeat.
+        # After the jumps of the clock the other light may be lost until its next heartbeat.
         eventually(lambda: own_ros.enable().success)

@@ -35,7 +35,7 @@ pytestmark = [pytest.mark.skipif(COLCON is None, reason='colcon is not installed
 
 
 def colcon(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run colcon as in a shell that knows of no package of ours."""
+    """Run colcon as in a shell without packages of this project."""
     path = {'PATH': f'{Path(sys.executable).parent}:/usr/bin:/bin'}
     return subprocess.run([str(COLCON), *arguments], cwd=workspace, text=True, timeout=120,
                           capture_output=True, env={**environment(path), 'PYTHONPATH': ''})
@@ -53,7 +53,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope='module')
 def prefix(workspace: Path) -> Path:
-    """Return where the package is installed."""
+    """Return the install prefix of the package."""
     return workspace / 'install' / 'illuminator_ros'
 
 
@@ -101,5 +101,5 @@ def test_installed_programs_find_each_other(
                         cwd=tmp_path))):
         bridge.wait_for('light 1/243 connected')
 
-        # These live by the machine's clock: where it stands still, a set may come too late.
+        # Retry: these use the clock of the machine; if it pauses, a set may be too late.
         eventually(lambda: Parameters(own_ros).set(brightness=60)[0].successful)

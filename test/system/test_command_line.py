@@ -128,7 +128,7 @@ def test_wrong_argument_is_one_line_with_status_2(
     outcome = run(f'illuminator_ros.{name}', *shlex.split(
         arguments.replace('KEYS', str(tmp_path))), env={'ROS_DOMAIN_ID': str(domain)})
 
-    # rcl may warn before.
+    # rcl may print a warning first.
     [line] = [line for line in outcome.stderr.splitlines() if not line.startswith('[WARN]')]
     assert line.startswith(f'{name}: ')
     assert text.replace('KEYS', str(tmp_path)) in line

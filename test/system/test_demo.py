@@ -20,7 +20,7 @@ import sys
 from support.processes import Program
 from support.waiting import PATIENCE
 
-# Without the flight, which has a test of its own.
+# The demonstration without the flight, which has a test of its own.
 DEMO = """
 import sys
 sys.path.insert(0, 'demo')
@@ -33,7 +33,7 @@ sys.exit(run.main())
 def test_demo_says_that_ros2_is_missing_and_ends_with_three_commands_that_run() -> None:
     demo = Program(sys.executable, '-c', DEMO, env={'PATH': '/usr/bin:/bin'})
     try:
-        # It waits for more than one event.
+        # The demonstration waits for more than one event.
         assert demo.wait(3 * PATIENCE) == 0, demo.log
     finally:
         demo.kill()

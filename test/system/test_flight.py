@@ -25,7 +25,7 @@ def test_images_of_a_flight_agree_with_the_truth(domain: int) -> None:
     flight = Program(sys.executable, 'demo/flight.py', '--seconds', '36', '--speed', '3',
                      env={'ROS_DOMAIN_ID': str(domain)})
     try:
-        # It ends by itself after less, if a program does not start.
+        # The flight ends by itself in less time if a program does not start.
         assert flight.wait(90.0) == 0, flight.log
         assert 'after the link was pulled' in flight.log
     finally:

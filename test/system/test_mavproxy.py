@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(
 
 def start_router(near: int, far: int, directory: Path) -> Program:
     """Start MAVProxy between the light's port and the bridge's."""
-    # Its other modules need far more than is installed for this.
+    # Load only the module "output": others need packages that are not installed.
     router = Program(
         sys.executable, '-u', '-m', 'MAVProxy.mavproxy', '--daemon', '--non-interactive',
         '--no-state', '--mav20', '--default-modules=output',

@@ -70,7 +70,7 @@ def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
 
 @pytest.mark.parametrize(('way', 'job'), [
     ('SIGTSTP', '"$@"'),
-    # As "ros2 run" does, another program waits for it in the same job.
+    # Another program waits for the monitor in the same job, as "ros2 run" does.
     ('\x1a', '("$@"; exit $?)'),
 ])
 def test_stopped_monitor_restores_the_terminal_until_it_continues(

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""With ``off_on_shutdown`` every light is switched off with the node, within the second it has."""
+"""With ``off_on_shutdown`` the node switches off every light at its end, within 1 s."""
 
 from collections.abc import Callable, Iterator
 import contextlib
@@ -41,7 +41,7 @@ def lit(
 
 
 def assert_goes_off(light: ServedLight) -> None:
-    # The bridge does not wait for it beyond its end.
+    # The light may go off after the end of the bridge.
     eventually(lambda: light.fake.fields['enable'] == 0)
 
 

@@ -29,7 +29,7 @@ from support.processes import ended, Program, start_interpreter
 from support.ros import bridge_arguments, Parameters, Ros
 from support.waiting import eventually
 
-# Their libraries, and one that the parser of the message generator brings.
+# Their libraries, and a library of the parser of the message generator.
 UNUSED = ('/numpy/', '/_hashlib.', '/_lzma.')
 SIGNING = """
 import sys
@@ -95,7 +95,7 @@ def test_bridge_that_serves_a_light_loads_no_library_that_it_does_not_use(
           ServedLight(port, enable=1, link=Link)):
         parameters = Parameters(own_ros)
         parameters.wait(brightness=100.0)
-        # By the clock of the machine, which may stand still for longer than a confirmation takes.
+        # Retry: the clock of the machine may pause for longer than a confirmation takes.
         eventually(lambda: parameters.set(brightness=50.0)[0].successful)
         loaded = Path(f'/proc/{bridge.pid}/maps').read_text()
 

@@ -36,7 +36,7 @@ from support.ros import bridge_arguments, Ros, start_bridge, start_slow_bridge
 from support.waiting import eventually
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-# Programs at a time; more would only measure how they wait for each other.
+# Programs at a time; with more, each would mostly wait for the others.
 AT_ONCE = 3
 # s; the default of Fast DDS.
 LEASE = 20.0
@@ -53,7 +53,7 @@ def hang(termination):
 run_program('program', hang)
 """
 
-# The thread that writes gets the processor late.
+# A program whose writing thread gets the processor late.
 BUSY = """
 import sys
 import time
@@ -79,7 +79,7 @@ sys.exit(run_program('program', fail, queued=[2]))
 
 
 def blocked(program: Program) -> set[signal.Signals]:
-    """Return the signals that a program has blocked, in order to wait for them itself."""
+    """Return the signals that a program has blocked, which one of its threads waits for."""
     with open(f'/proc/{program.pid}/status') as file:
         [mask] = [line.split()[1] for line in file if line.startswith('SigBlk:')]
     return {number for number in SIGNALS if int(mask, 16) & 1 << number - 1}
@@ -126,7 +126,7 @@ def test_program_ends_with_status_0_and_without_a_traceback(
     def run(attempt: int) -> tuple[int, str]:
         port = free_port()
         with moment(ros, port, f'case_{port}') as program:
-            # The moment of the signal is what is tested.
+            # The test varies the moment of the signal.
             threading.Event().wait(random.Random(
                 f'{moment.__name__} {number.name} {attempt}').uniform(0.0, longest))
             try:
@@ -135,7 +135,7 @@ def test_program_ends_with_status_0_and_without_a_traceback(
                 program.kill()
 
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        # SIGHUP takes the same way as SIGTERM.
+        # SIGHUP is handled like SIGTERM.
         outcomes = list(pool.map(run, range(1 if number == signal.SIGHUP else count)))
 
     for status, log in outcomes:
@@ -145,7 +145,7 @@ def test_program_ends_with_status_0_and_without_a_traceback(
 def test_node_leaves_the_graph_at_once_and_further_signals_change_nothing(
     ros: Ros, port: int,
 ) -> None:
-    # By the slow clock, so that it is not forced to end before it has left.
+    # Use the slow clock, so that the program is not forced to end before it has left the graph.
     program = start_slow_bridge(ros.domain, port, '-r', '__node:=leaving')
     program.wait_for('link open')
     eventually(lambda: 'leaving' in ros.node.get_node_names())
@@ -153,7 +153,7 @@ def test_node_leaves_the_graph_at_once_and_further_signals_change_nothing(
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
         program.send(number)
 
-    # A participant that only fell silent would be listed until its lease ends.
+    # A participant that only stops sending would be listed until its lease ends.
     eventually(lambda: 'leaving' not in ros.node.get_node_names(), within=0.9 * LEASE)
     assert (program.wait(), 'Traceback' in program.log) == (0, False)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A short soak: the long one is ``make soak``."""
+"""A short soak; ``make soak`` runs a long one."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def _has_ipv6() -> bool:
 
 @pytest.fixture(params=['127.0.0.1', '[::1]'])
 def loopback(request: pytest.FixtureRequest) -> str:
-    """Return the loopback address of either IP version, as it stands in a URL."""
+    """Return the loopback address of either IP version, as in a URL."""
     if request.param == '[::1]' and not _has_ipv6():
         pytest.skip('this machine has no ::1')
     return str(request.param)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A link in its thread: what it tells others, what faults do to it, and how it ends."""
+"""A link in its thread: its snapshots and calls, its response to faults, and its end."""
 
 from __future__ import annotations
 
@@ -88,15 +88,15 @@ def test_frames_are_logged_in_a_line_each_at_debug_level_only(
             assert any(line.startswith(said) for line in lines) == (level == logging.DEBUG)
 
 
-# Faults of ours: each is logged, and the link goes on
+# Exceptions of the endpoint and of listeners: each is logged, and the link continues
 
 class Fault(Exception):
-    """The fault that a test injects."""
+    """The exception that a test injects."""
 
 
 class Faulty(Talker):
     """
-    Fails in the method of this name, so often.
+    Fails in the method of this name, a number of times.
 
     :param deadline: of every poll, s; None for the heartbeat's.
     :ivar failures: the calls that failed.
@@ -224,7 +224,7 @@ def test_fault_while_opening_is_logged_and_tried_again(
 
 def test_connector_whose_thread_cannot_be_started_is_tried_again(
         run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    # As with a limit on the number of processes.
+    # Threads fail to start, as with a limit on the number of processes.
     monkeypatch.setattr(link_module, 'THREAD_RETRY_INTERVAL', 0.01)
     genuine, failures = threading.Thread.start, Log[str]()
 
@@ -256,7 +256,7 @@ def test_link_whose_thread_cannot_be_started_says_so_and_leaves_nothing(
     with pytest.raises(LinkThreadError, match="the label: can't start new thread for the link"):
         link.start()
     link.stop()
-    # Not as many where a thread of an earlier test has ended meanwhile.
+    # There may be fewer if a thread of an earlier test has ended meanwhile.
     wait_for_resources(*before)
 
 
@@ -291,7 +291,7 @@ def test_link_ends_in_its_own_thread_and_in_a_listener(run: Run) -> None:
 
 
 @pytest.mark.parametrize(('module', 'name', 'url', 'after'), [
-    # A name server or a host that does not answer takes long; the channel then comes late.
+    # A name server or a host that does not answer takes long, so the channel opens late.
     (socket, 'getaddrinfo', 'udpout://127.0.0.1:9', False),
     (tcp, '_connect', 'tcp://127.0.0.1:{port}', False),
     (connector_module, 'open_channel', 'udpin://127.0.0.1:{port}', True)])

@@ -32,7 +32,7 @@ from support.ptys import PtyDevice
 
 
 def reason(url: str) -> str:
-    """Return why a URL cannot be opened."""
+    """Return the reason why a URL cannot be opened."""
     with pytest.raises(OSError, match='cannot|no answer|pyserial') as caught:
         open_channel(parse_url(url))
     return caught.value.strerror or str(caught.value)
@@ -86,7 +86,7 @@ def test_serial_device_is_closed_for_other_programs_while_it_is_open(device: Pty
 def test_tcp_server_that_does_not_answer_is_given_up_in_time(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, 'CONNECT_TIMEOUT', 0.05)
-    # The queue of this server is full, so that the kernel drops what comes.
+    # The queue of this server is full, so the kernel drops connection requests.
     with bound_socket(kind=socket.SOCK_STREAM) as silent:
         silent.listen(0)
         clients = [socket.socket() for _ in range(4)]

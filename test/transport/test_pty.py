@@ -38,7 +38,7 @@ def device_of(channel: OpenChannel) -> int:
 
 
 def read(device: int, size: int = 1) -> bytes:
-    """Return what there is to read, so many bytes at least."""
+    """Return the readable bytes, at least ``size`` of them."""
     data = b''
     while len(data) < size:
         assert select.select([device], [], [], PATIENCE)[0]
@@ -89,7 +89,7 @@ def test_bytes_that_no_program_reads_are_discarded_and_the_newest_are_kept(chann
     for number in range(100):
         before = unread(device)
         one.broadcast(bytes((number,)) * 100)
-        # The kernel delivers them a little later.
+        # The kernel delivers the bytes a little later.
         eventually(lambda: unread(device) != before)  # noqa: B023 - called at once
     data = read(device)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Links and lights that are lost and return: without help, with one event each, without leaks."""
+"""Links and lights that are lost and found again: by themselves, with one event, no leaks."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ class Server:
         self._connection: socket.socket | None = None
 
     def come(self, data: bytes = heartbeat_frame()) -> None:
-        """Accept a connection and send something."""
+        """Accept a connection and send data."""
         self.listen()
         assert self._listener is not None
         self._connection = self._listener.accept()[0]
         self._connection.sendall(data)
 
     def listen(self) -> None:
-        """Listen, unless it does."""
+        """Listen, unless the server already does."""
         if self._listener is None:
             self._listener = listening_socket(port=self._port)
 
@@ -65,7 +65,7 @@ class Server:
             self._connection.close()
 
     def go(self) -> None:
-        """Close the listener first, or the link would be in its queue, and the connection."""
+        """Close the listener, then the connection, lest the link reconnects to the listener."""
         if self._listener:
             self._listener.close()
             self._listener = None
@@ -81,13 +81,13 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture
 def _unproven_without_frame(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have no channel proved for the time alone that it was open."""
+    """Prevent that a channel is proved by staying open."""
     monkeypatch.setattr(link_module, 'PROOF_TIME', 3600.0)
 
 
 @pytest.fixture
 def pauses(monkeypatch: pytest.MonkeyPatch) -> Log[float]:
-    """Return a log of the pauses before tries, which take the longest that they may be."""
+    """Return a log of the pauses before tries, which are not shortened at random."""
     log: Log[float] = Log()
 
     class Recorded(connector_module.Backoff):
@@ -186,7 +186,7 @@ def test_port_in_use_is_opened_once_it_is_free(run: live_link.Run) -> None:
 # Leaks
 
 def cycle(link: live_link.LiveLink, come: Callable[[], None], go: Callable[[], None]) -> None:
-    """Let the other side come and go, and check that no thread or descriptor is left of it."""
+    """Start and stop the other side, and check that it leaves no thread and no descriptor."""
     come()
     link.endpoint.wait_heard()
     before = live_link.resources()
@@ -235,7 +235,7 @@ def test_200_clients_of_a_tcp_server_and_udp_peers_leak_nothing(run: live_link.R
 
 # Lights behind a link
 
-# s after which a light is lost; a machine that stands still for a while loses none.
+# s after which a light is lost; longer than a pause of the machine.
 SILENCE = 30.0
 
 
@@ -251,7 +251,7 @@ def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_
         run: live_link.Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str) -> None:
     if kind == 'serial':
         pytest.importorskip('serial', reason='pyserial is not installed')
-    # No change fails because the machine stood still behind its acknowledgement.
+    # A pause of the machine after an acknowledgement must not fail a change.
     monkeypatch.setattr(request, 'CONFIRMATION_TIMEOUT', PATIENCE)
     monkeypatch.setattr(component, 'HEARTBEAT_INTERVAL', 0.05)
     clock, port = live_link.Jump(), free_port(socket.SOCK_STREAM)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The time stamps of signing go on over restarts of the program."""
+"""The time stamps of signing continue after a restart of the program."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from support.live_link import Jump, LiveLink, Run
 from support.waiting import eventually
 
 
-# Unix time, s: 1970, as a computer has it whose clock has not been set, and 2023.
+# Unix time, s: 1970, as on a computer whose clock was not set, and 2023.
 @pytest.mark.parametrize('unix_time', [0.0, 1.7e9])
 def test_link_stores_its_time_stamps_at_once_every_30_s_and_when_it_ends(
         run: Run, tmp_path: Path, unix_time: float) -> None:
@@ -39,7 +39,7 @@ def test_link_stores_its_time_stamps_at_once_every_30_s_and_when_it_ends(
                             wall_clock=lambda times=times: times[0]))
         link.wait_open()
         link.ask(lambda now: None)
-        # The file as a crash would leave it, now and after a while.
+        # The file that a crash would leave, now and after some time.
         assert store.load() > signing.timestamp > 0
         store.path.unlink()
         times[0] += STORE_INTERVAL

@@ -32,7 +32,7 @@ from support.waiting import eventually
 
 
 def assert_switched(bridge: Bridge) -> None:
-    # By the clock of the machine, which may stand still for longer than a confirmation takes.
+    # Retry: the clock of the machine may pause for longer than a confirmation takes.
     eventually(lambda: bridge.enable(True).success)
 
 

@@ -69,7 +69,7 @@ def test_queue_writes_frames_in_order_and_drops_the_oldest_whole_ones_beyond_its
             frame = number.to_bytes(2, 'big') * step
             dropped = queue.put(frame)
             waiting.append(frame)
-            # The first one may be half on the wire.
+            # Half of the first frame may be on the wire.
             del waiting[begun:begun + dropped]
             kept = sum(map(len, waiting))
             assert kept <= MAX_QUEUED or len(waiting) <= begun + 1
@@ -111,7 +111,7 @@ def reset(one: socket.socket) -> None:
 
 @pytest.fixture(params=['tcp client', 'tcp server', 'serial'])
 def stream(request: pytest.FixtureRequest, channel: Open) -> Iterator[Stream]:
-    """Return a stream of each kind, whose other side takes little that is not read."""
+    """Return a stream of each kind, whose other side buffers few unread bytes."""
     if request.param == 'serial':
         device: PtyDevice = request.getfixturevalue('device')
         yield Stream(channel(f'serial://{device.path}:57600'), device.write,
@@ -133,7 +133,7 @@ def stream(request: pytest.FixtureRequest, channel: Open) -> Iterator[Stream]:
 
 
 def test_all_bytes_go_both_ways_unchanged(stream: Stream) -> None:
-    # A terminal would act on some of them.
+    # A terminal would interpret some of them.
     every_byte, data = bytes(range(256)), b''
     stream.write(every_byte)
     stream.ours.broadcast(every_byte)
@@ -251,7 +251,7 @@ class Server:
         return client
 
     def say(self, client: socket.socket) -> Any:
-        """Let a client send something, and return the peer that it comes from."""
+        """Let a client send data, and return its peer."""
         client.sendall(b'hello')
         ((peer, received),) = self.ours.receive()
         assert received == b'hello'
@@ -294,7 +294,7 @@ def test_client_that_leaves_takes_no_other_with_it(server: Server) -> None:
 
 
 @pytest.mark.parametrize(('speaking', 'now', 'replaced'), [
-    # All speak; all but the first have not spoken; the first has been silent for long.
+    # All clients have sent; only the first one has; the first one has been silent for long.
     (MAX_CLIENTS, 0.0, None), (1, 0.0, 1), (MAX_CLIENTS, EXPIRY + 0.5, 0)])
 def test_client_beyond_the_bound_replaces_only_a_silent_one(
         server: Server, speaking: int, now: float, replaced: int | None) -> None:
@@ -354,7 +354,7 @@ def test_serial_port_is_set_as_the_url_says_with_low_latency_if_the_driver_has_i
 
 def test_bytes_that_a_line_does_not_take_do_not_delay_closing(
         channel: Open, device: PtyDevice, monkeypatch: pytest.MonkeyPatch) -> None:
-    # A pseudo-terminal closes at once; a UART under flow control waits for what is still to go.
+    # A pseudo-terminal closes at once; a UART under flow control waits until its buffer is empty.
     from serial import Serial
     steps: list[object] = []
     genuine = Serial.close

@@ -38,9 +38,9 @@ PEER = ('127.0.0.1', 14550)
 
 class Waiting(selectors.DefaultSelector):
     """
-    Waits, and tells so.
+    A selector that reports when it waits.
 
-    :ivar begins: set when it begins to wait.
+    :ivar begins: set when a wait begins.
     """
 
     def __init__(self) -> None:
@@ -72,8 +72,8 @@ def take_turn(
     link: LiveLink, selector: Waiting, function: Callable[[float], None],
     takers: Log[threading.Thread], is_done: Callable[[], bool] | None = None,
 ) -> None:
-    """Take a turn in this thread, which appears among the takers then."""
-    # The thread goes round each 0.25 s, since no peer answers, and may do so just now.
+    """Take a turn in this thread, which the function then adds to the takers."""
+    # The link's thread takes a turn each 0.25 s, since no peer answers, and may do so now.
     for _ in range(20):
         selector.begins.clear()
         assert selector.begins.wait(PATIENCE)
@@ -85,9 +85,9 @@ def take_turn(
 
 def ask(link: LiveLink, selector: Waiting, send: Callable[[], None]) -> int:
     """
-    Have this thread send in its turn, and wait until it has received in a turn.
+    Send in a turn of this thread, until this thread has received in a turn.
 
-    :return: how often it has sent.
+    :return: the number of times that it has sent.
     """
     callers: Log[threading.Thread] = Log()
     caller = threading.current_thread()
@@ -195,7 +195,7 @@ def test_turn_of_a_caller_does_not_overtake_a_call(link: SimulatedLink) -> None:
     assert done == ['call', 'turn']
 
 
-# A command is waited for so long at least: one that a caller sends does not wake the thread.
+# A sent command waits for MIN_TIMEOUT at least, so a turn of its caller does not wake the thread.
 @pytest.mark.parametrize(('ahead', 'wakes'), [
     (0.001, True), (MIN_TIMEOUT, False), (1000.0, False)])
 def test_turn_of_a_caller_wakes_the_thread_for_an_earlier_deadline_only(

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""UDP channels: which peers they have, which they send to, and which they hear."""
+"""UDP channels: the peers that they have, send to, and receive from."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_frames_share_datagrams_that_ethernet_does_not_fragment(
 
 
 class FailingSocket:
-    """Has one datagram, and then fails for one reason; a genuine socket is behind it."""
+    """Returns one datagram, and then fails for one reason; it wraps a genuine socket."""
 
     def __init__(self, real: socket.socket, reason: int) -> None:
         self._real, self._left = real, [(b'last', ('127.0.0.1', 14550))]
@@ -175,10 +175,10 @@ def test_learnt_peer_out_of_reach_is_forgotten_without_loss(channel: Open) -> No
         assert (ours.channel.peers(0.0), ours.channel.dropped) == ((good.getsockname(),), 2)
 
 
-# Amounts of one read
+# The amount of one read
 
 @pytest.mark.parametrize(('limits', 'sent', 'reads'), [
-    # The first datagram of a peer is alone: an answer may wait for it.
+    # The first datagram of a peer is read alone, since a request may wait for it.
     ({'BATCH': 4}, 'aaaaa', [(['a', 'aaa'], True), (['a'], False)]),
     ({}, 'aaab', [(['a', 'aa', 'b'], False)]),
     ({'BATCH_SIZE': 2}, 'aaa', [(['a', 'a'], True), (['a'], False)])])
