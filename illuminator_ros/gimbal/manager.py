@@ -15,8 +15,8 @@
 """
 A gimbal manager: it decides who controls a gimbal, and gives the device its setpoints.
 
-https://mavlink.io/en/services/gimbal_v2.html leaves it to the players when control moves. Here it
-moves only as a policy says. No I/O.
+In https://mavlink.io/en/services/gimbal_v2.html the players decide when control moves. In this
+manager a policy decides. No I/O.
 """
 
 from __future__ import annotations
@@ -84,8 +84,8 @@ from ..payload.mount_attitude import (
 )
 from ..payload.rotation import Quaternion
 
-# s between GIMBAL_MANAGER_STATUS; between repetitions of a setpoint that stays as it is, at most
-# 1 s by the specification; and of one that follows a place, the vehicle or a rate.
+# s between GIMBAL_MANAGER_STATUS; between repetitions of a constant setpoint, at most 1 s by the
+# specification; and between setpoints that follow a place, the vehicle or a rate.
 STATUS_INTERVAL = 0.2
 HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
@@ -93,8 +93,8 @@ FOLLOW_INTERVAL = 0.05
 CHANGE_INTERVAL = 0.1
 # s between requests for GIMBAL_DEVICE_INFORMATION until it comes.
 INFORMATION_INTERVAL = 5.0
-# s after the last AUTOPILOT_STATE_FOR_GIMBAL_DEVICE of an autopilot in which ours is not sent,
-# and between two of ours.
+# s for which the manager does not send AUTOPILOT_STATE_FOR_GIMBAL_DEVICE after an autopilot has
+# sent it, and the shortest time between two that the manager sends.
 AUTOPILOT_SILENCE = 2.0
 AUTOPILOT_INTERVAL = 0.02
 # s after which the attitude of a device is out of date.
@@ -137,14 +137,14 @@ class SetpointClipped:
 
 @dataclass(frozen=True)
 class SetpointSent:
-    """A device without MAVLink gets a setpoint, with everything mixed and clipped."""
+    """A device without MAVLink must take a setpoint, which is mixed and clipped."""
 
     setpoint: Setpoint
 
 
 @dataclass(frozen=True)
 class AddressShared:
-    """A player's address is used by two senders, whose heartbeats differ."""
+    """Two senders with different heartbeats use the address of one player."""
 
     player: Address
 
@@ -152,9 +152,9 @@ class AddressShared:
 @dataclass(frozen=True)
 class ReferenceLost:
     """
-    The gimbal does not follow its region of interest, or north.
+    The gimbal does not follow its region of interest, or a yaw relative to north.
 
-    :param unknown: of the vehicle: ``position`` or ``heading``.
+    :param unknown: the unknown value of the vehicle: ``position`` or ``heading``.
     """
 
     unknown: str
@@ -173,8 +173,8 @@ class GimbalManager(Payload):
     :param draw: returns a random number, 0..1.
     :ivar events: each a :data:`ManagerEvent`.
     :ivar tracker: its state, its device and other managers.
-    :ivar control: who has which kind of control.
-    :ivar vehicle: takes the vehicle's state from ROS.
+    :ivar control: the players in primary and in secondary control.
+    :ivar vehicle: the state of the vehicle, from the link or from ROS.
     :ivar model: the abilities of the device.
     """
 
@@ -222,7 +222,7 @@ class GimbalManager(Payload):
     # Snapshots
 
     def status(self, now: float) -> GimbalManagerStatus:
-        """Return the message with the players in control."""
+        """Return GIMBAL_MANAGER_STATUS, which contains the players in control."""
         setpoint, device = self._setpoint, self._device_status(now)
         flags = 0 if setpoint is None else setpoint.device_flags
         accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
@@ -329,7 +329,7 @@ class GimbalManager(Payload):
                 failure_flags=status.failure_flags | self._limits_reached))
 
     def _report_commanded(self, now: float) -> None:
-        """Report the setpoint as attitude of a device that reports none."""
+        """Report the setpoint as the attitude of a device that reports no attitude."""
         attitude = self._sent and self._sent.attitude or Quaternion()
         heading = self.vehicle.heading(now)
         self._report(GimbalDeviceAttitudeStatus(
@@ -337,12 +337,12 @@ class GimbalManager(Payload):
             math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan), now)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take the attitude of the device, from the link or of a device without MAVLink."""
+        """Take the attitude of the device, from the link or, without MAVLink, from ROS."""
         self._measured_at = now
         self._report(status, now)
 
     def vehicle_changed(self, now: float) -> None:
-        """Send the device the vehicle's state, unless an autopilot does."""
+        """Send the vehicle's state to the device, unless an autopilot does."""
         if (self.tracker.device is None or self.tracker.state is not ManagerState.ACTIVE
                 or now < self._autopilot_at + AUTOPILOT_SILENCE
                 or now < self._state_sent_at + AUTOPILOT_INTERVAL):
@@ -375,7 +375,7 @@ class GimbalManager(Payload):
                 self._send(now)
             self.events.emit(change)
         if changes and self._status_due < math.inf and now >= self._changed_at + CHANGE_INTERVAL:
-            # Beside the regular ones, so that players need not wait for the next.
+            # An additional status, so that players need not wait for the next regular one.
             self._changed_at = now
             self._commands.send(self.status(now))
 
@@ -398,7 +398,7 @@ class GimbalManager(Payload):
             self.events.emit(DemandRefused(source, refusal))
 
     def _answer(self, source: Address, refusal: str, now: float) -> MavResult:
-        """Return the result of a command; a refusal is reported, since no result has a reason."""
+        """Return the result of a command; report a refusal, since a result has no reason."""
         if refusal:
             self.events.emit(DemandRefused(source, refusal))
         return MavResult.DENIED if refusal else MavResult.ACCEPTED
@@ -429,11 +429,11 @@ class GimbalManager(Payload):
         return self._lacks_control(player)
 
     def _lacks_control(self, player: Address) -> str:
-        """Return why a player is refused what needs primary control, '' if it has it."""
+        """Return why a player may not set the gimbal, '' if it has primary control."""
         holder = self.control.primary.holder
         if holder == player:
             return ''
-        return f'{holder} has control' if holder else 'it must take control first'
+        return f'{holder} has control' if holder else 'the player must take control first'
 
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
@@ -449,7 +449,7 @@ class GimbalManager(Payload):
     def _current(self, demand: Demand, now: float) -> Quaternion | None:
         """Return the attitude that a demand changes, None if that needs an unknown heading."""
         if demand.is_pose or (demand.has_rates_only and self.tracker.has_mavlink):
-            # The device needs no attitude.
+            # Such a setpoint does not depend on the attitude.
             return Quaternion()
         if (demand.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
                 and self._heading(now) is None):
@@ -457,7 +457,7 @@ class GimbalManager(Payload):
         return demand.attitude or self._pointing(demand.frame, now)
 
     def _pointing(self, frame: YawFrame, now: float) -> Quaternion | None:
-        """Return the attitude of the setpoint, or else of the device, with a yaw in a frame."""
+        """Return the attitude of the setpoint, else of the device, with the yaw in a frame."""
         heading = self._heading(now)
         if self._setpoint is not None and (attitude := self._setpoint.at(now)) is not None:
             if self._setpoint.frame is frame:
@@ -480,24 +480,24 @@ class GimbalManager(Payload):
         return self._status if now < self._status_at + ATTITUDE_AGE else None
 
     def _heading(self, now: float) -> float | None:
-        """Return the vehicle's heading as the device reports it, or else the vehicle."""
+        """Return the vehicle's heading as the device reports it, else as the vehicle does."""
         if (self._attitude is not None and self._attitude.heading is not None
                 and self._device_status(now) is not None):
             return self._attitude.heading
         return self.vehicle.heading(now)
 
     def _send(self, now: float) -> None:
-        """Give the device the setpoint, with everything mixed and clipped."""
+        """Mix and clip the setpoint, and give it to the device."""
         setpoint = self._setpoint
         if setpoint is None or self.tracker.state is not ManagerState.ACTIVE:
             self._send_due = math.inf
             return
-        # The direction from which the range of the yaw counts.
+        # The yaw of straight ahead in the setpoint's frame; the yaw range is relative to it.
         ahead: float | None = 0.0
         converts = False
         if setpoint.frame is YawFrame.EARTH:
             converts = not self._accepts_earth_frame(now)
-            # A pose and rates have no attitude that is converted.
+            # A pose or a rate has no attitude that would be converted.
             ahead = 0.0 if setpoint.attitude is None else self._heading(now)
         turns = setpoint.turning != STILL
         attitude = setpoint.at(now) if turns else setpoint.attitude
@@ -590,14 +590,14 @@ class GimbalManager(Payload):
         return MavResult.ACCEPTED
 
     def _own_information(self, now: float) -> GimbalManagerInformation:
-        # The manager computes what the device cannot.
+        # The manager itself computes the attitude towards a place.
         capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
         return GimbalManagerInformation(
             mav.time_boot_ms(now), int(capabilities), self.tracker.device_id,
             **range_fields(self.model.ranges))
 
     def _device_information(self, now: float) -> GimbalDeviceInformation | None:
-        """Return the message of the device, which clients ask of its manager."""
+        """Return GIMBAL_DEVICE_INFORMATION, which clients may request from the manager."""
         if self.tracker.has_mavlink:
             return self._information and replace(
                 self._information, gimbal_device_id=self.tracker.device_id)
@@ -618,11 +618,11 @@ class GimbalManager(Payload):
         self._status_due = now if active else math.inf
         self._send_due = now if active else math.inf
         if change.after in (ManagerState.INACTIVE, ManagerState.NO_DEVICE):
-            # Another manager has moved the device, or the next device may be another one.
+            # Another manager may have moved the device, or the next device may be another one.
             self._setpoint = self._roi = None
             self._offsets = STILL
         if change.after is ManagerState.LISTENING:
-            # A manager that sends no status answers a request.
+            # Another manager may send no status, but answers a request.
             self._commands.send(Command(
                 Address(0, 0), mav.MavCmd.REQUEST_MESSAGE,
                 (GimbalManagerInformation.id,)).message(0, as_int=False))

@@ -165,7 +165,8 @@ def test_gm_14_a_player_that_is_not_in_control_is_refused(
         [] if isinstance(message, GimbalManagerSetPitchyaw) else [mav.MavResult.DENIED])
     assert rig.messages(GimbalDeviceSetAttitude) == []
     assert of(gimbal_manager.DemandRefused, rig.events) == [gimbal_manager.DemandRefused(
-        GUEST, f'{holder} has control' if holder else 'it must take control first')]
+        GUEST, f'{holder} has control' if holder else (
+            'the player must take control first'))]
 
 
 @pytest.mark.parametrize(('policy', 'overrules', 'result'), [
