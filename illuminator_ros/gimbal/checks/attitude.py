@@ -51,12 +51,12 @@ from ...payload.mount_attitude import MountFlags, yaw_frame
 from ...payload.rotation import Quaternion
 
 STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
-# Degrees that an attitude may differ from what the angular velocity explains.
+# Degrees; the rotation between two statuses that the angular velocity need not explain.
 JUMP = 8.0
 FRAMES = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
 
 T = TypeVar('T', bound=GimbalTester)
-# Sends a setpoint, and returns the command if it is one.
+# Sends a setpoint; returns the transaction if the setpoint is a command.
 Send: TypeAlias = Callable[[T, Pose], Awaitable[Transaction | None]]
 
 moves = partial(requirement, needs_consent=True)
@@ -66,7 +66,7 @@ def reaches(
     name: str, title: str, specification: Specification, section: str, send: Send[T],
     yaw: float = STEP,
 ) -> Requirement[T]:
-    """Return the requirement that a gimbal turns down and to a yaw, then back, when told to."""
+    """Return the requirement that a gimbal turns to a commanded attitude, and then back."""
     @moves(name, title, specification, section)
     async def check(tester: T) -> str:
         await tester.begin()
@@ -82,7 +82,7 @@ def reaches(
 def ignores(
     name: str, title: str, specification: Specification, section: str, cause: str, send: Send[T],
 ) -> Requirement[T]:
-    """Return the requirement that a gimbal stays where it is when something is sent."""
+    """Return the requirement that a gimbal keeps its attitude after a call of ``send``."""
     @moves(name, title, specification, section)
     async def check(tester: T) -> None:
         before = await tester.begin()
@@ -102,9 +102,9 @@ def turns(
     Return the requirement that a gimbal turns down for some seconds when a speed is sent.
 
     :param speed: deg/s, below 0.
-    :param slowest: the least share of it that counts.
-    :param fastest: how many times as fast it may be; infinite where the specification leaves it
-        open.
+    :param slowest: the lowest accepted speed, as a multiple of ``speed``.
+    :param fastest: the highest accepted speed, likewise; infinite where the specification does
+        not limit it.
     """
     @moves(name, title, specification, section)
     async def check(tester: T) -> str:
@@ -133,7 +133,7 @@ def information(cls: type[Message]) -> tuple[Requirement[GimbalTester], ...]:
                  'Messaging (GM-10)')
     async def static(tester: GimbalTester) -> None:
         first, second = [await tester.session.required(cls) for _ in range(2)]
-        # As text, since NaN is not equal to NaN.
+        # Compare texts, since NaN is not equal to NaN.
         if str(Limits.from_message(first)) != str(Limits.from_message(second)):
             raise Failed('two requests returned different limits or capabilities')
 
@@ -156,7 +156,7 @@ def information(cls: type[Message]) -> tuple[Requirement[GimbalTester], ...]:
 
 def command_int(cls: type[Message]) -> Requirement[GimbalTester]:
     """Return the requirement on COMMAND_INT, with a request of a message."""
-    @requirement('command-int', 'answers COMMAND_INT, if only with MAV_RESULT_COMMAND_LONG_ONLY',
+    @requirement('command-int', 'answers COMMAND_INT, at least with MAV_RESULT_COMMAND_LONG_ONLY',
                  COMMAND, 'Use COMMAND_INT or COMMAND_LONG?')
     async def check(tester: GimbalTester) -> str:
         one = await tester.session.command(MavCmd.REQUEST_MESSAGE, cls.id, as_int=True)
@@ -174,7 +174,7 @@ def _statuses(
     """
     Return a requirement on each status of the run.
 
-    :param deviation: returns what is wrong with one, '' if nothing.
+    :param deviation: returns the error in a status, '' if there is none.
     """
     @requirement(name, title, MESSAGES, section, whole_run=True)
     async def check(tester: GimbalTester) -> str:
@@ -213,7 +213,7 @@ async def continuous(tester: GimbalTester) -> str:
         speeds = [math.hypot(*(rate for rate in (
             status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z)
             if math.isfinite(rate))) for status in (one, other)]
-        # Without rates it has not measured how it turned.
+        # Without rates the statuses do not say how far the gimbal turned.
         if not any(math.isfinite(status.angular_velocity_y) for status in (one, other)):
             continue
         if _content(one) or _content(other) or other.time_boot_ms < one.time_boot_ms:
@@ -222,7 +222,7 @@ async def continuous(tester: GimbalTester) -> str:
             if yaw_frame(one.flags) is not yaw_frame(other.flags):
                 continue
         except ValueError:
-            # "yaw-frame" covers it.
+            # The requirement "yaw-frame" covers this error.
             continue
         count += 1
         turned = math.degrees(Quaternion(*one.q).normalized().angle_to(
@@ -240,7 +240,7 @@ async def continuous(tester: GimbalTester) -> str:
 @requirement('uptime', 'counts time_boot_ms in real time and never backwards', MESSAGES, STATUS,
              whole_run=True)
 async def uptime(tester: GimbalTester) -> None:
-    """Look for a step back, which a restart makes."""
+    """Look for a step back; a restart causes one."""
     for (_, one), (_, other) in pairwise(tester.session.received(AttitudeStatus)):
         back = (one.time_boot_ms - other.time_boot_ms) % (1 << 32)
         if 0 < back < 1 << 31:
@@ -276,7 +276,7 @@ def _beyond(found: Limits) -> tuple[float, float]:
     low, high = found.pitch
     if not (math.isfinite(low) and math.isfinite(high)):
         raise Skipped('it does not report the range of its pitch')
-    # At the singular pitch a quaternion has no pitch beyond it.
+    # A quaternion cannot have a pitch beyond the singular pitch of 90 degrees.
     if high <= 75.0:
         return high, high + STEP
     if low >= -75.0:
@@ -286,7 +286,7 @@ def _beyond(found: Limits) -> tuple[float, float]:
 
 @moves('range', 'keeps within the range that it reports', MESSAGES, 'GIMBAL_DEVICE_INFORMATION')
 async def within_range(tester: GimbalTester) -> str:
-    """Command a pitch beyond it."""
+    """Command a pitch beyond the range."""
     limit, beyond = _beyond(await tester.limits())
     start = await tester.begin()
     target = replace(start, roll=0.0, pitch=beyond)

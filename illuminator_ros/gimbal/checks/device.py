@@ -15,8 +15,8 @@
 """
 The checks of a gimbal device.
 
-They play its gimbal manager: the component ``--manager`` of the device's system announces itself
-with GIMBAL_MANAGER_STATUS and commands the device.
+The checks play its gimbal manager: the component ``--manager`` of the device's system announces
+itself with GIMBAL_MANAGER_STATUS and commands the device.
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ class DeviceTester(GimbalTester):
     """
     Plays the gimbal manager of a device.
 
-    :ivar heading: that is sent to the device with each announcement, degrees; None sends none.
+    :ivar heading: the vehicle's heading, sent to the device with each announcement, degrees; None
+        to send none.
     """
 
     information = gimbal.GimbalDeviceInformation
@@ -113,7 +114,7 @@ class DeviceTester(GimbalTester):
         rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
         target: Address | None = None,
     ) -> None:
-        """See :class:`GimbalTester`; the manager sends it if no other address is given."""
+        """See :class:`GimbalTester`; the default sender is the manager."""
         self.session.send(gimbal.GimbalDeviceSetAttitude(
             *(target or self.session.device), flags, quaternion_of(pose), *radians(rates)),
             sender or self.manager)
@@ -147,7 +148,7 @@ async def device_id(tester: DeviceTester) -> None:
 @requirement('north-needs-heading', 'accepts yaw relative to north only with a heading from the '
              'vehicle (GM-3)', MESSAGES, 'GIMBAL_DEVICE_CAP_FLAGS')
 async def north_needs_heading(tester: DeviceTester) -> None:
-    """Read the statuses before the first command, while nothing sends it a heading."""
+    """Read the statuses before the first command, while the checks send no heading."""
     unknown = [one for _, one in tester.session.idle(AttitudeStatus)
                if math.isnan(one.delta_yaw)]
     if not unknown:
@@ -159,7 +160,7 @@ async def north_needs_heading(tester: DeviceTester) -> None:
 # Setpoints, and their senders
 
 async def _point_from_others(tester: DeviceTester, pose: Pose) -> None:
-    """Send setpoints from our own address and from another component of its system."""
+    """Send setpoints from our own address and from another component of the device's system."""
     for source in (tester.session.address, free_address(tester.session)):
         await tester.point(pose, sender=source)
 
@@ -174,7 +175,7 @@ async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
 
 
 async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:
-    """Send what only gimbal managers take, from its manager."""
+    """Send messages and a command for gimbal managers, from the device's manager."""
     device = tester.session.device
     pitch, yaw = math.radians(pose.pitch), math.radians(pose.yaw)
     ids = (*device, int(LEVEL), device.component)
@@ -199,7 +200,7 @@ async def _point_others(tester: DeviceTester, pose: Pose) -> None:
 
 @contextlib.asynccontextmanager
 async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
-    """Send a heading of the vehicle meanwhile, degrees."""
+    """Send a heading of the vehicle, degrees, during the context."""
     await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
     if any(not math.isnan(one.delta_yaw) for _, one in tester.session.idle(AttitudeStatus)):
         raise Skipped('another component sends it a heading')
@@ -231,7 +232,7 @@ async def earth_frame(tester: DeviceTester) -> str:
 @moves('yaw-lock', 'holds a locked yaw against north while the vehicle turns (GM-3)', MESSAGES,
        'GIMBAL_DEVICE_FLAGS')
 async def yaw_lock(tester: DeviceTester) -> str:
-    """Lock it straight ahead, then turn the vehicle."""
+    """Lock the yaw straight ahead, then turn the vehicle."""
     await tester.requires(Capabilities.HAS_YAW_LOCK)
     async with _heading(tester, 40.0):
         await tester.point(Pose(0.0, -STEP, 0.0),
@@ -279,7 +280,7 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
 
 def is_device(message: Message) -> bool:
     """Return whether a message identifies its sender as a gimbal device."""
-    # With a gimbal_device_id it is of a gimbal manager.
+    # Gimbal managers send these messages with a gimbal_device_id.
     return (isinstance(message, gimbal.GimbalDeviceInformation | AttitudeStatus)
             and message.gimbal_device_id == 0
             or isinstance(message, Heartbeat) and message.type == gimbal.MAV_TYPE_GIMBAL)

@@ -15,8 +15,9 @@
 """
 The checks of a gimbal manager: control, setpoints, and the reports on its gimbal.
 
-They play two players: ours, and a second one in the system of the manager. -2 in
-MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE is not checked, since implementations differ in whom it means.
+The checks play two players: one with our own address, and a second one in the system of the
+manager. They do not check -2 in MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: implementations differ in the
+component that it means.
 """
 
 from __future__ import annotations
@@ -74,8 +75,8 @@ STARTING = 'Starting / Configuring Gimbal Control'
 ADDRESSING = 'Addressing of Gimbal MAVLink Devices'
 # s from an acknowledgement to the status that shows the control.
 SHOWN_TIMEOUT = 1.5
-# Degrees 1e7 and mm: the vehicle that is played, which heads 15 degrees from north, and degrees
-# 1e7 and m: a place 111 m north of it and 30 m below.
+# The vehicle that is played, 1e-7 degrees and mm, and its heading, degrees; a place 111 m north of
+# the vehicle and 30 m below it, 1e-7 degrees and m.
 VEHICLE = (474_000_000, 85_000_000, 500_000)
 HEADING = 15.0
 PLACE = (474_010_000, 85_000_000, 470.0)
@@ -113,7 +114,7 @@ class ManagerTester(GimbalTester):
     # Control
 
     async def control(self) -> Control:
-        """Return who has control; raise Skipped if the manager does not report it."""
+        """Return the players in control; raise Skipped if the manager does not report them."""
         return control_of(await self.newest(MANAGER_STATUS, 'who has control'))
 
     async def configure(
@@ -125,25 +126,25 @@ class ManagerTester(GimbalTester):
             sender=sender)
 
     async def shown(self, condition: Callable[[Control], bool]) -> Control:
-        """Return the control once it meets a condition, or after a time."""
+        """Return the control once it meets a condition, or after :data:`SHOWN_TIMEOUT`."""
         end = self.session.now + SHOWN_TIMEOUT
         while not condition(control := await self.control()) and self.session.now < end:
             await self.pause(0.1)
         return control
 
     async def take(self, primary: Address, secondary: Address = NO_COMPONENT) -> None:
-        """Give control to two players; raise Failed if that is refused or not shown."""
+        """Give control to two players; raise Failed if the manager refuses or does not show it."""
         one = await self.configure(*primary, *secondary)
         await self.leads_to(one, lambda control: control == (primary, secondary))
 
     async def leads_to(self, one: Transaction, wanted: Callable[[Control], bool]) -> None:
-        """Raise Failed if a command is refused, or control is another one after it."""
+        """Raise Failed if a command is refused or does not lead to the wanted control."""
         control = await self.shown(wanted)
         if not one.accepted or not wanted(control):
             raise one.failure(f'{one.answer}, and then {control_text(control)}')
 
     async def prepare(self) -> None:
-        """Take primary control; the second player gives up what an earlier check gave it."""
+        """Take primary control; the second player releases any control that it has."""
         if self.other in await self.control():
             await self.configure(-3.0, -3.0, -3.0, -3.0, sender=self.other)
         if (await self.control())[0] != self.session.address:
@@ -255,7 +256,7 @@ async def attitude_stream(tester: ManagerTester) -> str:
 @controls('take', 'gives primary control to a component that asks, and shows it', GIMBAL,
           STARTING)
 async def take(tester: ManagerTester) -> str:
-    """Take it."""
+    """Take primary control."""
     await tester.take(tester.session.address)
     return control_text(await tester.control())
 
@@ -263,7 +264,7 @@ async def take(tester: ManagerTester) -> str:
 @controls('release', 'ends the control of a component that releases it', MESSAGES,
           CONFIGURE_COMMAND)
 async def release(tester: ManagerTester) -> None:
-    """Send -3."""
+    """Send -3, which releases control."""
     await tester.prepare()
     one = await tester.configure(-3, -3, -3, -3)
     await tester.leads_to(one, lambda control: control[0] == NO_COMPONENT)
@@ -289,11 +290,11 @@ async def release_others(tester: ManagerTester) -> None:
 @controls('secondary', 'gives secondary control, and shows it', MESSAGES,
           CONFIGURE_COMMAND)
 async def secondary(tester: ManagerTester) -> None:
-    """Give it to the second player."""
+    """Give secondary control to the second player."""
     try:
         await tester.take(tester.session.address, tester.other)
     finally:
-        # Only its holder may end it in a manager that needs consent (GM-17).
+        # A manager may let only the holder end secondary control (GM-17).
         await tester.configure(-3, -3, -3, -3, sender=tester.other)
 
 
@@ -320,7 +321,7 @@ async def configure_values(tester: ManagerTester) -> None:
 @controls('one-player', 'obeys one player at a time when a second one takes control (GM-16)',
           PROPOSAL, 'Proposed Architecture')
 async def one_player(tester: ManagerTester) -> str:
-    """Let the second player take control; the one that the status does not show must not move."""
+    """Let the second player take control; the player without control must not move the gimbal."""
     before, other = await tester.begin(), tester.other
     one = await tester.configure(*other, *NO_COMPONENT, sender=other)
     await tester.pause(0.5)
@@ -330,7 +331,8 @@ async def one_player(tester: ManagerTester) -> str:
     loser = tester.session.address if holder == other else other
     await tester.point(await tester.target(-2 * STEP, STEP), sender=loser)
     await tester.stays(before, f'primary {holder}, a setpoint of {loser}')
-    return 'the second player took it at will' if holder == other else 'its holder kept it'
+    return ('the second player took control' if holder == other else
+            'the first player kept control')
 
 
 # Setpoints
@@ -346,7 +348,7 @@ async def _send_messages(tester: ManagerTester, pose: Pose) -> None:
 
 
 async def _clear_roi(tester: ManagerTester, pose: Pose) -> Transaction:
-    """Clear it from the second player, which would turn the gimbal to its neutral position."""
+    """Clear the region from the second player; success would turn the gimbal to neutral."""
     await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
     return await tester.session.command(
         GimbalCommand.DO_SET_ROI_NONE, tester.device_id, sender=tester.other)
@@ -392,7 +394,7 @@ async def flags_shown(tester: ManagerTester) -> None:
 @moves('other-target', 'ignores setpoints and commands for other components', ROUTING,
        'Routing Detail')
 async def other_target(tester: ManagerTester) -> None:
-    """Send them to a component that does not exist."""
+    """Send a setpoint and a command to a component that does not exist."""
     before, session = await tester.begin(), tester.session
     other, pose = free_address(session, 200), await tester.target(-2 * STEP, STEP)
     session.send(gimbal.GimbalManagerSetAttitude(
@@ -404,9 +406,9 @@ async def other_target(tester: ManagerTester) -> None:
         raise one.failure(f'answered a command for {other}: {one.answer}')
 
 
-@moves('roi', 'points at a place, and ends that (GM-8)', GIMBAL, 'Gimbal Manager Messages')
+@moves('roi', 'points at a place, and stops on command (GM-8)', GIMBAL, 'Gimbal Manager Messages')
 async def roi(tester: ManagerTester) -> str:
-    """Set a place north of the vehicle; play the vehicle where there is no autopilot."""
+    """Set a place north of the vehicle; play the autopilot if none is heard."""
     await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
     await tester.begin()
     session = tester.session
@@ -453,7 +455,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
                 math.radians(pose.yaw))),
     reaches('pitchyaw', f'turns to angles ({PITCHYAW_COMMAND})', MESSAGES, PITCHYAW_COMMAND,
             lambda tester, pose: tester.pitchyaw(pose.pitch, pose.yaw, NAN, NAN)),
-    # So slowly that rad/s are noticed and do no harm.
+    # A manager that reads this low rate as rad/s is detected and does no harm.
     turns('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
           PITCHYAW_COMMAND, lambda tester, speed: tester.pitchyaw(NAN, NAN, speed, 0.0), -2.0),
     reaches('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
@@ -475,7 +477,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
             '(GM-11)', GIMBAL, STARTING, 'a command of the second player', _clear_roi),
     ignores('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)',
             GIMBAL, ADDRESSING, 'setpoints for another gimbal device', _point_other_device),
-    reaches('all-devices', 'takes gimbal device 0 for all of its gimbals (GM-28)', GIMBAL,
+    reaches('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
             ADDRESSING, lambda tester, pose: tester.point(pose, device_id=0)),
     other_target, *component.interval_requirements(MANAGER_STATUS, optional=True),
     component.heartbeat_rate, *attitude.CONTENT, attitude.continuous, attitude.uptime,
@@ -484,7 +486,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
 
 
 def device_of(message: Message) -> int:
-    """Return the component id of the gimbal device of a manager, 0 if it is the manager itself."""
+    """Return the component id of a manager's gimbal device, 0 if it is not a component."""
     found = message.gimbal_device_id if isinstance(message, INFORMATION | MANAGER_STATUS) else 0
     return 0 if found in gimbal.NON_MAVLINK_IDS else found
 

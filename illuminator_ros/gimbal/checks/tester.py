@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The testers of gimbals: they move a gimbal, watch its attitude, and bring it back."""
+"""The base of the testers of gimbals: it moves a gimbal, watches it, and turns it back."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ PROPOSAL = Specification(
 
 # s
 MOVE_TIMEOUT = 8.0
-# In which a gimbal that must not move would begin to.
+# s; the time for which a gimbal that must not move is watched.
 WATCH_TIME = 1.0
 POLL = 0.1
-# After which a gimbal that only passes a pose has left it.
+# s; the time after which a gimbal that only passes a pose has left it.
 SETTLE_TIME = 0.4
 # Degrees.
 TOLERANCE = 3.0
@@ -110,7 +110,7 @@ class Limits(NamedTuple):
 
 
 def describe(message: Message) -> str:
-    """Return a message of the gimbal protocol in one line, '' for its name."""
+    """Return the content of a message of the gimbal protocol, '' if its name is enough."""
     if isinstance(message, AttitudeStatus):
         try:
             text = str(Pose.from_message(message))
@@ -131,7 +131,7 @@ def describe(message: Message) -> str:
 
 
 def control_text(control: Control) -> str:
-    """Return who has control."""
+    """Return the components in control, for people."""
     return ', '.join(f'{name} {one if any(one) else "none"}'
                      for name, one in zip(('primary', 'secondary'), control, strict=True))
 
@@ -144,7 +144,7 @@ def control_of(message: gimbal.GimbalManagerStatus) -> Control:
 
 class GimbalTester(ABC):
     """
-    Moves a gimbal; checks get it.
+    Moves a gimbal for the checks.
 
     :cvar information: the class of the INFORMATION message.
     :cvar status: the class whose interval is restored.
@@ -163,7 +163,7 @@ class GimbalTester(ABC):
 
     async def newest(self, cls: type[M], what: str) -> M:
         """
-        Return the newest message of a stream, or else request it.
+        Return the newest message of a stream; request one if none comes.
 
         :param what: its content, for people.
         :raises Skipped: if the gimbal does not send it.
@@ -188,9 +188,9 @@ class GimbalTester(ABC):
 
     async def limits(self) -> Limits:
         """
-        Return what the gimbal can do.
+        Return the ranges and the capabilities of the gimbal.
 
-        :raises Skipped: if it does not report it.
+        :raises Skipped: if the gimbal does not report them.
         """
         if self._limits is None:
             self._limits = Limits.from_message(await self.session.required(self.information))
@@ -205,7 +205,7 @@ class GimbalTester(ABC):
 
     @abstractmethod
     async def prepare(self) -> None:
-        """Do what must precede setpoints, such as taking control."""
+        """Prepare the gimbal for setpoints, for example by taking control."""
 
     @abstractmethod
     async def point(
@@ -215,7 +215,7 @@ class GimbalTester(ABC):
         """Send a setpoint: an attitude if there is one, and rates, deg/s."""
 
     async def pause(self, seconds: float) -> None:
-        """Let time pass, and send what must be sent regularly."""
+        """Wait, and send the messages that must be sent regularly."""
         await self.session.runner.sleep(seconds)
 
     async def until(
@@ -228,30 +228,30 @@ class GimbalTester(ABC):
         return pose
 
     async def steady(self) -> Pose:
-        """Return a pose that two statuses in succession show."""
+        """Return the pose once two successive statuses agree, or after 1 s."""
         end, pose = self.session.now + 1.0, await self.pose()
         while not pose.near(now := await self.pose()) and self.session.now < end:
             pose = now
         return now
 
     async def settle(self, pose: Pose) -> Pose:
-        """Return the pose once the gimbal stands still at a wanted one, or after a time."""
+        """Return the pose once the gimbal stays at a wanted one, or after MOVE_TIMEOUT."""
         end = self.session.now + MOVE_TIMEOUT
         while True:
             await self.until(pose.near, end - self.session.now)
-            # It may only have passed by.
+            # The gimbal may only have passed the wanted pose.
             await self.pause(SETTLE_TIME)
             if pose.near(now := await self.pose()) or self.session.now >= end:
                 return now
 
     async def reach(self, pose: Pose) -> None:
-        """Raise Failed if the gimbal does not turn to a pose, and stay there."""
+        """Raise Failed if the gimbal does not turn to a pose and stay at it."""
         reached = await self.settle(pose)
         if not pose.near(reached):
             raise Failed(f'commanded {pose}, reached {reached} after {MOVE_TIMEOUT:g} s')
 
     async def target(self, pitch: float, yaw: float) -> Pose:
-        """Return a pose within the ranges; an axis that it lacks stays where it is."""
+        """Return a pose within the ranges; an axis that the gimbal lacks keeps its angle."""
         try:
             limits = await self.limits()
         except Skipped:
@@ -270,7 +270,7 @@ class GimbalTester(ABC):
             if limits.capabilities & Capabilities.HAS_YAW_AXIS else now.yaw)
 
     async def begin(self) -> Pose:
-        """Bring it to the pose that checks start from, as far as it obeys; return its pose."""
+        """Turn the gimbal to the pose from which checks start; return the pose that it reaches."""
         await self.prepare()
         start = await self.target(-STEP, 0.0)
         if not start.near(await self.pose()):
@@ -280,7 +280,7 @@ class GimbalTester(ABC):
     async def stays(self, before: Pose, cause: str) -> None:
         """Raise Failed if the gimbal moves within :data:`WATCH_TIME`."""
         end = self.session.now + WATCH_TIME
-        # Two in succession, because "continuous" covers a wrong status.
+        # A single deviating status does not count: the requirement "continuous" covers it.
         away = 0
         while away < 2 and self.session.now < end:
             pose = await self.pose()
@@ -327,7 +327,7 @@ class GimbalTester(ABC):
         frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
         await self.point(before, flags=before.flags & ~frames | MountFlags.YAW_IN_VEHICLE_FRAME)
         await self.until(lambda pose: pose.near(before, 1.0))
-        # Until it stands still.
+        # Wait until the gimbal stands still.
         await self.pause(0.5)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The requirements on a light, and its checks: all requirements in the order of checking."""
+"""The requirements on a light, and its checks: these requirements in the order of checking."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ INTERNAL = float(Mode.INTERNAL_CONTROL)
 @requirement('other-target', 'ignores commands for other components and systems', ROUTING,
              'Routing Detail', changes=True)
 async def other_target(tester: LightTester) -> None:
-    """Send ON to addresses that do not exist: another component, and another system."""
+    """Send ON to addresses without a component, in the same and in another system."""
     await tester.ensure_dim()
     session = tester.session
     taken = session.heard | {session.address, session.device}
@@ -81,7 +81,7 @@ async def other_target(tester: LightTester) -> None:
 @requirement('command-int', 'accepts COMMAND_INT, or answers MAV_RESULT_COMMAND_LONG_ONLY',
              COMMAND, 'Use COMMAND_INT or COMMAND_LONG?', changes=True)
 async def command_int(tester: LightTester) -> str:
-    """Switch it on with COMMAND_INT."""
+    """Switch the light on with COMMAND_INT."""
     await tester.ensure_dim()
     change = await tester.switch(True, as_int=True)
     one = change.transaction
@@ -114,14 +114,14 @@ async def repeated(tester: LightTester) -> None:
 
 @requirement('on', 'can be switched on', ILLUMINATOR, 'ON/OFF', changes=True)
 async def on(tester: LightTester) -> None:
-    """Switch it on at low brightness."""
+    """Switch the light on at low brightness."""
     await tester.ensure_dim()
     await _switch(tester, True)
 
 
 @requirement('off', 'can be switched off', ILLUMINATOR, 'ON/OFF', changes=True)
 async def off(tester: LightTester) -> None:
-    """Switch it off while it is on; a light that is already off shows no change."""
+    """Switch the light off while it is on; a light that is already off shows no change."""
     status = await tester.status()
     if status is not None and not status.enabled:
         await tester.ensure_dim()
@@ -139,18 +139,18 @@ async def _switch(tester: LightTester, on: bool) -> None:
 
 
 async def _synchronise(tester: LightTester) -> Change:
-    """Configure external sync; at 0 % without consent, because another signal may strobe it."""
+    """Configure external sync; at 0 % without consent, because a signal may strobe the light."""
     brightness = LOW if tester.conditions.consent else 0.0
     return await tester.configure(Mode.EXTERNAL_SYNC, brightness=brightness)
 
 
 @requirement('mode-internal', 'accepts mode internal_control', ILLUMINATOR, 'MODES', changes=True)
 async def internal(tester: LightTester) -> None:
-    """Configure it to that mode, from the other one if it accepts that."""
+    """Configure the mode, from external_sync if the light accepts that."""
     await tester.baseline()
     await _synchronise(tester)
     before = await tester.status()
-    # With another brightness, because a light that has only one mode would show no change.
+    # The brightness changes, too, because a light with only one mode would show no change.
     one = await tester.configure(Mode.INTERNAL_CONTROL, brightness=DIM)
     after = await tester.status()
     if before and after and same(before, after):
@@ -161,12 +161,12 @@ async def internal(tester: LightTester) -> None:
 @requirement('mode-external', 'accepts mode external_sync if mode_bitmask lists it', ILLUMINATOR,
              'MODES', changes=True)
 async def external(tester: LightTester) -> None:
-    """Configure it to that mode."""
+    """Configure the mode."""
     await tester.baseline()
     status = await tester.status()
     one = await _synchronise(tester)
     bitmask = status.mode_bitmask if status else 0
-    # Bit value 2 means this mode, or as 1 << 1 the other one: lights differ in it.
+    # Lights differ in the meaning of bit value 2: external_sync, or internal_control as 1 << 1.
     if one.transaction.result == messages.MavResult.DENIED and bitmask not in (3, 6):
         raise Skipped(f'MAV_RESULT_DENIED, and mode_bitmask 0x{bitmask:x} is ambiguous')
     fail_if([one.unmet('mode')])
@@ -174,7 +174,7 @@ async def external(tester: LightTester) -> None:
 
 @requirement('brightness', 'applies a brightness', ILLUMINATOR, 'CONFIGURE', changes=True)
 async def brightness(tester: LightTester) -> str:
-    """Set several, 100 % only with consent."""
+    """Set several values, 100 % only with consent."""
     await tester.baseline()
     values = (50.0, 100.0, 33.3) if tester.conditions.consent else (5.0, DIM)
     fail_if([(await tester.configure(brightness=value)).unmet('brightness') for value in values])
@@ -192,7 +192,7 @@ def _rejects(
     Return the requirement that a light rejects some commands.
 
     :param commands: each a MAV_CMD and its parameters.
-    :param state: steps that bring the light to the state in which they are sent.
+    :param state: steps that bring the light to the state in which the commands are sent.
     """
     @requirement(name, title, MESSAGES, section, changes=True)
     async def check(tester: LightTester) -> None:
@@ -213,7 +213,7 @@ brightness_values = _rejects(
     'brightness-values', 'rejects a brightness outside 0 to 100 %',
     *((CONFIGURE, INTERNAL, value, 0.0, 0.0) for value in (-1.0, 101.0)),
     state=(LightTester.ensure_unlit, LightTester.baseline))
-# One by one: every comparison with NaN is false, so it passes range checks.
+# In each parameter separately: every comparison with NaN is false, so it can pass range checks.
 not_a_number = _rejects(
     'not-a-number', 'rejects NaN and infinity in every parameter',
     *(command for value in map(float, ('nan', 'inf', '-inf')) for command in (
@@ -231,9 +231,9 @@ def _strobe(
     """
     Return a requirement on strobe periods and duty cycles.
 
-    :param values: returns them, in s and %, from the limits that the light reports.
-    :param shown: the fields in which the status must show them; if none, the light must reject
-        them.
+    :param values: returns periods, s, and duty cycles, %, from the limits that the light reports.
+    :param shown: the fields in which the status must show these; without any, the light must
+        reject the values.
     """
     @requirement(name, title, specification, section, needs_consent=True)
     async def check(tester: LightTester) -> str:
@@ -283,7 +283,7 @@ STROBE = (
 
 # ILLUMINATOR_STATUS
 
-# Smallest rise of temperature that explains a flag, K.
+# K; the smallest rise of temperature that explains a flag.
 STEP = 0.5
 THERMAL = (ErrorFlag.THERMAL_THROTTLING, ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
 
@@ -344,7 +344,7 @@ async def flags(tester: LightTester) -> None:
 
 @reports('uptime', 'counts uptime_ms in real time and never backwards', whole_run=True)
 async def uptime(tester: LightTester) -> str:
-    """Compare it with our clock."""
+    """Compare uptime_ms with the session's clock."""
     seen = [(at, one.uptime_ms) for at, one in tester.session.received(IlluminatorStatus)]
     if len(seen) < 2 or seen[-1][0] - seen[0][0] < 2:
         raise Skipped('too few statuses')
@@ -384,7 +384,7 @@ unchanged = _compared(
 @requirement('thermal-flags', 'sets thermal error flags according to its temperature', ILLUMINATOR,
              'ILLUMINATOR_ERROR_FLAGS', needs_consent=True)
 async def thermal(tester: LightTester) -> str:
-    """Keep it at 100 % for some time, then off for as long, and compare."""
+    """Keep the light at 100 % for some time, then off for as long, and compare."""
     heat = tester.conditions.options['heat']
     if not heat:
         raise Skipped('disabled by --heat 0')
@@ -416,10 +416,10 @@ def _judge(seen: list[Status], seconds: float) -> str:
     """
     Return the temperatures at which flags were set.
 
-    A flag must not be set at a temperature at which it was not set at first. Consecutive samples
-    are not compared: between them a small light may heat up and cool down.
+    A flag that was not set at first must not be set at about the first temperature or below.
+    Consecutive samples are not compared: between them a small light may heat up and cool down.
 
-    :raises Failed: if a flag was.
+    :raises Failed: if a flag was set at such a temperature.
     """
     start, hottest = seen[0].temperature or 0.0, max(one.temperature or 0.0 for one in seen)
     if not any(one.temperature for one in seen):
@@ -442,7 +442,7 @@ def _judge(seen: list[Status], seconds: float) -> str:
     return ', '.join(ranges)
 
 
-# All of them
+# All requirements
 
 REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
     component.heartbeat, component.heartbeat_type(
@@ -476,7 +476,7 @@ def is_light(message: messages.Message) -> bool:
 
 
 def describe(message: messages.Message) -> str:
-    """Return an ILLUMINATOR_STATUS in one line, '' for another message."""
+    """Return the text of an ILLUMINATOR_STATUS in one line, '' for another message."""
     return f'{message.name} {status_text(Status.from_message(message))}' if isinstance(
         message, IlluminatorStatus) else ''
 

@@ -29,11 +29,11 @@ from ...payload.checks.session import Failed, MESSAGE_TIMEOUT, Session, Skipped,
 ILLUMINATOR = Specification(
     'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')
 
-# Brightness at which the light may be on without consent, and the limit of it, %.
+# %; the brightness of checks without consent, and the most at which the light may then be on.
 LOW = 10.0
 DIM = 20.0
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
-# s to wait for a status of the stream, where the light sends none on request.
+# s to wait for a status of the stream if the light sends none on request.
 STREAM_TIMEOUT = 2.5
 
 
@@ -70,10 +70,10 @@ def same(one: Status, other: Status) -> bool:
 @dataclass(frozen=True)
 class Change:
     """
-    A command that changes the light, and what the status shows of it.
+    A command that changes the light, and its effect on the status.
 
     :param not_shown: the fields in which the status does not show the accepted change.
-    :param contradiction: the failure because of them.
+    :param contradiction: the failure because of these fields.
     """
 
     transaction: Transaction
@@ -103,7 +103,7 @@ class LightTester:
         self.rejected_but_applied: list[Failed] = []
         self._before: Status | None = None
 
-    # Commands and what the light shows
+    # Commands and statuses
 
     async def status(self) -> Status | None:
         """Return a new status, None if the light does not send one."""
@@ -147,7 +147,7 @@ class LightTester:
         return Change(one, tuple(not_shown), self.disagreements[-1])
 
     async def rejected(self, command: int, *params: float) -> Failed | None:
-        """Send a command that must be rejected; return a failure if its result is another."""
+        """Send a command that must be rejected; return a failure unless the result is DENIED."""
         before = await self.status()
         one = await self.session.command(command, *params)
         after = await self.status()
@@ -174,7 +174,7 @@ class LightTester:
             await self.session.command(CONFIGURE, *low.params())
             status = await self.status()
         if status is not None and status.enabled:
-            # A light whose brightness is its switch.
+            # A brightness above 0 switches some lights on.
             await self._switch_off()
 
     async def _switch_off(self) -> None:
@@ -184,8 +184,8 @@ class LightTester:
         """
         Bring the light to a state in which it may be switched on: off, dim, no strobe.
 
-        :raises Skipped: if it rejects the configuration, may be too bright, and there is no
-            consent.
+        :raises Skipped: if the light does not apply the configuration, may be too bright, and
+            there is no consent.
         """
         await self.baseline()
         if self.conditions.consent:
@@ -193,7 +193,7 @@ class LightTester:
         change = await self.configure()
         status = await self.status()
         if status is not None and status.enabled:
-            # A light whose brightness is its switch.
+            # A brightness above 0 switches some lights on.
             await self._switch_off()
         if change.transaction.accepted and not change.contradiction:
             return
@@ -202,9 +202,9 @@ class LightTester:
 
     async def ensure_unlit(self) -> None:
         """
-        Bring the light to a state in which a brightness that it must reject cannot be seen.
+        Bring the light to a state in which it stays off at a brightness that it must reject.
 
-        :raises Skipped: if its brightness switches it on, and there is no consent.
+        :raises Skipped: if a brightness switches the light on, and there is no consent.
         """
         await self.baseline()
         if self.conditions.consent:
@@ -212,8 +212,8 @@ class LightTester:
         await self.configure(brightness=LOW / 2)
         status = await self.status()
         if status is None or status.enabled is not False:
-            raise Skipped('its brightness switches it on, so that an invalid one might dazzle: '
-                          + NOT_AGREED)
+            raise Skipped('its brightness switches it on, so that an invalid brightness might '
+                          'dazzle: ' + NOT_AGREED)
 
     # Restoring
 
@@ -232,10 +232,10 @@ class LightTester:
         """See :class:`Tester`."""
         assert self._before is not None
         wanted, enabled = _saved(self._before), bool(self._before.enabled)
-        # First, so that the changes are not visible.
+        # Switch off first, so that the changes are not visible.
         await self._switch_off()
         await self.session.command(CONFIGURE, *wanted.params())
-        # After it, because a light whose brightness is its switch is now on.
+        # Then restore the switch, because the brightness switches some lights on.
         await self.session.command(ON_OFF, float(enabled))
         await restore_interval(self.session, IlluminatorStatus)
         status = await self.status()
@@ -254,7 +254,7 @@ def _saved(status: Status) -> Configuration:
 
 def _risk(status: Status | None) -> str:
     """Return how a light might dazzle when it is switched on, '' if it would not."""
-    # Off, a light whose brightness is its switch reports 0 and was brighter before.
+    # A light that its brightness switches reports 0 while it is off, whatever it had before.
     if status is None or not status.brightness or status.error_flags & DIMMING_FLAGS:
         return 'it might have any brightness'
     if status.brightness > DIM:

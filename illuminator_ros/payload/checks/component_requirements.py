@@ -47,11 +47,11 @@ WATCH_TIME = 2.5
 DEFAULT_TIMEOUT = 5.0
 PROMPT = 1.0
 FINISHED = 2.0
-# Not a MAV_CMD, and far from the range in which new ones are defined.
+# Not a MAV_CMD, and far from the range in which new commands are defined.
 UNKNOWN_COMMAND = 65000
 # HIL_STATE (90), which only a simulator sends.
 UNKNOWN_MESSAGE = 90
-# Failures that are quoted.
+# The most failures that are quoted.
 MAX_QUOTED = 3
 
 
@@ -65,7 +65,7 @@ def periods(received: Iterable[tuple[float, object]]) -> list[float]:
 @requirement('heartbeat', 'sends HEARTBEAT', HEARTBEAT, 'HEARTBEAT Broadcast Frequency',
              presence=True)
 async def heartbeat(tester: Tester) -> str:
-    """Wait for one."""
+    """Wait for a HEARTBEAT."""
     session = tester.session
     received = session.received(Heartbeat)
     if not await session.runner.until(lambda: received, HEARTBEAT_TIMEOUT):
@@ -129,7 +129,7 @@ async def unknown_message(tester: Tester) -> str:
 
 
 def broadcast(status: type[Message]) -> Requirement[Tester]:
-    """Return the requirement on broadcast commands; the one sent requests the status."""
+    """Return the requirement on broadcast commands; the command requests the status."""
     @requirement('broadcast', 'answers commands that are broadcast to its system and to all '
                  'systems', ROUTING, 'Routing Detail')
     async def check(tester: Tester) -> None:
@@ -170,7 +170,7 @@ def _identity_strings(
     """
     Return a requirement on each string of COMPONENT_INFORMATION_BASIC.
 
-    :param deviation: returns what is wrong with a field of a name, '' if nothing.
+    :param deviation: returns the error in a field, '' if there is none; takes its name and value.
     """
     @requirement(name, title, MESSAGES, messages.ComponentInformationBasic.name)
     async def check(tester: Tester) -> None:
@@ -224,7 +224,7 @@ def interval_requirements(
     """
     Return the requirements ``interval``, ``interval-stop`` and ``interval-default``.
 
-    :param optional: whether a device may refuse the command.
+    :param optional: whether a device may reject the command.
     """
     on_interval = partial(requirement, specification=MESSAGES,
                           section='MAV_CMD_SET_MESSAGE_INTERVAL', changes=True)
@@ -238,7 +238,7 @@ def interval_requirements(
     @on_interval('interval', f'sends {status.name} at the requested interval')
     async def requested(tester: Tester) -> str:
         usual = periods(tester.session.idle(status))
-        # Not near its default.
+        # The requested interval must differ from the default.
         interval = 2 * INTERVAL if usual and median_high(usual) > INTERVAL / 2 and (
             median_high(usual) < 2 * INTERVAL) else INTERVAL
         await set_interval(tester, interval * 1e6)
@@ -267,7 +267,7 @@ def interval_requirements(
         if len(await tester.session.receive_more(status, DEFAULT_TIMEOUT, 2)) >= 2:
             return
         if not tester.session.idle(status):
-            raise Skipped('none was received, before the first command either')
+            raise Skipped('none was received, also not before the first command')
         raise Failed(f'accepted, but at most one was received in {DEFAULT_TIMEOUT:g} s')
 
     return requested, stopped, default
@@ -292,7 +292,7 @@ async def restore_interval(session: Session, status: type[Message]) -> None:
 @requirement('heartbeat-rate', 'sends HEARTBEAT at about 1 Hz', HEARTBEAT,
              'HEARTBEAT Broadcast Frequency', whole_run=True)
 async def heartbeat_rate(tester: Tester) -> str:
-    """Measure all intervals, and the time since the latest."""
+    """Measure all intervals, and the time since the latest HEARTBEAT."""
     received = tester.session.received(Heartbeat)
     gaps = periods(received)
     if not gaps:
@@ -325,7 +325,7 @@ def _for_each_command(
     """
     Return a requirement on the acknowledgements of every command.
 
-    :param deviation: returns what is wrong with a command from our address, '' if nothing.
+    :param deviation: returns the error of a command from our address, '' if there is none.
     :param measurement: returns a text that follows the number of commands.
     """
     @requirement(name, title, COMMAND, section, whole_run=True)
@@ -340,7 +340,7 @@ def _for_each_command(
 
 
 def _not_at_first(one: Transaction, sender: Address) -> str:
-    # On a lossy link the attempts show the link's loss.
+    # On a lossy link more attempts show the loss of the link.
     return f'{len(one.sent)} attempts, {one.answer}' if len(one.sent) > 1 or not one.acks else ''
 
 
@@ -376,7 +376,7 @@ def _unfinished(one: Transaction, sender: Address) -> str:
 
 
 def _busy(one: Transaction, sender: Address) -> str:
-    # Commands are never sent in parallel here.
+    # The session never sends commands in parallel.
     return ', '.join(result_name(ack.result) for ack in one.acks
                      if ack.result == MavResult.TEMPORARILY_REJECTED)
 
@@ -401,6 +401,6 @@ ACKNOWLEDGEMENTS = (
 @requirement('checksums', 'sends frames with correct checksums', SERIALIZATION, 'Checksum',
              whole_run=True)
 async def checksums(tester: Tester) -> None:
-    """Count the frames that the link has dropped; noise on a line counts, too."""
+    """Count the frames that the link has dropped; noise on a serial line counts, too."""
     if count := tester.conditions.checksum_errors():
         raise Failed(f'{count} {"frame" if count == 1 else "frames"} with a wrong checksum')

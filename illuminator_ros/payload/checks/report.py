@@ -32,12 +32,12 @@ _NOT_XML = {code: '?' for code in range(32) if code not in (9, 10, 13)}
 @dataclass(frozen=True)
 class Report:
     """
-    A run.
+    The report of a run.
 
     :param payload: name of the payload.
     :param kind: the kind of device.
     :param device: its address and identity, as text.
-    :param restored: the state in which it was left, as text.
+    :param restored: the state in which the device was left, as text.
     """
 
     payload: str
@@ -65,7 +65,7 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
     """
     Return a result as lines of the table.
 
-    :param verbose: whether a requirement that is met gets the lines of the log, too.
+    :param verbose: whether to show the lines of the log for a requirement that is met, too.
     """
     one = result.requirement
     met = result.verdict is Verdict.PASS
@@ -86,7 +86,7 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
 
 class Table:
     """
-    Turns results into lines; consecutive requirements that were not reached share one line.
+    Formats results as lines; consecutive requirements that were not reached share one line.
 
     :param verbose: as in :func:`lines`.
     """
@@ -105,7 +105,7 @@ class Table:
         return ended
 
     def end(self) -> list[str]:
-        """Return the lines that were held back."""
+        """Return the lines that were not complete before."""
         held, self._unreached = self._unreached, []
         if len(held) > 1:
             return [f'{Verdict.SKIPPED.value:8}{len(held)} requirements: {held[0].detail}']

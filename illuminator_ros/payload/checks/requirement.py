@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Requirements, the checks of a payload that they make up, and their results."""
+"""Requirements, the checks of a payload, which consist of requirements, and their results."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Conditions:
     :param consent: whether the operator has agreed to the checks that need consent.
     :param checksum_errors: returns how many frames with a wrong checksum the link has dropped.
     :param utc: returns the time, s since 1970.
-    :param options: values of the payload's own options.
+    :param options: the values of the options that only this payload has.
     """
 
     consent: bool = True
@@ -70,7 +70,7 @@ class Conditions:
 
 class Tester(Protocol):
     """
-    The part of a payload that operates the device; a check gets it.
+    The part of a payload that operates the device; the argument of each check.
 
     :ivar session: the session with the device.
     :ivar conditions: the conditions of the run.
@@ -87,7 +87,7 @@ class Tester(Protocol):
         """Save the state of the device; return whether the device reports one."""
 
     async def restore(self) -> list[str]:
-        """Restore the saved state; return the names of what differs from it."""
+        """Restore the saved state; return the names of the values that still differ from it."""
 
 
 T = TypeVar('T', bound=Tester, contravariant=True)
@@ -100,14 +100,14 @@ class Requirement(Generic[T]):
     A requirement on a device.
 
     :param name: its id, as in ``--only``.
-    :param title: what the device does, as a clause without subject.
+    :param title: the required behaviour of the device, as a clause without a subject.
     :param section: of the specification.
     :param check: returns a measurement as text, or None; raises ``Failed`` or ``Skipped``.
     :param changes: whether the check changes the state of the device.
     :param needs_consent: whether the operator must agree to the check, which then also changes
         the state of the device.
-    :param presence: whether it fails where no device is found; all others are skipped.
-    :param whole_run: whether it judges the messages of the whole run, so that it can be checked
+    :param presence: whether it fails if no device is found; all other requirements are skipped.
+    :param whole_run: whether it is about the messages of the whole run, so that it can be checked
         after the device was lost.
     """
 
@@ -130,7 +130,7 @@ class Requirement(Generic[T]):
 def requirement(
     name: str, title: str, specification: Specification, section: str, **flags: bool,
 ) -> Callable[[Check[T]], Requirement[T]]:
-    """Return a decorator that makes a check a :class:`Requirement`, with flags of that class."""
+    """Return a decorator that makes a :class:`Requirement` of a check, with its flags."""
     changes = flags.pop('changes', False) or flags.get('needs_consent', False)
     return lambda check: Requirement(
         name, title, specification, section, check, changes, **flags)
@@ -160,7 +160,7 @@ class Result:
 
 
 class Option(NamedTuple):
-    """An option of the command line that only this payload has: a number with a range."""
+    """An option of the command line that only one payload has: a number with a range."""
 
     name: str
     metavar: str
@@ -181,15 +181,15 @@ class PayloadChecks(Generic[T]):
     :param is_device: whether a message identifies its sender as a device of this payload.
     :param evidence: those messages, as text.
     :param tester: returns a tester that operates the device of a session.
-    :param describe: text of one of its messages, '' for the message's name.
-    :param risk: what the device does in the checks that need consent, as a clause.
-    :param question: asked before them; ``{device}`` and the options are filled in.
+    :param describe: returns the text of one of its messages, '' for the message's name.
+    :param risk: the actions of the device in the checks that need consent, as a clause.
+    :param question: asked before these checks; ``{device}`` and the options are filled in.
     :param options: options of the command line, for :attr:`Conditions.options`.
-    :param mavlink_version: 1 or 2, which the device needs; None if both will do.
+    :param mavlink_version: the version that the device needs, 1 or 2; None if it takes both.
     :param component: the component id that alone identifies a device, see :class:`Session`.
-    :param traces: what the checks leave, although they restore the device.
+    :param traces: the changes that remain after the device is restored, as text.
     :param discovery: a message that is requested of all components until a device is found.
-    :param part_of: names a part of a device that is another component, see :class:`Session`.
+    :param part_of: returns the component id of a part of the device, see :class:`Session`.
     """
 
     payload: str

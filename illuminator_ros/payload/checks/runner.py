@@ -27,9 +27,9 @@ from ...mavlink.messages import Address
 # s
 RESTORE_TIMEOUT = 10.0
 RESTORE_PAUSE = 0.5
-# Lines of the log that are kept of one check.
+# The most lines of the log that are kept of one check.
 MAX_LINES = 60
-# Addresses that are named in one text.
+# The most addresses that are named in one text.
 MAX_NAMED = 8
 
 _log = logging.getLogger(__name__)
@@ -51,7 +51,7 @@ def absence(session: Session, checks: PayloadChecks[T], timeout: float) -> str:
     """
     Return why there is no device to check.
 
-    :param timeout: s for which it was awaited.
+    :param timeout: s for which the device was awaited.
     """
     others = f'heard instead: {names(session.heard)}' if session.heard else (
         'nothing else was heard')
@@ -63,10 +63,10 @@ def absence(session: Session, checks: PayloadChecks[T], timeout: float) -> str:
 
 class CheckRunner(Generic[T]):
     """
-    Checks requirements one after another; :meth:`run` does it.
+    Checks requirements one after another in :meth:`run`.
 
-    :param checks: those of the payload.
-    :param requirements: those to check.
+    :param checks: the checks of the payload.
+    :param requirements: the requirements to check.
     :param on_result: called with each result.
     :ivar results: one for each requirement, in order, after the run.
     :ivar restored: the state in which the device was left, as text.
@@ -93,21 +93,21 @@ class CheckRunner(Generic[T]):
 
     @property
     def passed(self) -> bool:
-        """Whether at least one requirement is met, none is missed, and the run was complete."""
+        """Whether a requirement is met, no requirement has failed, and the run was complete."""
         verdicts = [one.verdict for one in self.results]
         return (not self.left_changed and not self._session.runner.interrupted
                 and Verdict.FAIL not in verdicts and Verdict.PASS in verdicts)
 
     async def run(self, missing: str = '') -> None:
         """
-        Check all requirements; to be run once by the session's runner.
+        Check all requirements; the session's runner must run it once.
 
         :param missing: why there is no device to check, '' if there is one.
         """
         self._missing = missing
         try:
             for one in self._requirements:
-                # Raises Interrupted, before the first check too.
+                # This raises Interrupted, also before the first check.
                 await self._session.runner.sleep(0.0)
                 self._add(await self._check(one))
         except Interrupted:
@@ -143,7 +143,7 @@ class CheckRunner(Generic[T]):
         return Result(one, verdict, detail, exchange, session.now - begun, reached)
 
     async def _prepare(self, one: Requirement[T]) -> None:
-        """Raise where the check cannot be made, or the device could not be restored after it."""
+        """Raise if the check cannot be made, or if the device could not be restored after it."""
         device = self._checks.device
         if self._missing:
             raise Failed(self._missing) if one.presence else _Unreached(f'no {device} was found')
@@ -156,7 +156,7 @@ class CheckRunner(Generic[T]):
         self.changed |= one.changes
 
     async def _restore(self) -> None:
-        """Restore the device; repeat it for some time if the device does not answer."""
+        """Restore the device; repeat this for :data:`RESTORE_TIMEOUT` while its state differs."""
         device, until = self._checks.device, self._session.now + RESTORE_TIMEOUT
         while True:
             try:

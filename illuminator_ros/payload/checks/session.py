@@ -49,9 +49,9 @@ ACK_TIMEOUT = 3.0
 PROGRESS_TIMEOUT = 4.0
 PROGRESS_LIMIT = 15.0
 MESSAGE_TIMEOUT = 1.0
-# After a final acknowledgement, so that a duplicate is not taken for the next command's.
+# s after a final acknowledgement, so that a duplicate is not assigned to the next command.
 SETTLE_TIME = 0.05
-# In which a device that must not answer may answer.
+# s; the time for which an answer that must not come is awaited.
 NO_ANSWER_TIME = 0.7
 LOST_TIMEOUT = 5.0
 REJECTION_PAUSE = 0.3
@@ -59,7 +59,7 @@ DISCOVERY_INTERVAL = 1.0
 
 ATTEMPTS = 4
 REJECTIONS = 12
-# Entries kept of each record, and acknowledgements of one command.
+# The most entries that are kept of each record, and acknowledgements of one command.
 MAX_ENTRIES = 10_000
 MAX_ACKS = 400
 
@@ -77,7 +77,7 @@ class _Wait:
         yield self
 
 
-# A coroutine that awaits :class:`_Wait`, by way of others.
+# A coroutine that awaits :class:`_Wait`, directly or through other coroutines.
 Main = Coroutine[_Wait, None, None]
 
 
@@ -160,14 +160,14 @@ class DeviceLost(Exception):
 
 
 class Skipped(Exception):
-    """A requirement cannot be checked here; the text gives the reason."""
+    """A requirement cannot be checked; the text gives the reason."""
 
 
 class Failed(Exception):
     """
     The device does not meet a requirement; the text gives the deviation.
 
-    :ivar lines: the lines of the log that show it, None for all of the check.
+    :ivar lines: the lines of the log that show the deviation, None for all lines of the check.
     """
 
     def __init__(self, reason: str, lines: list[str] | None = None) -> None:
@@ -188,7 +188,7 @@ def fail_if(failures: Iterable[Failed | None]) -> None:
 
 class History(deque[T]):
     """
-    The newest entries, so that a flood takes a bounded memory.
+    The newest entries, so that a flood of messages takes a bounded memory.
 
     :ivar total: entries ever appended.
     """
@@ -198,7 +198,7 @@ class History(deque[T]):
         self.total = 0
 
     def append(self, entry: T, /) -> None:
-        """Append an entry; the oldest one is dropped where there is no room."""
+        """Append an entry; drop the oldest entry if there is no room."""
         super().append(entry)
         self.total += 1
 
@@ -297,13 +297,13 @@ class Session(Endpoint):
     """
     Sends commands to one device and records its messages.
 
-    An endpoint of its own, not a payload of a component: it must see messages from system id 0
-    and every acknowledgement, which a component handles or drops.
+    It is an endpoint, not a payload of a component: it must see the messages from system id 0 and
+    every acknowledgement, which a component handles or drops.
 
-    :param address: our own address.
+    :param address: the address of the session.
     :param payload_messages: the classes of the payload's messages.
     :param is_device: whether a message identifies its sender as a device of this payload.
-    :param describe: text of a message of the payload, '' for its name.
+    :param describe: returns the text of a message of the payload, '' for its name.
     :param target: the device; None selects the first that is heard.
     :param component: the component id that alone identifies the device, whose system id changes;
         None if its address stays the same.
@@ -315,9 +315,8 @@ class Session(Endpoint):
     :ivar devices: the senders that are devices of this payload.
     :ivar idle_until: end of the time in which the session only listened, s.
     :ivar transactions: all commands.
-    :ivar versions: MAVLink versions of the frames of the device, each with their number.
-    :ivar odd_lengths: lengths of its MAVLink 1 frames that are not those of their messages, by
-        message name.
+    :ivar versions: the number of frames of the device by MAVLink version.
+    :ivar odd_lengths: the latest wrong length of its MAVLink 1 frames, by message name.
     :ivar log: a line for each message.
     """
 
@@ -458,7 +457,7 @@ class Session(Endpoint):
         return [(at, one) for at, one in self.received(cls) if at <= self.idle_until]
 
     def send(self, message: Message, sender: Address | None = None) -> None:
-        """Send a message from an address, by default our own."""
+        """Send a message from an address, by default the session's."""
         self._give(message, self._describe(message) or message.name, sender)
 
     def _give(self, message: Message, text: str, sender: Address | None) -> None:
@@ -478,10 +477,10 @@ class Session(Endpoint):
 
     async def find(self, timeout: float, listen: float) -> None:
         """
-        Wait for the device, ask for it if there is a discovery message, then only listen.
+        Wait for the device, and request its discovery message if there is one; then only listen.
 
         :param timeout: s to wait for the device.
-        :param listen: s to listen; :attr:`idle_until` is the end of it.
+        :param listen: s to listen; :attr:`idle_until` is their end.
         """
         end = self.now + timeout
         while self.found is None and self.now < end:
@@ -496,7 +495,7 @@ class Session(Endpoint):
     async def receive_more(
         self, cls: type[M], timeout: float, count: int = 1,
     ) -> list[tuple[float, M]]:
-        """Return the messages of a class that come within a time, s; end at the count-th."""
+        """Return the messages of a class that come within ``timeout`` s, or until the count-th."""
         received = self.received(cls)
         before = received.total
         await self.runner.until(lambda: received.total >= before + count, timeout)
@@ -507,15 +506,15 @@ class Session(Endpoint):
         target: Address | None = None, sender: Address | None = None,
     ) -> Transaction:
         """
-        Send a command, repeatedly while it is not acknowledged or temporarily rejected.
+        Send a command; repeat it while it is not acknowledged or is temporarily rejected.
 
         :param as_int: whether it is sent as COMMAND_INT.
         :param target: None for the device.
-        :param sender: the address that sends it, None for ours.
+        :param sender: the address that sends it, None for the session's.
         :raises DeviceLost: if the device has stopped sending.
         """
         for _ in range(REJECTIONS):
-            # Requirements of their own cover COMMAND_INT and other addresses.
+            # Separate requirements cover COMMAND_INT and other addresses.
             one = self._begin(
                 command, params, expected=not as_int and target is None and sender is None)
             for attempt in range(ATTEMPTS):
@@ -530,7 +529,7 @@ class Session(Endpoint):
         return one
 
     async def send_to_other(self, target: Address, command: int, *params: float) -> Transaction:
-        """Send a command to another address, and return what our device answers to it."""
+        """Send a command to another address, and return it with the answers of the device."""
         one = self._begin(command, params, expected=False)
         self._send(one, target)
         await self.runner.until(lambda: one.acks, NO_ANSWER_TIME)
@@ -538,7 +537,7 @@ class Session(Endpoint):
         return one
 
     async def required(self, cls: type[M]) -> M:
-        """Return a message that was requested; raise Skipped if it does not come."""
+        """Request a message and return it; raise Skipped if it does not come."""
         message = await self.request(cls)
         if message is None:
             raise Skipped(f'no {cls.name} was received')
@@ -580,7 +579,7 @@ class Session(Endpoint):
         return await self.runner.until(lambda: len(one.acks) > before, timeout)
 
     async def _answered(self, one: Transaction) -> bool:
-        """Wait for the result of an attempt, as long as progress is reported."""
+        """Wait for the result of an attempt, longer while progress is reported."""
         timeout, until = ACK_TIMEOUT, self.now + PROGRESS_LIMIT
         while not one.finals and self.now < until:
             if not await self._acknowledged(one, timeout):
