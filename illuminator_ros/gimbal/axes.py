@@ -35,12 +35,12 @@ LOCKS = (MountFlags.ROLL_LOCK, MountFlags.PITCH_LOCK, MountFlags.YAW_LOCK)
 AT_LIMIT = (ErrorFlags.AT_ROLL_LIMIT, ErrorFlags.AT_PITCH_LIMIT, ErrorFlags.AT_YAW_LIMIT)
 # Roll and pitch are relative to the horizon.
 LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
-# Angles that are equal, rad.
+# rad; angles that differ by less are equal.
 RESOLUTION = 1e-6
 
 
 class Range(NamedTuple):
-    """The range of an axis, rad, infinite where it is not known."""
+    """The range of an axis, rad; an unknown end is infinite."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -52,7 +52,7 @@ class Range(NamedTuple):
 
     @property
     def is_endless(self) -> bool:
-        """Whether it is a full turn, which has no stop."""
+        """Whether the range is a full turn, which has no stop."""
         return self.high - self.low >= math.tau - RESOLUTION
 
     def clip(self, angle: float) -> float:
@@ -60,7 +60,7 @@ class Range(NamedTuple):
         return min(max(angle, self.low), self.high)
 
 
-# Of roll, pitch, and yaw relative to the vehicle.
+# The ranges of roll, of pitch, and of yaw relative to the vehicle.
 Ranges: TypeAlias = tuple[Range, Range, Range]
 
 
@@ -71,7 +71,7 @@ def read_ranges(message: GimbalManagerInformation | GimbalDeviceInformation) -> 
 
 
 def range_fields(ranges: Ranges) -> dict[str, float]:
-    """Return the fields roll_min to yaw_max of such a message."""
+    """Return the fields roll_min to yaw_max of an INFORMATION message."""
     return {f'{axis}_{end}': value if math.isfinite(value) else math.nan
             for axis, range_ in zip(AXES, ranges, strict=True)
             for end, value in zip(('min', 'max'), range_, strict=True)}
@@ -80,5 +80,5 @@ def range_fields(ranges: Ranges) -> dict[str, float]:
 def other_signs(axis: str, range_: Range) -> Range:
     """Return a range of MAVLink with the signs of ROS, or the reverse: pitch and yaw differ."""
     low, high = range_
-    # 0 is added to have no negative zero.
+    # Adding 0 turns a negative zero into 0.
     return range_ if axis == 'roll' else Range(-high + 0.0, -low + 0.0)

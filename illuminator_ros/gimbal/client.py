@@ -37,7 +37,7 @@ from ..mavlink.messages import Address, Heartbeat, MAV_AUTOPILOT_INVALID, MavCmd
 from ..payload.listeners import Listeners
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
-# Gimbals, and one more if it is wanted; others are ignored, so that memory is bounded.
+# The most gimbals, so that memory is bounded. The gimbal with the configured id is kept, too.
 MAX_GIMBALS = 32
 # Components that may be managers. A further component replaces a long silent one.
 MAX_COMPONENTS = 256
@@ -47,7 +47,7 @@ FORGET_AFTER = 60.0
 RETURN_AFTER = 5.0
 # s between requests to different components, so that a slow line is not filled.
 REQUEST_SPACING = 0.25
-# s by which a component that is less likely to manage a gimbal is asked later.
+# s; the delay of the request to a component that is less likely to manage a gimbal.
 UNLIKELY_DELAY = 1.0
 
 
@@ -61,7 +61,7 @@ class GimbalClient(Payload):
     """
     Finds gimbals on a link by GIMBAL_MANAGER_INFORMATION.
 
-    It is requested from each component that is heard, less and less often where it does not come:
+    The client requests it from each component that is heard, at growing intervals until it comes:
     the capability bits of managers are optional.
 
     :param commands: the command sender of the component that carries this payload.
@@ -139,7 +139,7 @@ class GimbalClient(Payload):
         """
         Return the gimbal that has sent a message of a device.
 
-        Implementations that are older than the field send 0 for each device.
+        Implementations older than the field gimbal_device_id send 0 for each device.
         """
         found = self._gimbals.get(GimbalKey(source, number))
         if found is None and not number:
@@ -178,7 +178,7 @@ class GimbalClient(Payload):
         return True
 
     def _reopen(self, manager: Address, now: float) -> None:
-        """Request the information of a manager, which has sent a status without it."""
+        """Request the information of a manager that has sent a status but no information."""
         component = self._component(manager, now)
         if component.query.due == math.inf:
             component.query = Repetition()

@@ -55,7 +55,7 @@ def setpoint_flags(frame: YawFrame) -> MountFlags:
     """
     Return the flags of a setpoint whose yaw is relative to a frame.
 
-    PX4 and ArduPilot read YAW_LOCK as the frame of the yaw, so the two always agree.
+    PX4 and ArduPilot read YAW_LOCK as the frame of the yaw, so the two flags always agree.
     """
     lock = MountFlags.YAW_LOCK if frame is YawFrame.EARTH else MountFlags(0)
     return LEVEL | frame.flag | lock
@@ -64,9 +64,9 @@ def setpoint_flags(frame: YawFrame) -> MountFlags:
 @dataclass(frozen=True)
 class Configure:
     """
-    Takes primary control, or releases all control that we have.
+    Takes primary control, or releases all control of this component.
 
-    :param us: our address.
+    :param us: the address of this component.
     """
 
     us: Address
@@ -78,7 +78,7 @@ class Configure:
     @property
     def params(self) -> tuple[float, ...]:
         """See :class:`~..payload.request.Change`."""
-        # Not SENDER: PX4 takes that for the autopilot, ArduPilot for the sender.
+        # The address instead of SENDER, which PX4 reads as the autopilot.
         primary = self.us if self.take else (REMOVE_SENDER, REMOVE_SENDER)
         secondary = UNCHANGED if self.take else REMOVE_SENDER
         return *primary, secondary, secondary, 0, 0, self.device_id
@@ -107,7 +107,7 @@ class SetFlags:
     """
     Sets flags of the gimbal, and leaves its angles and rates as they are.
 
-    The device shows them; GIMBAL_MANAGER_STATUS of ArduPilot does not.
+    The status of the device shows the flags; GIMBAL_MANAGER_STATUS of ArduPilot does not.
 
     :param flag: the flag that changes.
     :param goal: the state to be reached, for people.

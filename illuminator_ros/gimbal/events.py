@@ -32,8 +32,8 @@ class GimbalKey(NamedTuple):
     """
     A gimbal device.
 
-    :param address: of the component that sends its attitude: itself, or its manager.
-    :param number: 1..6 of a device that is not a component of its own, else 0.
+    :param address: of the component that sends the attitude: the device, or its manager.
+    :param number: 1..6 for a device that is not a component of its own, else 0.
     """
 
     address: Address
@@ -50,7 +50,7 @@ class GimbalKey(NamedTuple):
 
 @dataclass(frozen=True)
 class DeviceIdentity:
-    """A GIMBAL_DEVICE_INFORMATION; a text that the device leaves empty is ''."""
+    """The identity in GIMBAL_DEVICE_INFORMATION; '' is an empty text or no version."""
 
     vendor: str
     model: str
@@ -91,14 +91,14 @@ class GimbalForgotten(GimbalEvent):
 
 @dataclass(frozen=True)
 class GimbalConnected(GimbalEvent):
-    """Manager and device are heard, for the first time or again."""
+    """The manager and the device are heard, for the first time or again."""
 
     manager: Address
 
 
 @dataclass(frozen=True)
 class GimbalLost(GimbalEvent):
-    """Manager or device is not heard any more."""
+    """The manager or the device is no longer heard."""
 
     reason: str
 
@@ -108,7 +108,7 @@ class AttitudeReceived(GimbalEvent):
     """
     The device has sent GIMBAL_DEVICE_ATTITUDE_STATUS.
 
-    :param attitude: None if the status has none.
+    :param attitude: None if the status has no valid attitude.
     """
 
     attitude: MountAttitude | None
@@ -119,12 +119,12 @@ class AttitudeReceived(GimbalEvent):
 @dataclass(frozen=True)
 class ControlChanged(GimbalEvent):
     """
-    Other components control the gimbal, or it is not known any more who does.
+    The components in control have changed, or have become unknown.
 
-    :param before: as it was known last, None if it never was.
-    :param after: None where it is not known.
-    :param ours: whether we have primary control.
-    :param was_lost: whether we had primary control and have not released it.
+    :param before: the last known control, None if it was never known.
+    :param after: None if it is unknown.
+    :param ours: whether this component has primary control.
+    :param was_lost: whether this component had primary control and has not released it.
     """
 
     before: Control | None
@@ -150,7 +150,7 @@ class SecondManager(GimbalEvent):
 
 @dataclass(frozen=True)
 class ManagerChanged(GimbalEvent):
-    """The gimbal is controlled through another manager, since the one before is lost."""
+    """The gimbal is controlled through another manager, since the previous one is lost."""
 
     before: Address
     after: Address
@@ -158,7 +158,7 @@ class ManagerChanged(GimbalEvent):
 
 @dataclass(frozen=True)
 class AutomaticTakeFailed(GimbalEvent):
-    """Control was not obtained automatically."""
+    """The automatic request for control has failed."""
 
     message: str
 
@@ -169,14 +169,14 @@ class GimbalSnapshot:
     A gimbal at one moment, for any thread.
 
     :param unreachable: why it is not connected, for people; '' if it is.
-    :param managers: those that announce it and are heard; the first one is used.
+    :param managers: the managers that announce it and are heard; the first one is used.
     :param capabilities: None if the manager has not sent them.
     :param attitude_at: when the last attitude status came, s; -inf if none has.
-    :param attitude_problem: why that has no attitude, '' if it has one.
+    :param attitude_problem: why the last status has no attitude, '' if it has one.
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
     :param enforces_control: False if the manager is known to obey components without control.
     :param holder: the source of commands that holds it, '' if none does; None without sources.
-    :param held_since: when that began, s.
+    :param held_since: when it got this holder, s.
     """
 
     key: GimbalKey

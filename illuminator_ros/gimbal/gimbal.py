@@ -60,14 +60,14 @@ from ..payload.rotation import flu_frd, Quaternion, Vector
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
-# s for a request, confirmation included.
+# s; the limit of a request, including its confirmation.
 REQUEST_LIMIT = 5.0
 # s after which an attitude is sent again, since the message is not acknowledged.
 REPEATS = (0.2, 0.4, 0.8)
-# s after GIMBAL_MANAGER_STATUS until it is requested, since ArduPilot does not stream it and PX4
-# does each 2 s, and until it shows control no more.
+# s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
+# PX4 does every 2 s), and after which control is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
-# Managers of one gimbal; more are ignored.
+# The most managers of one gimbal; further ones are ignored.
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
@@ -77,7 +77,7 @@ _MOVES = DEVICE_ID_PARAM.keys() - {GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE}
 
 @dataclass
 class Repetition:
-    """Requests a message until it has come, less and less often; times are s."""
+    """The times of the requests for a message, at growing intervals until it comes; s."""
 
     due: float = -math.inf
     _interval: float = 1.0
@@ -91,7 +91,7 @@ class Repetition:
         return True
 
     def finish(self) -> None:
-        """Request nothing more: the message has come."""
+        """End the requests: the message has come."""
         self.due = math.inf
 
 
@@ -101,7 +101,7 @@ class _Manager:
 
     target: request.Target
     requests: request.RequestQueue[GimbalManagerStatus]
-    # For changes that the device shows.
+    # For changes that the status of the device confirms.
     flag_target: request.Target
     flag_requests: request.RequestQueue[GimbalDeviceAttitudeStatus]
     heard_at: float = -math.inf
@@ -122,14 +122,14 @@ class _Manager:
 @dataclass(frozen=True)
 class GimbalSettings:
     """
-    How gimbals are treated.
+    The settings of the gimbals of a client.
 
     :param setpoint_timeout: s after the last rate until a rate of zero is sent.
     :param attitude_interval: s between attitudes of the device; 0 for its own.
-    :param auto_take_control: whether control is taken once a gimbal is connected that no
-        component controls.
-    :param device_id: gimbal device id of the gimbal that is found whatever others there are.
-    :param sources: of commands, None where all are alike.
+    :param auto_take_control: whether to take control of a gimbal that no component controls once
+        it is connected.
+    :param device_id: gimbal device id of the gimbal that is kept beyond the limit of gimbals.
+    :param sources: the sources of commands, None where all are alike.
     """
 
     setpoint_timeout: float = 0.5
@@ -142,9 +142,9 @@ class GimbalSettings:
 @dataclass
 class _Setpoint:
     """
-    The last setpoint, and when it is sent again or ends, s.
+    The last setpoint, and the times at which it is sent again or ends, s.
 
-    :param message: None for a place, which is a command.
+    :param message: None for a place, which a command sets.
     """
 
     manager: Address
@@ -155,7 +155,7 @@ class _Setpoint:
 
     @property
     def moves(self) -> bool:
-        """Whether the gimbal turns on with it: towards a place, or at a rate."""
+        """Whether the gimbal keeps turning: towards a place, or at a rate."""
         return self.message is None or self.zero_at < math.inf
 
 
@@ -163,12 +163,12 @@ class Gimbal:
     """
     One gimbal device, for a component that may control it; in turns of the link.
 
-    Its first manager that is heard is used. Every change needs primary control, as
-    GIMBAL_MANAGER_STATUS shows it.
+    The first manager that is heard is used. Every change needs primary control, which
+    GIMBAL_MANAGER_STATUS must show.
 
     :param emit: takes its events.
     :ivar was_commanded: whether a user has ever sent it a request or a setpoint.
-    :ivar in_control: whether we have primary control, and its manager is heard.
+    :ivar in_control: whether this component has primary control, and the manager is heard.
     """
 
     def __init__(
@@ -186,7 +186,7 @@ class Gimbal:
         self._others: set[Address] = set()
         self._announced_at = self._device_heard_at = -math.inf
         self._manager_heard = self._connected = False
-        # As it is known, and as it was known last.
+        # The control now, None if unknown; and the last known control.
         self._control: Control | None = None
         self._last_control: Control | None = None
         self._may_take = settings.auto_take_control
@@ -209,7 +209,7 @@ class Gimbal:
     # Liveness
 
     def link_closed(self, now: float, reason: str) -> None:
-        """Note that nothing can be sent any more, and why."""
+        """Record that the link is closed, and the reason."""
         self._link_problem = reason
         for manager in self._managers.values():
             manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
@@ -217,7 +217,7 @@ class Gimbal:
 
     @property
     def silent_since(self) -> float:
-        """Return when a manager last announced it, or its device was heard, s."""
+        """Return when a manager last announced the gimbal or its device was last heard, s."""
         return max(self._announced_at, self._device_heard_at)
 
     def heard(self, address: Address, now: float, autopilot: int) -> None:
@@ -274,7 +274,7 @@ class Gimbal:
         if control is None:
             if (setpoint := self._setpoint) is not None:
                 setpoint.repeats.clear()
-                # The zero that ends a rate is sent now, or when the manager is heard again.
+                # The zero that ends a rate is sent now, or once the manager shows control again.
                 if (setpoint.zero_at < math.inf and self._manager_heard
                         and setpoint.manager == self._manager):
                     self._send_rates(STILL, now)
@@ -382,22 +382,22 @@ class Gimbal:
 
     @property
     def has_any_control(self) -> bool:
-        """Whether we have primary or secondary control, and its manager is heard."""
+        """Whether this component has primary or secondary control, and the manager is heard."""
         return self._control is not None and self._control.includes(self._commands.address)
 
     @property
     def enforces_control(self) -> bool:
-        """Whether the manager is not known to obey components without control."""
+        """False if the manager is known to obey components without control."""
         manager = self._active
         return manager is None or manager.autopilot != MAV_AUTOPILOT_ARDUPILOTMEGA
 
     def take_control(self, now: float, done: request.Done) -> None:
-        """Take primary control; a success only if GIMBAL_MANAGER_STATUS shows it."""
+        """Take primary control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         self.was_commanded = True
         self._configure(True, now, done)
 
     def release_control(self, now: float, done: request.Done) -> None:
-        """Release control; a success only if GIMBAL_MANAGER_STATUS shows it."""
+        """Release control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         def ended(result: request.Result, now: float) -> None:
             self._releasing = False
             done(result, now)
@@ -432,7 +432,7 @@ class Gimbal:
                 manager.target, change, now, self._explained(change.goal, ended)), now)
 
     def _explained(self, goal: str, done: request.Done) -> request.Done:
-        """Return the end of a request, whose refusal names the goal, the manager and control."""
+        """Return a callback that adds the manager, the goal and the control to a refusal."""
         manager = self._manager
 
         def ended(result: request.Result, now: float) -> None:
@@ -454,7 +454,7 @@ class Gimbal:
     # Sources
 
     def claim(self, source: str, now: float) -> str:
-        """Take a request of a source; return why it may not command the gimbal, '' if it may."""
+        """Claim the gimbal for a source; return why it may not command it, '' if it may."""
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.claim(source, now), now)
         return self.refusal(source)
@@ -469,7 +469,7 @@ class Gimbal:
 
     def release(self, source: str, now: float) -> str:
         """
-        Note that a source needs the gimbal no more: the next lower one gets it.
+        Release the gimbal: the next lower source that has claimed it then holds it.
 
         :return: the source that holds it now, '' if none does.
         """
@@ -478,14 +478,14 @@ class Gimbal:
         return self._sources.holder or ''
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """End the rate, the place and the commands of the source before."""
+        """End the rate, the place and the commands of the previous source."""
         if change is None:
             return
         if self._setpoint is not None and self._setpoint.moves:
             self._setpoint.zero_at = now
         if self._active is not None and change.before is not None:
             self._active.flag_requests.cancel(self.refusal(change.before), now)
-            # The manager may have other gimbals.
+            # The manager may have other gimbals, whose commands must not end.
             self._commands.end_all(
                 now, CommandStatus.CANCELLED, self._manager, lambda command: (
                     command.command in _MOVES and self.key.device_id == command.params[
@@ -537,7 +537,7 @@ class Gimbal:
         return Capabilities(manager.information.cap_flags)
 
     def _missing(self, *enough: Capabilities) -> str:
-        """Return which of some capabilities is needed, for people; '' if the gimbal has one."""
+        """Return that the gimbal has none of some capabilities, '' if it has or may have one."""
         known = self._capabilities()
         if known is None or any(one in known for one in enough):
             return ''
@@ -608,7 +608,7 @@ class Gimbal:
         """
         Send an attitude as roll, pitch and yaw in ROS, rad; NaN leaves an axis as it is.
 
-        An axis is left where the last attitude that was sent has it, else where it is.
+        Such an axis keeps its angle in the last sent attitude, else its reported angle.
 
         :return: why it was not sent, for people; '' if it was.
         """
@@ -631,7 +631,7 @@ class Gimbal:
 
     def set_rates(self, rates: Vector, now: float) -> str:
         """
-        Send rates of roll, pitch and yaw in ROS, rad/s; zero follows after the time-out.
+        Send rates of roll, pitch and yaw in ROS, rad/s; zero is sent after the time-out.
 
         :return: why they were not sent, for people; '' if they were.
         """
@@ -659,7 +659,7 @@ class Gimbal:
         self._commands.send(message)
 
     def _stop(self) -> None:
-        """Send no setpoint again."""
+        """End the repetition of the setpoint."""
         self._setpoint = None
 
     # Time

@@ -37,7 +37,7 @@ class ControlSettings:
     """
     The rules by which control moves from player to player.
 
-    :param priority: players, the highest first; all others rank below them, and equally.
+    :param priority: players, the highest first; all others rank equally, below these.
     :param overruling: players that take control under each policy.
     :param lease: s without a heartbeat of a player after which its control ends, > 0.
     """
@@ -51,7 +51,7 @@ class ControlSettings:
 @dataclass(frozen=True)
 class RoleHolderChanged:
     """
-    A role has another player.
+    The player that has a role has changed.
 
     :param before: the player that had it, None if none had.
     :param after: the player that has it now, None if none has.
@@ -69,10 +69,11 @@ class ControlArbiter:
     """
     Decides who is in primary and in secondary control. No I/O; times are s.
 
-    Each role is held by at most one player. A player may also give a role that it may have to
+    Each role is held by at most one player. A player that may take a role may also give it to
     another player.
 
-    :ivar primary: who holds primary control, and ``secondary``; only this class changes them.
+    :ivar primary: the arbiter of primary control; likewise ``secondary``. Only this class changes
+        them.
     """
 
     def __init__(self, settings: ControlSettings) -> None:
@@ -97,14 +98,14 @@ class ControlArbiter:
         self, source: Address, params: Sequence[float], now: float,
     ) -> list[RoleHolderChanged] | None:
         """
-        Execute MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, both roles or neither.
+        Execute MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE for both roles or for neither.
 
-        Clients such as MAVSDK claim both roles where they need the primary one. The secondary one
-        then stays with another player that has it.
+        Clients such as MAVSDK claim both roles although they need only the primary one. Another
+        player that has the secondary role then keeps it.
 
         :param params: param1 to param4.
         :return: None if it is denied.
-        :raises ValueError: if the params have no meaning.
+        :raises ValueError: if the params do not name players.
         """
         primary = self._wanted(Role.PRIMARY, source, *params[0:2])
         secondary = self._wanted(Role.SECONDARY, source, *params[2:4])
@@ -133,7 +134,7 @@ class ControlArbiter:
     def _wanted(
         self, role: Role, source: Address, system: float, component: float,
     ) -> Address | None:
-        """Return the player that shall have a role."""
+        """Return the player to which the params give a role."""
         holder = self.holder(role)
         special: dict[float, Address | None] = {
             NO_PLAYER: None, UNCHANGED: holder, SENDER: source,

@@ -15,8 +15,8 @@
 """
 Setpoints of a gimbal: reading, mixing and limiting them. Pure functions; MAVLink's conventions.
 
-Rotations are those of FRD axes. Roll and pitch are relative to the horizon, yaw to north or to the
-vehicle's heading, as the :class:`~..payload.mount_attitude.YawFrame` says.
+Rotations are of FRD axes. Roll and pitch are relative to the horizon. Yaw is relative to north or
+to the vehicle's heading: see :class:`~..payload.mount_attitude.YawFrame`.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ from ..payload.mount_attitude import (
 )
 from ..payload.rotation import Quaternion, Vector
 
-# The attitude is set by the flag alone.
+# Flags that alone set the attitude.
 POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
-# Flags that GIMBAL_DEVICE_SET_ATTITUDE passes on; those of the yaw frame are set by its value.
+# Flags that are copied to GIMBAL_DEVICE_SET_ATTITUDE; its yaw frame flags depend on the frame.
 # An operation on an IntFlag takes ten times as long as on an int.
 _PASSED_BITS = int(POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
                    | MountFlags.RC_MIXED)
@@ -62,7 +62,7 @@ _POSE_BITS = int(POSES)
 _EARTH_BIT, _VEHICLE_BIT = int(YawFrame.EARTH.flag), int(YawFrame.VEHICLE.flag)
 _NO_FLAGS = MountFlags(0)
 _RIGHT_ANGLE = math.pi / 2
-# rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
+# rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL; the specification names no value.
 MANUAL_RATE = 0.5
 # The capability that a flag needs.
 _NEEDED = {MountFlags.RETRACT: Capabilities.HAS_RETRACT,
@@ -90,7 +90,7 @@ class GimbalModel:
         """
         Read the message of a device; an axis that it lacks stays at 0.
 
-        An end that is not finite is unknown, and so are both of a range whose ends are swapped.
+        An end that is not finite is unknown. If the ends of a range are swapped, both are unknown.
         """
         capabilities = Capabilities(message.cap_flags | message.cap_flags2)
 
@@ -128,9 +128,9 @@ class GimbalModel:
 
     def accepts_earth_frame(self, reported: int | None) -> bool:
         """
-        Return whether the gimbal can be given a yaw that is relative to north.
+        Return whether the gimbal accepts a yaw relative to north.
 
-        :param reported: the flags that the device reports now, None if it does not.
+        :param reported: the flags that the device reports now, None if it reports none.
         """
         if not self.capabilities:
             return True
@@ -141,13 +141,13 @@ class GimbalModel:
 
 class Demand(NamedTuple):
     """
-    A player's request, as one message or command has it.
+    The content of one setpoint message or command of a player.
 
     :param flags: :class:`~..payload.mount_attitude.MountFlags`.
     :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
     :param rates: of the axes, rad/s; NaN where none is given.
-    :param attitude: given, or made of the angles if none of them is NaN, else None.
+    :param attitude: as given, or computed from the angles if none of them is NaN, else None.
     """
 
     flags: int = 0
@@ -163,7 +163,7 @@ class Demand(NamedTuple):
 
     @property
     def has_rates_only(self) -> bool:
-        """Whether it has a rate, and neither attitude nor angle."""
+        """Whether the demand has a rate, and neither an attitude nor an angle."""
         return (self.attitude is None and any(map(math.isfinite, self.rates))
                 and not any(map(math.isfinite, self.angles)))
 
@@ -181,7 +181,7 @@ class Demand(NamedTuple):
         """
         Return a demand with the yaw frame that its flags name.
 
-        :raises ValueError: if they name both, or a value is infinite.
+        :raises ValueError: if the flags name both frames, or a value is infinite.
         """
         values = *angles, *rates
         if math.inf in values or -math.inf in values:
@@ -197,7 +197,7 @@ class Demand(NamedTuple):
         """
         Read GIMBAL_MANAGER_SET_ATTITUDE or GIMBAL_DEVICE_SET_ATTITUDE.
 
-        :raises ValueError: if the quaternion is not a rotation, or see above.
+        :raises ValueError: if the quaternion is not a rotation; also see :meth:`_checked`.
         """
         return cls._checked(message.flags, UNSET_VECTOR, (
             message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
@@ -210,7 +210,7 @@ class Demand(NamedTuple):
         """
         Read the values of GIMBAL_MANAGER_SET_PITCHYAW, rad and rad/s; with an angle, roll is 0.
 
-        :raises ValueError: see above.
+        :raises ValueError: see :meth:`_checked`.
         """
         roll = math.nan if math.isnan(pitch) and math.isnan(yaw) else 0.0
         return cls._checked(flags, (roll, pitch, yaw), (math.nan, pitch_rate, yaw_rate))
@@ -220,9 +220,9 @@ class Demand(NamedTuple):
         cls, message: GimbalManagerSetManualControl, ranges: Ranges,
     ) -> Demand:
         """
-        Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of the rates.
+        Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of :data:`MANUAL_RATE`.
 
-        :raises ValueError: if a value is beyond -1..1, or see above.
+        :raises ValueError: if a value is beyond -1..1; also see :meth:`_checked`.
         """
         values = message.pitch, message.yaw, message.pitch_rate, message.yaw_rate
         if any(abs(value) > 1 for value in values):
@@ -263,11 +263,11 @@ class Setpoint(NamedTuple):
     """
     The setpoint of a gimbal.
 
-    :param attitude: None where only the rates count.
-    :param rates: rad/s, that the device follows; NaN where it chooses.
-    :param turning: rad/s, by which the manager turns the attitude.
+    :param attitude: None for a pose, or where only the rates count.
+    :param rates: the rates that the device follows, rad/s; NaN where the device chooses.
+    :param turning: the rates at which the manager turns the attitude, rad/s.
     :param since: when the attitude applies, s.
-    :param angles: roll, pitch and yaw that made the attitude, rad; NaN if anything else did.
+    :param angles: the angles from which the attitude was computed, rad; NaN if it was not.
     """
 
     flags: int
@@ -307,8 +307,8 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     """
     Return the setpoint that a demand makes.
 
-    :param current: the attitude in the frame of the demand, from which axes without an angle
-        begin; not used with an attitude, a pose or, unless ``turns``, with rates only.
+    :param current: the attitude, in the frame of the demand, from which axes without an angle
+        start; not used for an attitude, for a pose or, unless ``turns``, for rates only.
     :param turns: whether the manager must turn the gimbal where only rates are given.
     """
     flags, frame = demand.flags, demand.frame
@@ -368,12 +368,12 @@ def clip(
     """
     Return an attitude within the ranges, and the angles that were clipped.
 
-    :param offset: the direction from which the range of the yaw counts, rad in the frame of the
-        attitude; None where it is not known, which leaves the yaw as it is.
-    :param made_of: the angles that made the attitude, if they are known.
+    :param offset: the yaw of straight ahead in the frame of the attitude, rad: the yaw range is
+        relative to it. None if it is unknown; the yaw is then not clipped.
+    :param made_of: the angles from which the attitude was computed, NaN if they are unknown.
     """
     if offset is not None:
-        # The angles of a quaternion take as long as all of the rest.
+        # The computation of angles from a quaternion takes as long as the rest of this function.
         roll, pitch, yaw = made_of
         (roll_low, roll_high), (pitch_low, pitch_high), (yaw_low, yaw_high) = ranges
         if (roll_low <= roll <= roll_high and pitch_low <= pitch <= pitch_high
@@ -390,7 +390,7 @@ def clip(
             continue
         asked = _nearest(angles[index] - zero, range_)
         limit = range_.clip(asked)
-        # A difference by float32 rounding does not count.
+        # Ignore differences due to rounding to float32.
         if abs(limit - asked) > 1e-5:
             clipped.append(Clipped(AXES[index], asked, limit))
             angles[index] = limit + zero
@@ -398,7 +398,7 @@ def clip(
 
 
 def _nearest(angle: float, range_: Range) -> float:
-    """Return the angle, or the same direction a turn away, that is nearest to a range."""
+    """Return the angle, or the same angle plus or minus a turn, that is nearest to a range."""
     return min((angle, angle + 2 * math.pi, angle - 2 * math.pi),
                key=lambda one: max(range_.low - one, one - range_.high, 0.0))
 
@@ -445,12 +445,12 @@ def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | MavResult:
     """
     Return the place of MAV_CMD_DO_SET_ROI_LOCATION.
 
-    :return: the place, and whether its altitude is above the home position; the result of the
-        command if it has no place.
+    :return: the place, and whether its altitude is relative to the home position; the result of
+        the command if it has no valid place.
     """
     *_, latitude, longitude, altitude = command.params
     is_relative = False
-    # A COMMAND_LONG has no frame: PX4 takes its altitude for one above mean sea level, too.
+    # A COMMAND_LONG has no frame; PX4, too, reads its altitude as above mean sea level.
     if isinstance(command, CommandInt):
         is_relative = command.frame in RELATIVE_FRAMES
         if not is_relative and command.frame not in ABSOLUTE_FRAMES:
@@ -465,7 +465,7 @@ def direction(origin: GeoPoint, target: GeoPoint) -> tuple[float, float] | None:
     """
     Return pitch and yaw of the line from one place to another, rad.
 
-    :return: None if the places are nearer than 0.1 m, so that there is no direction.
+    :return: None if the places are less than 0.1 m apart.
     """
     x, y, z = (b - a for a, b in zip(_in_space(origin), _in_space(target), strict=True))
     latitude, longitude = math.radians(origin.latitude), math.radians(origin.longitude)

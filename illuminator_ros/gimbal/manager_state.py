@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether a gimbal manager may be active: its device is heard, no other manager announces it."""
+"""The state of a gimbal manager, which depends on its device and on other managers of it."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ from ..mavlink.messages import Address
 # s without a message after which a device, or another manager, is lost.
 DEVICE_TIMEOUT = 3.0
 MANAGER_TIMEOUT = 3.0
-# s for which a manager listens for others: at least, and at random more, so that of two that begin
-# together one announces the device first. Their addresses may be equal.
+# s for which a manager listens for other managers: the least time, and the most random time that
+# is added. So of two managers that start together, one announces the device first, even if their
+# addresses are equal.
 LISTENING_TIME, RANDOM_TIME = 2.0, 2.0
-# Other gimbal devices that are named where the manager's own is not heard.
+# The most other gimbal devices that are named while the manager's own is not heard.
 MAX_OTHER_DEVICES = 8
 
 
@@ -38,8 +39,8 @@ class ManagerState(Enum):
     """
     The states of a gimbal manager.
 
-    Only an ACTIVE one announces the device and gives it setpoints. LISTENING waits for other
-    managers of the device, INACTIVE has heard one.
+    Only an ACTIVE manager announces the device and gives it setpoints. A LISTENING manager waits
+    for other managers of the device; an INACTIVE manager has heard one.
     """
 
     NO_DEVICE = 'no device'
@@ -74,7 +75,7 @@ TRANSITIONS: dict[tuple[ManagerState, ManagerInput], ManagerState] = {
 @dataclass(frozen=True)
 class StateChanged:
     """
-    A manager has another state.
+    The state of a manager has changed.
 
     :param device: the address of its device, None for one without MAVLink.
     :param other: the other manager that was heard, None if there is none.
@@ -89,7 +90,7 @@ class StateChanged:
 
 class StateTracker:
     """
-    The device of a manager, and other managers of it. No I/O; times are s.
+    Tracks the device of a manager, and other managers of this device. No I/O; times are s.
 
     :param address: of the manager.
     :param device_id: of the device; 1..6 for one without MAVLink, 0 for the first that is heard.
@@ -135,12 +136,12 @@ class StateTracker:
         return f'{device} has not been heard' + (f'; heard: {others}' if others else '')
 
     def link_opened(self, now: float) -> None:
-        """Note that messages can be sent."""
+        """Record that the link is open."""
         if not self.has_mavlink:
             self._take(ManagerInput.DEVICE_HEARD, now)
 
     def link_closed(self, now: float) -> None:
-        """Note that nothing can be heard any more."""
+        """Record that the link is closed."""
         self.other = None
         self._take(ManagerInput.DEVICE_LOST, now)
 
@@ -165,10 +166,10 @@ class StateTracker:
         self._take(ManagerInput.MANAGER_HEARD, now)
 
     def poll(self, now: float) -> None:
-        """Note the ends of times."""
+        """Act on each time-out that is over."""
         if self.device and now >= self._device_heard + DEVICE_TIMEOUT:
             self._take(ManagerInput.DEVICE_LOST, now)
-            # Another device may be meant where none is named.
+            # If no id is configured, the next device may be another one.
             self.device = None
         if self.other and now >= self._other_heard + MANAGER_TIMEOUT:
             self.other = None

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-A gimbal manager with a client in its own process, by which ROS is one of the players.
+A gimbal manager and a client in one process; through the client, ROS is one of the players.
 
-The two exchange the messages of the gimbal protocol as over a link, with one address for both. So
-the manager has the same interface for ROS as a gimbal that another component manages, and ROS is
-subject to the same rules as all other players.
+The two exchange the messages of the gimbal protocol as over a link, and have the same address. So
+ROS has the same interface as for a gimbal that another component manages, and the same rules apply
+to ROS as to all other players.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class ManagerWithClient(Payload):
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, AnySetpoint):
-            # It makes none of the messages that the client receives.
+            # A setpoint causes none of the messages that the client receives.
             self.manager.take_setpoint(source, message, now)
             return
         if isinstance(message, mav.CommandAck):
@@ -126,7 +126,7 @@ class ManagerWithClient(Payload):
 
     def _manage(self, call: Callable[..., T], *arguments: Any) -> T:
         """
-        Call the manager, and let the client receive the messages that it broadcasts.
+        Call the manager, and pass the messages that it broadcasts to the client.
 
         :param arguments: of the call; the last one is the time.
         """
@@ -139,7 +139,7 @@ class ManagerWithClient(Payload):
         return result
 
     def _serve_client(self, now: float) -> None:
-        """Give the client's messages to the manager, or send those to the device."""
+        """Pass the client's messages to the manager; send those for other components."""
         while self._own.outgoing:
             source, message = self._own.outgoing.popleft()
             target = (getattr(message, 'target_system', 0),

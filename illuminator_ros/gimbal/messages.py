@@ -16,7 +16,7 @@
 The gimbal protocol v2: messages, commands and flags.
 
 https://mavlink.io/en/services/gimbal_v2.html
-Its commands and messages carry a gimbal device id: the component id of the device, or 1..6 for a
+Its commands and messages have a gimbal device id: the component id of the device, or 1..6 for a
 device that is not a component of its own, and 0 for all devices of a manager. Quaternions are
 w, x, y, z. GIMBAL_DEVICE_ATTITUDE_STATUS is in ``payload/messages.py``, the flags of devices and
 managers are in ``payload/mount_attitude.py``.

@@ -16,9 +16,9 @@
 A simulated gimbal device: it obeys its gimbal manager and no other component.
 
 https://mavlink.io/en/services/gimbal_v2.html. Its manager is the component of its own system that
-announces it: that names the device's component id in GIMBAL_MANAGER_STATUS or
-GIMBAL_MANAGER_INFORMATION. The first one stays its manager until it has been silent for
-:data:`MANAGER_TIMEOUT`.
+announces it, that is, names the device's component id in GIMBAL_MANAGER_STATUS or
+GIMBAL_MANAGER_INFORMATION. The first such component stays its manager until it has not announced
+the device for :data:`MANAGER_TIMEOUT`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from ..payload.simulated_settings import integer, number, one_of, Setting, text,
 
 # s without an announcement after which a component is no longer the manager.
 MANAGER_TIMEOUT = 5.0
-# rad of movement after which the view has another line.
+# rad of movement after which the view shows another line.
 TRAVEL_STEP = math.radians(15.0)
 
 _degrees = number(-180.0, 180.0)
@@ -55,11 +55,11 @@ _degrees = number(-180.0, 180.0)
 @dataclass(frozen=True)
 class GimbalBehaviour(Behaviour):
     """
-    How a simulated gimbal behaves; the defaults follow the protocol.
+    The behaviour of a simulated gimbal; the defaults follow the protocol.
 
     :param enforces_control: whether it ignores setpoints of components that do not control it.
     :param reports: whether it sends its status.
-    :param frozen_flags: whether its status shows the flags of the start.
+    :param frozen_flags: whether its status always shows the flags that it had at the start.
     :param frozen_axis: the name of an axis that does not move, '' for none.
     :param jump: angle by which every tenth reported attitude is wrong, degrees.
     :param names_frame: whether the status names its yaw frame.
@@ -68,11 +68,11 @@ class GimbalBehaviour(Behaviour):
     :param static_information: whether its INFORMATION message always has the same content.
     :param limits_range: whether it keeps within the range that it reports.
     :param stops: whether a rate of 0 stops it.
-    :param accepts_earth_always: whether it claims to accept yaw in the earth frame without a
+    :param accepts_earth_always: whether it reports ACCEPTS_YAW_IN_EARTH_FRAME even without a
         heading.
     :param takes_manager_set: whether a device obeys the messages to managers.
-    :param reports_earth: whether it reports yaw relative to north where its setpoint is.
-    :param reports_failures: whether it has failure flags.
+    :param reports_earth: whether it reports yaw relative to north if its setpoint has such a yaw.
+    :param reports_failures: whether its failure flags show the axes at their limits.
     """
 
     heartbeat_type: int = gimbal.MAV_TYPE_GIMBAL
@@ -113,7 +113,7 @@ GIMBAL_FAULTS = FaultTable({
     'no-limits': Fault('limits_range', 'turns beyond the range that it reports', default=False),
     'runaway': Fault('stops', 'goes on turning when the rate is set to 0', default=False),
 })
-# A device takes no commands that change it, so that it has no result to get wrong.
+# No command changes a device, so the faults in the results of such commands are left out.
 FAULTS = FaultTable({
     **{name: fault for name, fault in GIMBAL_FAULTS.items()
        if name not in ('refuse', 'progress', 'busy', 'disobey')},
@@ -144,7 +144,7 @@ class GimbalProperties:
 
 class SimulatedMount:
     """
-    The gimbal of a device, or of a manager that is its own device: motion, and what it reports.
+    The gimbal of a device, or of a manager that is its own device: its motion and its reports.
 
     :param device_id: gimbal_device_id of its messages, 0 for a component of its own.
     """
@@ -195,7 +195,7 @@ class SimulatedMount:
         if behaviour.names_frame:
             flags |= frame.flag
         elif known:
-            # In older devices YAW_LOCK is the frame, too.
+            # In older devices YAW_LOCK also selects the frame.
             frame = yaw_frame(flags)
         if behaviour.accepts_earth_always or known and (
                 motion.mechanics.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME):
@@ -339,7 +339,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
             roll, pitch, yaw = Quaternion(*message.q).normalized().euler()
         except ValueError:
             return
-        # 0 means that it is unknown.
+        # An angular velocity of 0 means unknown.
         self.mount.motion.take_heading(
             roll, pitch, yaw, message.angular_velocity_z or math.nan, now)
 

@@ -15,10 +15,10 @@
 """
 A simulated gimbal with a gimbal manager of its own: one component, no messages between the two.
 
-https://mavlink.io/en/services/gimbal_v2.html, "Standalone Integrated Camera/Gimbal". Where the
-specification is open: control goes to any component that takes it; a command without control gets
-MAV_RESULT_DENIED; the angles of secondary control are added to those of primary control, up to
-:data:`NUDGE_LIMIT`.
+https://mavlink.io/en/services/gimbal_v2.html, "Standalone Integrated Camera/Gimbal". Rules for
+what the specification leaves open: control goes to any component that takes it; a command without
+control gets MAV_RESULT_DENIED; the angles of secondary control are added to the angles of primary
+control, up to :data:`NUDGE_LIMIT`.
 """
 
 from __future__ import annotations
@@ -67,20 +67,20 @@ MAV_AUTOPILOT_PX4 = 12
 @dataclass(frozen=True)
 class ManagerBehaviour(GimbalBehaviour):
     """
-    How a simulated gimbal manager behaves; the defaults follow the protocol.
+    The behaviour of a simulated gimbal manager; the defaults follow the protocol.
 
     :param enforces_roi: whether a region of interest needs control, too.
-    :param frozen_control: whether its status shows the control of the start.
+    :param frozen_control: whether its status always shows that no component has control.
     :param has_secondary: whether it has secondary control.
-    :param own_is_manager: whether -2 in CONFIGURE is the manager itself, not the sender.
+    :param own_is_manager: whether -2 in CONFIGURE means the manager itself, not the sender.
     :param releases_pairs: whether -3 in CONFIGURE needs system and component id of the sender.
     :param invalid_configure: result of CONFIGURE with values that do not exist.
     :param rates_in_degrees: whether PITCHYAW has rates in deg/s, else in rad/s.
     :param checks_device: whether it ignores messages for other gimbal devices.
     :param takes_pitchyaw: whether it takes GIMBAL_MANAGER_SET_PITCHYAW.
     :param takes_manual: whether it takes GIMBAL_MANAGER_SET_MANUAL_CONTROL.
-    :param partial_angles: result of PITCHYAW with the angle of one axis, which then changes
-        nothing; None where the axes are independent.
+    :param partial_angles: result of PITCHYAW with the angle of only one axis, which it then
+        ignores; None if it takes such an angle.
     :param angles_with_rates: whether messages may have angles and rates.
     :param frame_is_lock: whether YAW_LOCK alone selects the frame of a yaw.
     :param shows_flags: whether its status has the flags of the setpoint.
@@ -102,7 +102,7 @@ class ManagerBehaviour(GimbalBehaviour):
     shows_flags: bool = True
 
 
-# Each kind of component may be a manager, so that no heartbeat type is wrong.
+# Any type of component may be a manager, so the faults of the heartbeat's content are left out.
 FAULTS = FaultTable({
     **{name: fault for name, fault in GIMBAL_FAULTS.items() if name not in ('type', 'autopilot')},
     'stale-control': Fault('frozen_control', 'reports the control of its start'),
@@ -110,7 +110,7 @@ FAULTS = FaultTable({
 
 
 class Profile(NamedTuple):
-    """The behaviour of a gimbal manager that exists."""
+    """The behaviour of a kind of gimbal manager."""
 
     description: str
     behaviour: ManagerBehaviour = ManagerBehaviour()
@@ -277,14 +277,14 @@ class SimulatedManager(simulated.SimulatedDevice):
         return None if ignored else demand
 
     def _lacks_an_axis(self, demand: Demand) -> bool:
-        """Return whether a demand has the angle of one axis, which the profile does not take."""
+        """Return whether a demand has the angle of only one axis, and the profile ignores it."""
         _, pitch, yaw = demand.target
         return math.isnan(pitch) is not math.isnan(yaw) and (
             self.behaviour.partial_angles is not None)
 
     def _obey(self, source: Address, demand: Demand, now: float) -> None:
         if self.behaviour.enforces_control and source == self.secondary != self.primary:
-            # Nudging adds angles; a rate would move what primary control holds.
+            # Nudging adds angles; a rate would override the angles of primary control.
             nudge = Range(-NUDGE_LIMIT, NUDGE_LIMIT)
             roll, pitch, yaw = (
                 (own if math.isfinite(own) else 0.0) + nudge.clip(added)
@@ -329,7 +329,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         pitch, yaw, *rates = map(math.radians, values)
         pitch_rate, yaw_rate = rates if self.behaviour.rates_in_degrees else values[2:]
         try:
-            # NaN and infinity cannot be converted: ValueError, OverflowError.
+            # int() of NaN raises ValueError, and of infinity OverflowError.
             demand = Demand.from_pitch_yaw(
                 self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
@@ -355,7 +355,7 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _resolved(
         self, current: Address, values: Sequence[float], source: Address,
     ) -> Address:
-        """Return the component that the values of CONFIGURE give control to."""
+        """Return the component to which the values of CONFIGURE give control."""
         own = self.properties.gimbal.address if self.behaviour.own_is_manager else source
         result = []
         for now_, value, itself, sender in zip(current, values, own, source, strict=True):

@@ -54,7 +54,7 @@ class GimbalMechanics:
     :param roll, pitch: relative to the horizon.
     :param yaw: relative to the vehicle's heading; a full turn has no stop.
     :param rate: highest rate of each axis, rad/s.
-    :param drift: of the gimbal's own heading where it gets none from the vehicle, rad/s.
+    :param drift: of the gimbal's own heading while the vehicle sends none, rad/s.
     """
 
     roll: Range = Range(*map(math.radians, (-45.0, 45.0)))
@@ -76,7 +76,7 @@ class GimbalMechanics:
 
     @property
     def retracted(self) -> Vector:
-        """Return the angles of the retracted position, rad: as far up as it turns, ahead."""
+        """Return the angles of the retracted position, rad: the highest pitch, and ahead."""
         return self.roll.clip(0.0), self.pitch.high, self.yaw.clip(0.0)
 
 
@@ -123,7 +123,7 @@ class _Axis:
         self.angle = wrapped(self.angle + step) if endless else self.angle + step
         self.stopped = within != goal and abs(within - self.angle) < RESOLUTION
         if self.stopped and self.rate:
-            # Otherwise it would take as long to return as it was driven against the stop.
+            # Otherwise its return would take as long as it was driven against the stop.
             self.target += self.angle - goal
 
 
@@ -132,7 +132,7 @@ class GimbalMotion:
     """
     The axes of a gimbal: roll and pitch relative to the horizon, yaw relative to the vehicle.
 
-    It computes the state of a moment when it is asked for; ``now`` is s.
+    A call computes the state at its time ``now``, s.
 
     :ivar flags: the flags of the latest setpoint.
     :ivar frame: the yaw frame of the latest setpoint.
@@ -151,7 +151,7 @@ class GimbalMotion:
     _limited: bool = True
 
     def fail(self, frozen_axis: str, *, limited: bool) -> None:
-        """Let an axis stand still, '' for none, and the axes keep within their ranges or not."""
+        """Freeze an axis, '' for none; set whether the axes keep within their ranges."""
         self._frozen_axis, self._limited = frozen_axis, limited
 
     def heading_known(self, now: float) -> bool:
@@ -159,7 +159,7 @@ class GimbalMotion:
         return now < self.vehicle.until
 
     def _heading(self, now: float) -> float:
-        """Return the heading as the gimbal's gyros have it: it drifts while it is unknown."""
+        """Return the heading of the gimbal's gyros; it drifts while the vehicle sends none."""
         lost = max(0.0, now - max(self.vehicle.until, 0.0))
         return wrapped(self.vehicle.yaw + self.mechanics.drift * lost)
 
@@ -176,7 +176,7 @@ class GimbalMotion:
         return bool(can_lock and (self.flags & LOCKS[axis] or not can_follow))
 
     def _references(self, now: float) -> Vector:
-        """Return for each axis what is added to its target to have its angle."""
+        """Return for each axis the difference of its angle and its target, rad."""
         vehicle = self.vehicle
         roll, pitch = (0.0 if self.locked(axis) else angle
                        for axis, angle in enumerate((vehicle.roll, vehicle.pitch)))
@@ -186,8 +186,8 @@ class GimbalMotion:
         """
         Take a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
 
-        A rate beside an angle is that at which it is approached; an axis with neither keeps its
-        angle.
+        A rate with an angle is the speed at which the axis approaches the angle; an axis with
+        neither keeps its angle.
         """
         self.advance(now)
         flags, angles, rates = demand.flags, demand.target, demand.rates
@@ -234,7 +234,7 @@ class GimbalMotion:
             axis.target += turned
             goal = axis.target + reference
             if name == 'yaw':
-                # An angle is within a turn of the stops, a rate goes on from where it is.
+                # The goal of an angle is within -pi..pi; a rate continues from the present angle.
                 ahead = axis.angle + turned
                 goal = ahead + wrapped(goal - ahead) if axis.rate else wrapped(goal)
             if name == self._frozen_axis or not capabilities & has_axis:
@@ -261,7 +261,7 @@ class GimbalMotion:
         return any(abs(rate) > self.mechanics.drift * 1.5 + RESOLUTION for rate in self.rates)
 
     def limits(self) -> ErrorFlags:
-        """Return the flags of the axes that the end of their range has stopped."""
+        """Return the flags of the axes that are stopped at the end of their range."""
         return ErrorFlags(sum(flag for flag, axis in zip(AT_LIMIT, self._axes, strict=True)
                               if axis.stopped))
 

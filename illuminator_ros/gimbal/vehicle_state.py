@@ -34,7 +34,7 @@ ESTIMATES_ATTITUDE, ESTIMATES_VELOCITY = 1, 2 | 4
 
 
 class _Latest(Generic[T]):
-    """The latest values of the link and of ROS; the value of the link comes first."""
+    """The latest values from the link and from ROS; the link's value takes precedence."""
 
     def __init__(self) -> None:
         # Of ROS, and of the link.
@@ -54,8 +54,8 @@ class VehicleState:
     """
     Attitude, velocity and position of the vehicle; NED and FRD. No I/O; times are s.
 
-    Values of the link's autopilot come before those of ROS. A value older than :data:`MAX_AGE`
-    is unknown.
+    Values of the link's autopilot take precedence over values from ROS. A value older than
+    :data:`MAX_AGE` is unknown.
     """
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class VehicleState:
         self._home_altitude: float | None = None
 
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
-        """Take a message of the autopilot, unless its values are not finite, or no position."""
+        """Take a message of the autopilot; ignore values that are not finite, or no position."""
         if isinstance(message, Attitude):
             if not (message.is_finite and math.isfinite(message.yawspeed)):
                 return
@@ -106,7 +106,7 @@ class VehicleState:
 
     @property
     def home_altitude(self) -> float | None:
-        """Return the altitude from which relative altitudes count, m above mean sea level."""
+        """Return the altitude of the home position, m above mean sea level, None if unknown."""
         return self._home_altitude
 
     def for_device(self, device: Address, now: float) -> AutopilotStateForGimbalDevice | None:

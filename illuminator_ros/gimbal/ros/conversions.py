@@ -33,12 +33,13 @@ FRAME_PARAMETERS = (
     ParameterSpec('vehicle_frame', 'base_link_stabilized',
                   'frame_id of attitudes with a yaw relative to the vehicle'),
 )
-# Of roll, pitch and yaw, rad; a quaternion has no angles beyond. Rounded ones are accepted.
+# rad; the limits of roll, pitch and yaw, which are those of a quaternion, and the tolerance for
+# rounded angles.
 ANGLE_LIMITS = (math.pi, math.pi / 2, math.pi)
 ANGLE_TOLERANCE = 0.001
-# rad/s, one turn a second: greater ones are likely to be degrees.
+# rad/s, one turn a second; greater rates are probably in degrees.
 RATE_LIMIT = 2 * math.pi
-# m; float32, the type of MAVLink, does not have all greater ones.
+# m; some greater altitudes exceed the range of float32, their type in MAVLink.
 ALTITUDE_LIMIT = 100e3
 
 

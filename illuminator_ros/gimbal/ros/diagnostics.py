@@ -28,9 +28,9 @@ from ...payload.mount_attitude import AXES, MountFlags
 from ...ros import diagnostics
 from ...ros.command_sources import holder_values
 
-# s of silence that are reported: statuses and attitudes come about five times a second.
+# s; a longer silence is reported: statuses and attitudes come about five times a second.
 SILENCE = 2.0
-# Error flags that do not say that the gimbal is defective.
+# Error flags that do not indicate a defect of the gimbal.
 _CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags.AT_YAW_LIMIT
                | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER)
 
@@ -63,7 +63,7 @@ def reports(
 
     :param gimbal: the node's gimbal, None if there is none yet.
     :param known: see :func:`why_no_gimbal`.
-    :param interval: s between attitudes as it was requested, 0 for the device's own.
+    :param interval: the requested s between attitudes, 0 for the device's own interval.
     :param started: when the node was started, s on the link's clock.
     """
     manager = gimbal.managers[0] if gimbal else None
@@ -114,7 +114,7 @@ def _single(errors: ErrorFlags) -> list[ErrorFlags]:
 
 
 def controller(control: Control | None) -> str:
-    """Return the components in control for people, ``unknown`` where they are not known."""
+    """Return the components in control, for people; ``unknown`` if they are not known."""
     return 'unknown' if control is None else str(control)
 
 
@@ -139,7 +139,7 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
         values['status_s_ago'] = now - gimbal.status_at
     if gimbal.attitude is not None:
         values['yaw_frame'] = gimbal.attitude.frame.value
-        # 0 is added to have no negative zero.
+        # Adding 0 turns a negative zero into 0.
         values |= {f'{axis}_rad': angle + 0.0 for axis, angle in zip(
             AXES, gimbal.attitude.rotation.euler(), strict=True)}
         values['vehicle_heading_rad'] = gimbal.attitude.heading

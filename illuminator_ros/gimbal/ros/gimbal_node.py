@@ -109,7 +109,7 @@ class GimbalNode:
         self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, key: events.GimbalKey, now: float) -> None:
-        """Serve a gimbal from now on, and publish what is known of it."""
+        """Serve a gimbal from now on, and publish its known state."""
         self.key = key
         self._host.frame_log.assign(key.address, self._log)
         if (gimbal := self._gimbal()) is not None:
@@ -122,7 +122,7 @@ class GimbalNode:
                 self.take(events.SecondManager(key, snapshot.managers[0], other))
 
     def release(self) -> None:
-        """Serve no gimbal: it was forgotten."""
+        """Serve the gimbal no longer, since it was forgotten."""
         if self.key:
             self._host.frame_log.assign(self.key.address, None)
         self.key = None
@@ -211,7 +211,7 @@ class GimbalNode:
             answer(False, self.absence(now))
 
     def _claimed(self, name: str, now: float, answer: ros_node.Answer) -> Gimbal | None:
-        """Return the gimbal for a request of the plain interface; answer a refused one."""
+        """Return the gimbal for a request of the plain interface; answer a refused request."""
         gimbal = self._gimbal()
         refusal = self.absence(now) if gimbal is None else _refusal(gimbal, name, now)
         if refusal:
@@ -269,7 +269,7 @@ class GimbalNode:
             ended(now)
 
         gimbal = self._gimbal()
-        # The source may have lost the gimbal while the place before was sent.
+        # The source may have lost the gimbal while the previous place was sent.
         refusal = gimbal.refusal(source) if gimbal else self.absence(now)
         if refusal or gimbal is None:
             done(request.Result(False, refusal), now)
@@ -292,9 +292,9 @@ class GimbalNode:
 
 
 def _refusal(gimbal: Gimbal, name: str, now: float) -> str:
-    """Claim the gimbal for a request of the plain interface; return why not, '' if claimed."""
+    """Claim the gimbal if a request of the plain interface needs it; return any refusal, or ''."""
     if name == 'take_control':
-        # A higher source needs the control that only this service takes.
+        # Higher sources also need this control, and no other service takes it.
         return ''
     if name == 'release_control':
         return gimbal.refusal_of_claim(DEFAULT)

@@ -49,7 +49,7 @@ GIMBAL_PARAMETERS = (
 
 def settings(values: Values) -> GimbalSettings:
     """
-    Return how gimbals are treated.
+    Return the settings of the gimbals.
 
     :raises ParameterError: if the sources are wrong.
     """
@@ -62,7 +62,7 @@ class Gimbals(ServedPayload):
     """
     Gives each gimbal on the link a node; for turns of the link.
 
-    :param why_none: returns the reason of this process why there is no gimbal, '' if it has none.
+    :param why_none: returns a reason in this process why there is no gimbal, '' if there is none.
     :raises ParameterError: if a parameter is wrong.
     """
 
@@ -87,7 +87,7 @@ class Gimbals(ServedPayload):
             self._serve(event)
 
     def _serve(self, event: GimbalConnected) -> None:
-        """Give a gimbal a node: the first one, or one of its own."""
+        """Give a gimbal a node: the first node, or a new one."""
         key, nodes = event.key, self._nodes
         if nodes.first_is_free and self._host.values['gimbal_device_id'] in (0, key.device_id):
             nodes.bind(nodes.first, key, self._host.link.clock())
@@ -95,7 +95,7 @@ class Gimbals(ServedPayload):
         else:
             name = f'{self._host.node.get_name()}_{key.address.system}_{key.device_id}'
             if nodes.has_name(name):
-                # The same number behind another manager.
+                # Another manager has a gimbal with this number.
                 name += f'_{key.address.component}'
             nodes.serve(key, name)
 
@@ -104,7 +104,7 @@ class Gimbals(ServedPayload):
         self._nodes.poll(now)
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
-        """See :meth:`ServedPayload.shut_down`: release the gimbals that we control."""
+        """See :meth:`ServedPayload.shut_down`: release all gimbals under our control."""
         def done(key: GimbalKey, result: Result, now: float) -> None:
             severity = logging.INFO if result.success else logging.ERROR
             report(key, severity, f'gimbal {key}: {result.message}')

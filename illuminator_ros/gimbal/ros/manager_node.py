@@ -48,7 +48,7 @@ from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 # The name of ROS in the lists of players.
 ROS = 'ros'
-# The fastest vehicle, rad/s and m/s.
+# The limits of a plausible vehicle, rad/s and m/s.
 VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
 
@@ -194,7 +194,7 @@ class ManagerNode(ServedPayload):
 
     def _publish(self, event: gimbal_manager.SetpointSent) -> None:
         setpoint = event.setpoint
-        # Neutral and retracted are the same for a gimbal that has an attitude only.
+        # A setpoint without an attitude is the neutral position: level and ahead.
         attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
         header = Header(stamp=self._clock.now().to_msg(),
                         frame_id=self._frames.name(setpoint.frame))
@@ -234,7 +234,7 @@ def findings(manager: gimbal_manager.GimbalManager, peers: int) -> list[Finding]
     """
     Return the findings on a manager.
 
-    :param peers: over how many peers the player in primary control is heard.
+    :param peers: the number of peers over which the player in primary control is heard.
     """
     found: list[Finding] = []
     if manager.tracker.state is ManagerState.INACTIVE:
@@ -283,7 +283,7 @@ def _read_imu(message: Imu) -> tuple[Quaternion, float]:
 
 
 def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
-    """Return attitude, yaw rate and velocity, NED and FRD; the twist has the child's frame."""
+    """Return attitude, yaw rate and velocity, NED and FRD; the twist is in the child frame."""
     attitude = read_quaternion(message.pose.pose.orientation).normalized()
     twist = message.twist.twist
     x, y, z = (_within(value, VEHICLE_SPEED_LIMIT) for value in read_vector(twist.linear))
