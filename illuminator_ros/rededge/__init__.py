@@ -15,7 +15,7 @@
 """
 A MicaSense multispectral camera: RedEdge, RedEdge-MX, RedEdge-P, Altum.
 
-It takes position, UTC, attitude and mount angles in MAVLink 1 frames, writes them into the
+The camera takes position, UTC, attitude and mount angles in MAVLink 1 frames, writes them into the
 metadata of its images, and captures on request.
 https://micasense.github.io/rededge-api/api/serial.html
 """

@@ -29,15 +29,15 @@ from ..mavlink.messages import Address, Message
 PING_INTERVAL = 2.0
 PING_TIMEOUT = 1.0
 PING_TRIES = 2
-# PINGs without a reply that show that the camera does not receive.
+# Successive PINGs without a reply after which the camera counts as not receiving.
 UNANSWERED_PINGS = 3
 # s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
 CAPTURE_TIMEOUT = 5.0
-# s in which the answer to a capture that had none may still come.
+# s in which a late answer to a capture may still come.
 LATE_ANSWER = 60.0
-# Image indices that are remembered: a new request has an index that was not seen.
+# Image indices that are remembered: the image of a new request has a new index.
 MAX_INDICES = 32
-# Heartbeats in CONFLICT_WINDOW s that one component does not send; it sends one a second.
+# So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
 CONFLICT_HEARTBEATS = 10
 CONFLICT_WINDOW = 7.0
 
@@ -54,7 +54,7 @@ class CameraConnected:
 
 @dataclass(frozen=True)
 class CameraLost:
-    """The camera's heartbeat has ended, or the link has."""
+    """The camera's heartbeat has stopped, or the link is closed."""
 
     address: Address
     reason: str
@@ -62,7 +62,7 @@ class CameraLost:
 
 @dataclass(frozen=True)
 class ImageTaken:
-    """The camera reported an image, requested by whichever component."""
+    """The camera reported an image, which any component may have requested."""
 
     feedback: rededge.CameraFeedback
 
@@ -75,12 +75,12 @@ class CameraSnapshot:
     """
     The camera at one moment, for any thread; times are s on the link's clock.
 
-    :param address: the one that it sent from last, None if it was never heard.
-    :param loss: that it is lost and why, '' if it is connected or was never heard.
+    :param address: its latest address, None if it was never heard.
+    :param loss: a text with the reason of its loss, '' if it is connected or was never heard.
     :param conflict: whether several components have the camera's component id.
-    :param round_trip: of the last answered PING, s; None if none was.
-    :param unanswered_pings: since the last reply.
-    :param images: reported since the start.
+    :param round_trip: of the last answered PING, s; None if no PING was answered.
+    :param unanswered_pings: PINGs without a reply since the last reply.
+    :param images: images that were reported since the start.
     """
 
     address: Address | None
@@ -95,7 +95,7 @@ class CameraSnapshot:
 
     @property
     def is_unresponsive(self) -> bool:
-        """Return whether the camera is heard, and does not answer."""
+        """Return whether the camera is heard, but does not answer PINGs."""
         return self.connected and self.unanswered_pings >= UNANSWERED_PINGS
 
 
@@ -115,7 +115,7 @@ class _Capture:
     sent_at: float
     done: Done
     index: int | None = None
-    # Whether an image was seen that an earlier request may have caused.
+    # Whether an image was reported that an earlier request may have caused.
     ambiguous: bool = False
 
     @property
@@ -125,13 +125,13 @@ class _Capture:
 
 class Camera:
     """
-    The camera, identified by its component id: it adopts the system id of what it receives.
+    The camera, identified by its component id, since it adopts the system id of the host.
 
-    :param own: our address.
+    :param own: the address of this component.
     :param heartbeat_timeout: silence after which it is lost, s.
     :param send: sends a message.
     :param emit: takes the events.
-    :param sequence: of the first PING.
+    :param sequence: the sequence number before the first PING.
     """
 
     def __init__(
@@ -157,13 +157,13 @@ class Camera:
         self._unanswered_pings = 0
         self._capture: _Capture | None = None
         self._indices: deque[int] = deque(maxlen=MAX_INDICES)
-        # Until when answers to captures that had none may come, s.
+        # The ends of the times in which late answers to captures may come, s.
         self._late: deque[float] = deque(maxlen=MAX_INDICES)
         self._images = 0
 
     @property
     def target(self) -> Address:
-        """Return where messages to the camera go; its system id is 0 until it is heard."""
+        """Return the target of messages to the camera; its system id is 0 until it is heard."""
         return self._address or Address(0, rededge.MAV_COMP_ID_CAMERA)
 
     def snapshot(self, now: float) -> CameraSnapshot:
@@ -240,7 +240,7 @@ class Camera:
         self._send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
 
     def take_ping(self, message: rededge.Ping, now: float) -> None:
-        """Take a PING of the camera, which is a reply if it has our address."""
+        """Take a PING of the camera, which is a reply if its target is our address."""
         if (message.target_system, message.target_component) != self._own:
             return
         sent_at = self._pings.pop(message.seq, None)
@@ -271,7 +271,7 @@ class Camera:
     # Captures
 
     def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
-        """Take an image; a success only after its CAMERA_FEEDBACK."""
+        """Take an image; succeed only after its CAMERA_FEEDBACK."""
         if not self._connected:
             done(False, self._loss(now) or 'no camera connected: none heard yet')
         elif self._capture is not None:
@@ -282,12 +282,12 @@ class Camera:
             self._send(rededge.DigicamControl(*self.target, 1, 1, 0, 0, shot, 0, 0, 0.0))
 
     def take_status(self, message: rededge.CameraStatus, now: float) -> None:
-        """Take CAMERA_STATUS, which says that an image was triggered."""
+        """Take CAMERA_STATUS, which reports that an image was triggered."""
         if message.event_id == rededge.CameraStatusType.TRIGGER:
             self._take_index(message.img_idx, now)
 
     def take_feedback(self, message: rededge.CameraFeedback, now: float) -> None:
-        """Take CAMERA_FEEDBACK, which says that an image was taken."""
+        """Take CAMERA_FEEDBACK, which reports that an image was taken."""
         self._images += 1
         self._take_index(message.img_idx, now)
         self._emit(ImageTaken(message))
@@ -301,14 +301,14 @@ class Camera:
                       f'{format_seconds(now - capture.sent_at)}{note}')
 
     def _take_index(self, index: int, now: float) -> None:
-        """Note an image; a request caused the first one after it."""
+        """Record an image; a request causes the first new image after it."""
         if index in self._indices:
             return
         self._indices.append(index)
         while self._late and now >= self._late[0]:
             self._late.popleft()
         if self._late:
-            # It may be the late answer to an earlier request.
+            # The image may be the late answer to an earlier request.
             self._late.popleft()
             if self._capture is not None:
                 self._capture = replace(self._capture, ambiguous=True)

@@ -49,11 +49,11 @@ PING_TIMEOUT = 1.0
 LATE_TIMEOUT = 2.0
 STATUS_TIMEOUT = 2.0
 FEEDBACK_TIMEOUT = 10.0
-# In which an image that must not be taken would be reported.
+# s; the time for which the report of an image that must not be taken is awaited.
 NO_IMAGE_TIME = 3.0
 INJECTION_TIME = 1.0
 INJECTION_INTERVAL = 0.2
-# After the last injected state: it still counts, and it does not count any more.
+# s after the last injected state: the camera still uses it, and no longer uses it.
 WITHIN_VALIDITY, AFTER_VALIDITY = 3.0, 7.0
 MAX_CLOCK_ERROR = 2.0
 
@@ -71,14 +71,14 @@ with_consent = partial(requires, needs_consent=True)
 
 
 class Capture(NamedTuple):
-    """The messages that reported an image; None for one that did not come."""
+    """The messages that reported an image; None for a message that did not come."""
 
     status: rededge.CameraStatus | None
     feedback: rededge.CameraFeedback | None
 
     @property
     def taken(self) -> bool:
-        """Whether it has reported an image at all."""
+        """Whether an image was reported."""
         return self.status is not None or self.feedback is not None
 
 
@@ -132,11 +132,11 @@ class CameraTester:
         state: Callable[[], Sequence[Message]] = tuple,
     ) -> Capture:
         """
-        Command an image, and return what the camera reports of it.
+        Command an image, and return the camera's reports of it.
 
         :param system: the target system, by default the camera's.
         :param timeout: s to wait for CAMERA_FEEDBACK.
-        :param state: returns messages that are sent meanwhile.
+        :param state: returns messages that are sent during the wait.
         """
         session = self.session
         statuses = session.received(rededge.CameraStatus)
@@ -206,7 +206,7 @@ class CameraTester:
                                     round(mount_roll * 100), 0))
 
     def clock_error(self, feedback: rededge.CameraFeedback) -> float:
-        """Return how far the time of an image, taken now, is from the time of day, s."""
+        """Return the error of the time of an image that was taken now, s."""
         return feedback.time_usec / 1e6 - self.conditions.utc()
 
     def _utc_us(self) -> int:
@@ -214,7 +214,7 @@ class CameraTester:
 
 
 def is_at_injected_place(feedback: rededge.CameraFeedback) -> bool:
-    """Return whether an image was taken where :meth:`CameraTester.raw_position` says."""
+    """Return whether an image was taken at the place of :meth:`CameraTester.raw_position`."""
     return (abs(feedback.lat / 1e7 - LATITUDE) <= MAX_PLACE_ERROR
             and abs(feedback.lng / 1e7 - LONGITUDE) <= MAX_PLACE_ERROR
             and abs(feedback.alt_msl - ALTITUDE) <= MAX_ALTITUDE_ERROR)
@@ -244,7 +244,7 @@ async def ping(tester: CameraTester) -> str:
 
 @requires('ping-sequence', 'answers PING with its sequence number', section='PING')
 async def ping_sequence(tester: CameraTester) -> None:
-    """Send both ends of its range, too."""
+    """Send PINGs with both ends of the range, too."""
     for sequence in (0, 1, 2 ** 32 - 1):
         if (answer := await tester.ping(sequence)).seq != sequence:
             raise Failed(f'answers sequence number {sequence} with {answer.seq}')
@@ -344,7 +344,7 @@ async def any_system(tester: CameraTester) -> None:
 def _position(
     name: str, section: str, state: Callable[[CameraTester], Sequence[Message]],
 ) -> Requirement[CameraTester]:
-    """Return the requirement on images with a position that some messages carry."""
+    """Return the requirement that images have the position and time of some messages."""
     @with_consent(name, f'writes position and time of {section} into images', section=section)
     async def check(tester: CameraTester) -> str:
         await tester.inject(lambda: state(tester))
@@ -417,7 +417,7 @@ async def lengths(tester: CameraTester) -> None:
 
 
 def _documented(one: Requirement[Tester], title: str = '') -> Requirement[Tester]:
-    """Return a requirement on any component as the serial API has it."""
+    """Return a requirement on any component, with the serial API as its specification."""
     return replace(one, specification=SERIAL_API, section='HEARTBEAT', title=title or one.title)
 
 
@@ -436,7 +436,7 @@ REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
 
 
 def describe(message: Message) -> str:
-    """Return a message of the camera in one line, '' for another message."""
+    """Return the text of a message of the camera, '' for another message."""
     if isinstance(message, rededge.Ping):
         target = Address(message.target_system, message.target_component)
         return f'PING {message.seq} to {target}' if any(target) else f'PING {message.seq}'

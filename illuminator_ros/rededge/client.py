@@ -32,9 +32,9 @@ from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 @dataclass(frozen=True)
 class Settings:
     """
-    How the camera is treated.
+    The settings of the client.
 
-    :param heartbeat_timeout: silence after which it is lost, s.
+    :param heartbeat_timeout: silence after which the camera is lost, s.
     """
 
     feeder: FeederSettings = FeederSettings()
@@ -53,8 +53,9 @@ class RedEdgeClient(Payload):
     """
     Feeds one camera, captures images, and reports its events.
 
-    :param commands: of the component that carries it; the camera itself takes no commands.
-    :param sequence: of the first PING, so that a reply to an earlier run is not taken for ours.
+    :param commands: sends messages from the component's address; the camera takes no commands.
+    :param sequence: the sequence number before the first PING; by default random, so that a reply
+        to an earlier run does not count.
     :ivar camera: PINGs and captures.
     :ivar feeder: takes the inputs.
     """

@@ -16,8 +16,8 @@
 Conversions between ROS and the camera: pure functions, and one table of all fields.
 
 ROS: ENU and FLU (REP-103), heights above the WGS84 ellipsoid, m, rad. The camera: NED and FRD,
-heights above mean sea level, and mount angles of its own. A vehicle-relative rotation of zero is
-a camera that looks straight down with the top of its images ahead.
+heights above mean sea level, and mount angles of its own. At a rotation of zero relative to the
+vehicle, the camera looks straight down with the top of its images ahead.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class MountFrame(Enum):
 
 
 class MountParent(Enum):
-    """The frame in which ``~/mount`` has the camera, by its usual ``frame_id``."""
+    """The frame of the orientation in ``~/mount``, by its usual ``frame_id``."""
 
     VEHICLE = 'base_link'
     # Level, with the vehicle's heading.
@@ -67,7 +67,7 @@ class MountParent(Enum):
         """
         Return the frame that a ``frame_id`` names, with or without a prefix and a slash.
 
-        :raises ValueError: if it is another one; '' is the vehicle's.
+        :raises ValueError: if it names another frame; '' is the vehicle's frame.
         """
         name = frame_id.rpartition('/')[2]
         for parent in cls:
@@ -82,11 +82,11 @@ class Field:
     """
     A field of a sent message.
 
-    :param source: the value of ROS that it carries.
+    :param source: the value from ROS.
     :param unit: of that value and of its range.
     :param scale: counts of the field for one unit; None for a float field, in the unit itself.
     :param low: and ``high``, the permitted range, both ends included.
-    :param unknown: is sent for a value that is NaN or out of range; None: nothing is sent.
+    :param unknown: sent for a value that is NaN or out of range; None if nothing is sent.
     """
 
     source: str
@@ -126,7 +126,7 @@ def _velocity(axis: str) -> Field:
 
 
 def _angle(name: str, limit: float = math.pi) -> Field:
-    # A rounded angle may lie behind the limit.
+    # A rounded angle may exceed the limit.
     return Field(f'{name} of ~/imu or ~/attitude', 'rad', None, -limit - 1e-9, limit + 1e-9)
 
 
@@ -204,7 +204,7 @@ class Position:
 
 
 def standard_deviations(covariance: Sequence[float]) -> tuple[float, float]:
-    """Return the larger horizontal and the vertical one of an ENU covariance (row-major), m."""
+    """Return the larger horizontal and the vertical deviation of a row-major ENU covariance, m."""
     def root(*variances: float) -> float:
         return math.sqrt(max(variances)) if all(one >= 0 for one in variances) else math.nan
 
@@ -288,7 +288,7 @@ def attitude(orientation: Quaternion, rates: Vector, boot_ms: int) -> Attitude:
 
 
 def interpolate(one: Quaternion, other: Quaternion, share: float) -> Quaternion:
-    """Return the rotation between two close ones, by its share (0..1) of the way."""
+    """Return the rotation at a share (0..1) of the way between two close rotations."""
     # q and -q are the same rotation.
     sign = 1.0 if (one.inverse() * other).w >= 0 else -1.0
     rest, share = 1 - share, sign * share
@@ -297,10 +297,10 @@ def interpolate(one: Quaternion, other: Quaternion, share: float) -> Quaternion:
         rest * one.y + share * other.y, rest * one.z + share * other.z).normalized()
 
 
-# The camera's axes are those of a FRD body with x out of the lens. Its zero pose in the vehicle:
+# The camera has the axes of an FRD body with x out of the lens. Its zero pose in the vehicle:
 # x down, z to the rear.
 _ZERO_POSE = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
-# Coordinates in the frame with x out of the lens, from those in the optical frame.
+# Converts coordinates in the optical frame to coordinates in the frame with x out of the lens.
 _FROM_OPTICAL = Quaternion(0.5, -0.5, 0.5, -0.5)
 
 
@@ -328,8 +328,8 @@ def mount_angles(mount: Quaternion, frame: MountFrame) -> Vector:
         mount = mount * _FROM_OPTICAL.inverse()
     turned = _ZERO_POSE.inverse() * flip(mount)
     _, pitch, yaw = (round(math.degrees(angle), 2) for angle in turned.euler())
-    # Near the singular pitch the errors of rounded yaw and roll would add up: let roll make up
-    # for that of yaw.
+    # Near the singular pitch the rounding errors of yaw and roll would add up: roll compensates
+    # the error of yaw.
     rest = Quaternion.from_euler(0.0, math.radians(pitch), math.radians(yaw)).inverse() * turned
     return math.degrees(2 * math.atan2(*(
         (rest.x, rest.w) if rest.w >= 0 else (-rest.x, -rest.w)))), pitch, yaw
@@ -350,7 +350,7 @@ def mount_status(angles: Vector, target: tuple[int, int]) -> MountStatus:
 
 
 def gps_status(satellites: int) -> GpsStatus:
-    """Return GPS_STATUS without single satellites, which ROS has no standard message for."""
+    """Return GPS_STATUS without single satellites: ROS has no standard message for them."""
     none = (0,) * GPS_STATUS_SATELLITES
     return _encode(GpsStatus, {
         'satellite_prn': none, 'satellite_used': none, 'satellite_elevation': none,

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Position, UTC, attitude and mount for the camera: checked, and never repeated.
+Position, UTC, attitude and mount for the camera: checked, and not repeated.
 
 A refused or stale input is not sent. The camera then falls back to its own sensors, 5 s after
-the last message.
+the last message. Only a fixed mount is repeated.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload.rotation import Quaternion, Vector
 
-# s between messages about a fixed mount while there is no attitude; the camera forgets after 5 s.
+# s between messages about a fixed mount while there is no attitude; the camera uses it for 5 s.
 MOUNT_INTERVAL = 1.0
 GPS_STATUS_INTERVAL = 1.0
 # s for which the offset of UTC from ROS time holds.
 TIME_REFERENCE_LIFETIME = 60.0
-# Attitudes, and mounts, of which one instant is chosen.
+# Attitudes, and mounts, that are kept to find a pair of one instant.
 MAX_SAMPLES = 256
 NANO = 1_000_000_000
 # The first ROS time, ns, whose seconds do not fit into the int32 of a stamp.
@@ -48,14 +48,14 @@ UNKNOWN: Vector = (math.nan, math.nan, math.nan)
 
 
 class PositionSource(Enum):
-    """The path by which the camera gets position and UTC; it must get them by one only."""
+    """The messages by which the camera gets position and UTC; only one kind may be sent."""
 
     RAW = 'raw'
     FUSED = 'fused'
 
 
 class Input(Enum):
-    """The inputs, called as their topics."""
+    """The inputs, named after their topics."""
 
     FIX = 'fix'
     VELOCITY = 'velocity'
@@ -67,7 +67,7 @@ class Input(Enum):
 
 
 class InputState(Enum):
-    """Whether an input can be used."""
+    """The state of an input."""
 
     MISSING = 'missing'
     OK = 'ok'
@@ -78,13 +78,13 @@ class InputState(Enum):
 @dataclass(frozen=True)
 class FeederSettings:
     """
-    How inputs are treated.
+    The settings of the inputs.
 
     :param geoid_separation: height of mean sea level above the ellipsoid, m.
-    :param mount_frame: the axes of the frame in which ``~/mount`` has the camera.
-    :param attitude_rate: Hz, at most.
+    :param mount_frame: the axes of the camera's frame in ``~/mount``.
+    :param attitude_rate: the highest rate of attitudes, Hz.
     :param position_timeout: age, s, at which a fix, a velocity or satellites are stale.
-    :param attitude_timeout: the same of an attitude or a mount.
+    :param attitude_timeout: likewise for an attitude or a mount.
     """
 
     position_source: PositionSource = PositionSource.RAW
@@ -108,7 +108,7 @@ class Stamp(NamedTuple):
     The stamp of a message.
 
     :param time: ROS time, ns.
-    :param age: when it was received, by the ROS clock, s; negative for a stamp in the future.
+    :param age: its age on reception by the ROS clock, s; negative for a stamp in the future.
     :param simulated: whether ROS time is simulated, so that it is not UTC.
     """
 
@@ -123,9 +123,9 @@ class InputSnapshot:
     An input at one moment.
 
     :param age: since the last accepted message, s; None if there was none.
-    :param refusal: why the last refused message was refused, '' if none was.
-    :param refused_age: since then, s; None if none was.
-    :param refused: refused messages.
+    :param refusal: why the last refused message was refused, '' if no message was.
+    :param refused_age: the time since that message, s; None if no message was refused.
+    :param refused: the number of refused messages.
     """
 
     state: InputState
@@ -138,7 +138,7 @@ class InputSnapshot:
 @dataclass(frozen=True)
 class InputChanged:
     """
-    An input has another state.
+    The state of an input has changed.
 
     :param text: the reason, for people.
     """
@@ -153,9 +153,9 @@ class FeederSnapshot:
     """
     All inputs at one moment.
 
-    :param needed: groups of inputs, of each of which one must be there.
-    :param positions: sent positions, and ``attitudes``, sent pairs of attitude and mount; those
-        that are made while the link is closed are dropped, and not counted.
+    :param needed: groups of inputs; one input of each group must be received.
+    :param positions: sent positions, and ``attitudes``, sent pairs of attitude and mount. Messages
+        that are made while the link is closed are dropped, and are not counted.
     """
 
     inputs: Mapping[Input, InputSnapshot]
@@ -165,13 +165,13 @@ class FeederSnapshot:
 
     @property
     def lacking(self) -> list[Sequence[Input]]:
-        """Return the groups of which no input can be used."""
+        """Return the groups in which no input can be used."""
         return [group for group in self.needed
                 if all(self.inputs[name].state is not InputState.OK for name in group)]
 
 
 class _Tracker:
-    """Whether an input is missing, used, stale or refused."""
+    """Tracks whether an input is missing, used, stale or refused."""
 
     def __init__(self, name: Input, timeout: float) -> None:
         self._name = name
@@ -365,7 +365,7 @@ class Feeder:
         """
         Take the UTC (ns since the UNIX epoch) of a stamp.
 
-        From then on ROS time is not taken for UTC any more.
+        From then on ROS time is no longer used as UTC.
         """
         def take() -> None:
             if not FIRST_UTC <= utc // 1000 <= LAST_UTC:
@@ -385,7 +385,7 @@ class Feeder:
                 raise ValueError('a component is not a finite number')
             self._velocity, self._velocity_time = velocity, stamp.time
 
-        # It is sent with later fixes, so its age counts from its stamp.
+        # The velocity is sent with later fixes, so its age is measured from its stamp.
         self._take(Input.VELOCITY, now, take, age=max(0.0, stamp.age))
 
     def take_satellites(self, count: int, now: float) -> None:
@@ -399,7 +399,7 @@ class Feeder:
         self._take(Input.SATELLITES, now, take)
 
     def ros_time(self, time: int) -> int | None:
-        """Return the ROS time of a UTC in ns; None if it is not known, or no stamp has it."""
+        """Return the ROS time of a UTC in ns; None if it is unknown or does not fit a stamp."""
         if (not FIRST_UTC <= time // 1000 <= LAST_UTC
                 or self._needs_reference and self._reference is None):
             return None
@@ -407,7 +407,7 @@ class Feeder:
         return ros if 0 <= ros < END_OF_STAMPS else None
 
     def clock_jumped(self) -> None:
-        """Forget what is bound to ROS time, which has jumped."""
+        """Forget everything that depends on ROS time, which has jumped."""
         self._reference = self._fix_time = self._velocity_time = None
         self._pair_time = 0
         for history in (*self._attitudes.values(), self._mounts):
@@ -422,7 +422,7 @@ class Feeder:
         """
         Take the orientation of the vehicle's FLU body in ENU.
 
-        :param name: IMU or ATTITUDE; the first is preferred while it comes.
+        :param name: IMU or ATTITUDE; IMU takes precedence while it is received.
         :param orientation: of any norm; None if the message has none.
         :param rates: of the body, FLU, rad/s; NaN if unknown.
         """
@@ -441,7 +441,7 @@ class Feeder:
         """
         Take the orientation of the camera; the mount is then not fixed.
 
-        :param frame_id: the frame in which it is, see :class:`~.conversions.MountParent`.
+        :param frame_id: the frame of the orientation, see :class:`~.conversions.MountParent`.
         """
         def take() -> None:
             parent = MountParent.of(frame_id)
@@ -461,7 +461,7 @@ class Feeder:
         return self._fixed_mount is not None
 
     def expect_mount(self) -> None:
-        """Send no fixed mount any more, since ``~/mount`` has a publisher."""
+        """Stop sending the fixed mount, since ``~/mount`` has a publisher."""
         self._fixed_mount = None
         self._mount_due = math.inf
 
@@ -472,7 +472,7 @@ class Feeder:
             self._mount_due = now if self._link_open else math.inf
 
     def _send_pair(self, now: float) -> None:
-        """Send attitude and mount of one instant, back to back, the newest that are known."""
+        """Send the newest known attitude and mount of one instant, back to back."""
         name = Input.IMU if self._is_fresh(Input.IMU, now) else Input.ATTITUDE
         if now < self._pair_due or not self._is_fresh(name, now):
             return
@@ -531,14 +531,14 @@ class Feeder:
             self._emit(change)
 
     def link_opened(self, now: float) -> None:
-        """Send the fixed mount soon."""
+        """Let the next :meth:`poll` send the fixed mount."""
         self._link_open = True
         # The link repeats the call while it hears no peer.
         if self._fixed_mount is not None and self._mount_due == math.inf:
             self._mount_due = now
 
     def link_closed(self) -> None:
-        """Send nothing by itself until the link is open again."""
+        """Stop repeating the fixed mount until the link is open again."""
         self._link_open = False
         self._mount_due = math.inf
 
@@ -556,7 +556,7 @@ class Feeder:
 
 
 def _check_age(stamp: Stamp, timeout: float) -> None:
-    """Refuse what was measured long before it was received, or after."""
+    """Refuse a message whose stamp is too old, or too far in the future."""
     if stamp.age > timeout:
         raise ValueError(f'its stamp is {format_seconds(stamp.age)} old by the ROS clock')
     if stamp.age < -timeout:

@@ -15,7 +15,7 @@
 """
 The messages of the camera; MAVLink 1 carries them without extension fields.
 
-Fields and scales are those of MAVLink; deviations of the camera stand with the field.
+Fields and scales are as in MAVLink; the docstrings name the deviations of the camera.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class GpsRawInt(mav.Message):
 @mav.define(25, 'GPS_STATUS')
 @dataclass(slots=True)
 class GpsStatus(mav.Message):
-    """Shown on the camera's web page only."""
+    """The camera only shows it on its web page."""
 
     satellites_visible: mav.UInt8
     satellite_prn: mav.UInt8x20
@@ -137,12 +137,12 @@ class CameraStatus(mav.Message):
 @dataclass(slots=True)
 class CameraFeedback(mav.Message):
     """
-    An image that was requested by DIGICAM_CONTROL; ``img_idx`` counts these since power on.
+    An image that was requested by DIGICAM_CONTROL; ``img_idx`` counts such images since power on.
 
     Position in 1e-7 degrees and m above mean sea level. Roll, pitch and yaw (ZYX, degrees, yaw
     0..360) turn north, east, down into top of the image, right of the image, line of sight: all
     are zero for a camera that looks straight down with the top of its images to the north. The
-    manufacturer does not name the axes; these are those of image metadata.
+    manufacturer does not name the axes; these are the axes of image metadata.
     ``completed_captures`` is an extension field, which MAVLink 1 does not have.
     """
 

@@ -43,7 +43,7 @@ DEFAULT_SYSTEM_ID = 255
 SHORTEST_INTERVAL = 0.05
 # s from an image to its CAMERA_FEEDBACK.
 FEEDBACK_DELAY = 0.2
-# Images that are kept, and those whose CAMERA_FEEDBACK is not sent yet.
+# Images that are kept, and images whose CAMERA_FEEDBACK is not sent yet.
 MAX_IMAGES = 1000
 # mm
 FOCAL_LENGTH = 5.4
@@ -51,14 +51,14 @@ FOCAL_LENGTH = 5.4
 FIX_3D = 3
 UNKNOWN = 0xFFFF
 UNKNOWN_SATELLITES = 0xFF
-# The camera's axes in those of the vehicle, FRD, at a mount of 0/0/0: x down, y right, z back.
+# The camera's axes in the vehicle's FRD axes at a mount of 0/0/0: x down, y right, z back.
 _DOWN = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
 
 M = TypeVar('M')
 
 
 class Source(Enum):
-    """Where a value of an image comes from."""
+    """The source of a value of an image."""
 
     INJECTED = 'injected'
     OWN = 'own'
@@ -76,7 +76,7 @@ class Place(NamedTuple):
 @dataclass(frozen=True)
 class RedEdgeBehaviour(Behaviour):
     """
-    How a simulated camera behaves; the defaults are those of the serial API.
+    The behaviour of a simulated camera; the defaults follow the serial API.
 
     :param validity: s for which it uses injected state.
     :param injectable: whether it uses injected state at all.
@@ -85,8 +85,8 @@ class RedEdgeBehaviour(Behaviour):
     :param triggers: whether it sends CAMERA_STATUS.
     :param counts: whether it counts its images.
     :param shots: the values of ``shot`` for which it takes an image.
-    :param ping_component: what is added to the component id that answers PING.
-    :param ping_sequence: what is added to the sequence number in the answer.
+    :param ping_component: offset of the component id that answers PING.
+    :param ping_sequence: offset of the sequence number in the answer.
     :param ping_target: whether the answer is addressed to the sender.
     :param extension: whether CAMERA_FEEDBACK has its extension field.
     """
@@ -287,9 +287,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     """
     A simulated camera, without the link: see :class:`SimulatedDevice`.
 
-    It takes images when DIGICAM_CONTROL asks for them, at an interval, and by hand. Position,
-    time, attitude and mount angles of the host are used for some time after they were received;
-    then it uses its own GPS.
+    It takes images on DIGICAM_CONTROL, at an interval, and on a console command. It uses position,
+    time, attitude and mount angles of the host for some time after it has received them, and then
+    the position and time of its own GPS.
 
     :param address: the address until it hears a host.
     :param validity: s for which injected state is used.
@@ -353,7 +353,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
-        # Those that are due were taken before the message came.
+        # The images that are due were taken before the message came.
         self._take_due_images(now)
         if isinstance(message, rededge.Ping):
             return self._answer(source, message)

@@ -266,7 +266,7 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
         newest = findings(own_ros)
         eventually(lambda: newest() == (
             'nothing received on ~/fix; nothing received on ~/imu or ~/attitude; '
-            'geoid_separation is not set, so altitudes are those above the ellipsoid'))
+            'geoid_separation is not set, so altitudes are above the ellipsoid'))
         with Robot(own_ros) as robot:
             eventually(lambda: newest().startswith('geoid_separation is not set'))
             robot.position['latitude'] = math.nan

@@ -60,7 +60,7 @@ PARAMETERS = (
                   'top of the image, or z out of the lens',
                   choices=tuple(frame.value for frame in MountFrame)),
     ParameterSpec('attitude_rate', 20.0, 'highest rate of attitudes', 'Hz', 1.0, 200.0),
-    # The camera keeps what it gets for 5 s.
+    # The camera uses received values for 5 s.
     ParameterSpec('position_timeout', 1.0, 'age at which position and velocity are stale', 's',
                   0.05, 5.0),
     ParameterSpec('attitude_timeout', 0.5, 'age at which attitude and mount are stale', 's',
@@ -77,7 +77,7 @@ MOUNT_PARAMETERS = tuple(
 
 class CameraNode(ServedPayload):
     """
-    Serves the camera of a link. In turns of the link, except the making.
+    Serves the camera of a link; in turns of the link, except the constructor.
 
     :raises ParameterError: if a parameter is wrong.
     """
@@ -103,7 +103,7 @@ class CameraNode(ServedPayload):
                 RequestService('capture_panel', Trigger, self._capture(Shot.PANEL))),
             commands=subscriptions(host.node, host.link, client.feeder))
         self._interface.publish('connected', False)
-        # The first one imports numpy, which takes too long for the link's thread.
+        # The first NavSatFix imports numpy, which takes too long for the link's thread.
         NavSatFix()
         self._parameters = DeviceParameters(host.node, MOUNT_PARAMETERS)
         given = self._parameters.overrides()

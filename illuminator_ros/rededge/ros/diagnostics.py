@@ -35,7 +35,7 @@ from ...ros.diagnostics import (
     why_nothing_is_heard,
 )
 
-# It adopts our system id, so only the component id is its own.
+# The camera adopts the system id of the host, so only the component id identifies it.
 HARDWARE_ID = f'mavlink:{MAV_COMP_ID_CAMERA}'
 
 
@@ -89,7 +89,7 @@ def input_findings(feeder: FeederSnapshot) -> list[Finding]:
 
 
 def topics(names: Sequence[Input]) -> str:
-    """Return the topics of inputs of which one is needed, for people."""
+    """Return the topics of alternative inputs, for people."""
     return ' or '.join(f'~/{name.value}' for name in names)
 
 
@@ -103,7 +103,7 @@ def _why(name: Input, snapshot: InputSnapshot) -> str:
 def _camera_report(client: ClientSnapshot, now: float, geoid_is_known: bool) -> Report:
     findings = camera_findings(client.camera) + input_findings(client.feeder)
     if not geoid_is_known:
-        findings.append((WARN, 'geoid_separation is not set, so altitudes are those above the '
+        findings.append((WARN, 'geoid_separation is not set, so altitudes are above the '
                                'ellipsoid'))
     return Report('camera', HARDWARE_ID, findings, 'connected', lambda: _values(client, now))
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The subscribed topics: their messages as the feeder takes them, and jumps of ROS time."""
+"""The subscribed topics: conversion of their messages for the feeder, and jumps of ROS time."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
 from ...ros.node import AnyCommand, CommandTopic
 
-# s by which the clock must differ from a steady one to have jumped. Simulated time may run fast
-# and in steps.
+# s; a greater change relative to a steady clock is a jump. Simulated time may run fast and in
+# steps, so its limit is higher.
 JUMP = 0.5
 SIMULATED_JUMP = 5.0
 
 
 class StampReader:
     """
-    Stamps with their age by the node's clock.
+    Reads stamps with their age by the node's clock.
 
     :param jumped: called when ROS time has jumped, in any thread.
     """
@@ -51,7 +51,7 @@ class StampReader:
     def __init__(self, node: Node, jumped: Callable[[], None]) -> None:
         self._clock = node.get_clock()
         self._jumped = jumped
-        # The system time less a steady one, s.
+        # The system time minus the time of a steady clock, s.
         self._offset: float | None = None
         # rclpy reports jumps of simulated time only. The handle keeps the callback.
         self._handle = self._clock.create_jump_callback(
@@ -65,7 +65,7 @@ class StampReader:
     def read(self, header: Header) -> Stamp:
         """Return the stamp of a message that was received just now."""
         simulated = self._clock.ros_time_is_active
-        # ROS time is the system's otherwise; rclpy takes 50 times as long to read it.
+        # Otherwise ROS time is the system time; rclpy takes 50 times as long to read it.
         now = self._clock.now().nanoseconds if simulated else time.time_ns()
         if not simulated:
             offset = now / 1e9 - time.monotonic()
