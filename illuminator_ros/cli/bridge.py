@@ -15,7 +15,7 @@
 """
 The executables that make MAVLink devices ROS 2 nodes.
 
-``bridge`` serves lights; each other one serves the payload that has its name.
+``bridge`` serves lights; each other executable serves the payload of its name.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Executable(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return how it is called."""
+        """Return the name of the executable."""
         return 'bridge' if self.payload == ILLUMINATOR else self.payload
 
     def load(self) -> RosPayload:
@@ -70,13 +70,13 @@ class Executable(NamedTuple):
         return 0 if print_output(self.refuse, text, end='') else 1
 
     def refuse(self, reason: str) -> int:
-        """Say in one line what is wrong with the command line, and return the exit status."""
+        """Print the reason why it cannot start, in one line, and return the exit status."""
         print(f'{self.name}: {one_line(reason)}', file=sys.stderr)
         return 2
 
 
 def usage(executable: Executable) -> str:
-    """Return what ``--help`` prints."""
+    """Return the text of ``--help``."""
     from ..ros.parameters import LINK_PARAMETERS, ParameterSpec
 
     kind, name = executable.load(), executable.name
@@ -113,7 +113,7 @@ examples:
 parameters that are fixed at the start, with their defaults:
 {fixed}
 
-{variable}connection URLs, each meaning what it means in MAVROS, MAVSDK or pymavlink:
+{variable}connection URLs, with their meanings in MAVROS, MAVSDK and pymavlink:
   udp://[BIND][:PORT]@[HOST][:PORT]   udpin://BIND:PORT   udpout://HOST:PORT
   tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
   serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
@@ -148,7 +148,7 @@ gimbal_manager = partial(main, payload='gimbal_manager')
 def _run(arguments: list[str], termination: Termination, executable: Executable) -> int:
     own = list(arguments)
     if '--ros-args' in arguments:
-        # Slow to import, as all else that is imported in a function here.
+        # Slow to import, like everything that is imported inside a function here.
         from rclpy.utilities import remove_ros_args
         try:
             own = remove_ros_args([executable.name, *arguments])[1:]
@@ -162,7 +162,7 @@ def _run(arguments: list[str], termination: Termination, executable: Executable)
     url = own.pop(0) if own and not own[0].startswith('-') else ''
     if own:
         return executable.refuse(
-            f'unknown argument {own[0]!r}; parameters go behind --ros-args, see '
+            f'unknown argument {own[0]!r}; parameters follow --ros-args, see '
             f'{executable.name} --help')
     arguments = [argument for argument in arguments if argument != url]
     return _serve(arguments, url, termination, executable)
@@ -179,33 +179,33 @@ def _serve(
 
         from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
 
-        # From here on the ROS graph has to be left in order, so a signal only has effect later.
+        # From here on the process must leave the ROS graph in order, so a signal acts later.
         termination.calls(lambda: None)
         if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():
             return executable.refuse(refusal)
         _use_profile()
-        # On a terminal rcutils colours its lines; its stderr is a pipe.
+        # rcutils colours its lines on a terminal only, and stderr is the pipe of a queue here.
         if termination.is_terminal:
             os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
         try:
             rclpy.init(
                 args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
             node = PayloadNode(executable.payload)
-            # Other participants discover the node while all this is imported.
+            # Other participants discover the node while these modules are imported.
             from ..ros.bridge import Bridge
             from ..ros.parameters import ParameterError
             executable.load()
         except Exception as error:
-            # rclpy has an exception of its own for each thing that can be wrong with an argument.
+            # rclpy has an exception for each kind of wrong argument.
             return executable.refuse(_start_failure(error, wrong_arguments(executable.name)))
         try:
             bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
         except ParameterError as error:
             return executable.refuse(f'parameter {error}')
         except Exception as error:
-            # Such as two topics with one name.
+            # For example, two topics may have the same name.
             return executable.refuse(_start_failure(error, 'cannot create the node'))
-    # Existing objects stay: a collector that visits them would only delay answers.
+    # The existing objects stay: a garbage collection that visits them would only delay answers.
     gc.freeze()
     termination.calls(bridge.end)
     bridge.run()
@@ -216,14 +216,14 @@ def _serve(
 def _start_failure(error: Exception, failed: str) -> str:
     if isinstance(error, ModuleNotFoundError):
         raise error
-    # For a lack of descriptors or threads the middleware has no exception of its own.
+    # The middleware has no special exception for a lack of descriptors or threads.
     if isinstance(error, OSError | ImportError) or type(error) is RuntimeError:
         failed = 'cannot start'
     return f'{failed}: {error}'
 
 
 def _use_profile() -> None:
-    """Use our profile of Fast DDS, unless the user has one."""
+    """Use the package's profile of Fast DDS, unless the user has one."""
     names = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
     files = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
     if not (any(map(os.environ.get, names)) or any(map(os.path.exists, files))):

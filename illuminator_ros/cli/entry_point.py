@@ -43,7 +43,7 @@ def run_program(
     """
     Run a program and return its exit status.
 
-    :param run: must import what it needs itself, so that a signal meanwhile ends the process.
+    :param run: must import its modules itself, so that a signal meanwhile ends the process.
     :param more: signals that end it too, see :class:`Termination`.
     :param queued: descriptors that are written to through an :class:`~.output_queue.OutputQueue`.
     """
@@ -100,18 +100,18 @@ def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n'
 
 
 def discard_output() -> None:
-    """Discard what is still to be written to stdout, at the exit too."""
+    """Discard buffered and later output to stdout, also at the exit."""
     with open(os.devnull, 'wb') as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def wrong_arguments(name: str) -> str:
-    """Return the beginning of an error of rcl, which does not say how an argument is written."""
+    """Return a prefix for an error of rcl, which does not explain the syntax of arguments."""
     return f'wrong ROS arguments, see {name} --help'
 
 
 def log_directory_refusal() -> str:
-    """Return which directory for log files cannot be written, '' if it can."""
+    """Return why log files cannot be written to their directory, '' if they can."""
     home = os.environ.get('ROS_HOME') or '~/.ros'
     directory = os.path.expanduser(os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log'))
     try:
@@ -126,5 +126,5 @@ def log_directory_refusal() -> str:
 
 
 def one_line(message: object) -> str:
-    """Return a message of rcl in one line, without the places in its sources at its end."""
+    """Return a message of rcl in one line, without its positions in the sources of rcl."""
     return re.sub(r', at /[^ ,]+:\d+', '', ' '.join(str(message).split()))

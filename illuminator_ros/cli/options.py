@@ -61,7 +61,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f'{self.prog}: {message}; see {self.prog} --help\n')
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        """Write a text; argparse itself ignores that it cannot be written."""
+        """Write a text; argparse itself ignores errors of writing."""
         if file is not sys.stdout or sys.stdout is None:
             super()._print_message(message, file)
             return
@@ -69,7 +69,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def option(read: Callable[[str], T]) -> Callable[[str], T]:
-    """Return a reader whose ValueError argparse shows; it hides the text of others."""
+    """Return a reader whose ValueError argparse shows; it hides the text of a plain ValueError."""
     def read_option(text: str) -> T:
         try:
             return read(text)
@@ -82,7 +82,7 @@ def address(text: str) -> Address:
     """
     Read ``SYSTEM/COMPONENT``.
 
-    :raises ValueError: if it is not that.
+    :raises ValueError: if the text is not an address.
     """
     system, slash, component = text.partition('/')
     if not (slash and system.isdecimal() and component.isdecimal()
@@ -103,8 +103,8 @@ def mavlink_version(chosen: int | None, needed: Mapping[str, int | None]) -> int
     Return the version of the frames that are sent.
 
     :param chosen: the value of the option, None without it.
-    :param needed: the version that each kind of device needs, None where both will do.
-    :raises ValueError: if they differ.
+    :param needed: the version that each kind of device needs, None if it takes both.
+    :raises ValueError: if these versions differ.
     """
     needs = {kind: version for kind, version in needed.items() if version}
     versions = {*needs.values(), *([chosen] if chosen else [])}
@@ -127,8 +127,8 @@ def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampS
     """
     Return the signing that the options select.
 
-    :param name: whose time stamps are kept.
-    :raises KeyFileError: if the key cannot be used, or is given and not used.
+    :param name: the name under which time stamps are kept.
+    :raises KeyFileError: if the key cannot be used, or is given although signing is off.
     """
     try:
         return load_signing(

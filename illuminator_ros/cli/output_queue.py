@@ -25,7 +25,7 @@ import select
 import stat
 import threading
 
-# Bytes that wait for a reader, and those that the pipe holds while the thread has no turn.
+# Bytes of the queue, and of the pipe, which holds output until the thread runs.
 QUEUE_SIZE = 1 << 20
 # Bytes of a write; a blocking pipe that polls as writable takes as many (POSIX, PIPE_BUF).
 WRITE_SIZE = 4096
@@ -36,8 +36,8 @@ class OutputQueue:
     A queue between descriptors of this process and their readers.
 
     Each descriptor leads to a pipe that never blocks, also for C code that holds the
-    interpreter's lock. A thread writes what comes from there as fast as it is read. Lines that do
-    not fit into the queue are dropped; their number is written once there is room again.
+    interpreter's lock. A thread forwards the output of the pipe as fast as the reader takes it.
+    Lines that do not fit into the queue are dropped; their number is written once there is room.
 
     :param descriptors: such as 1 and 2; closed ones are ignored.
     """
@@ -83,7 +83,7 @@ class _Stream:
     """
     One descriptor.
 
-    :ivar source: what is read from it was written to the descriptor.
+    :ivar source: the end of the pipe from which the output to the descriptor is read.
     :ivar target: leads to the reader.
     """
 
@@ -91,14 +91,14 @@ class _Stream:
         self.descriptor = descriptor
         self.target = _open_again(descriptor)
         self.source, self._input = os.pipe()
-        # As much as an unprivileged process may have.
+        # The largest size for an unprivileged process.
         with contextlib.suppress(OSError):
             fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, QUEUE_SIZE)
         os.set_blocking(self.source, False)
         os.set_blocking(self._input, False)
         self._send: Callable[[bytes], int] = functools.partial(os.write, self.target)
         if stat.S_ISSOCK(os.fstat(self.target).st_mode):
-            # Slow to import, and signals must be taken before that.
+            # Slow to import, and signals must be handled before.
             import socket
             connection = socket.socket(fileno=self.target)
             self._send = lambda data: connection.send(data, socket.MSG_DONTWAIT)
@@ -132,7 +132,7 @@ class _Stream:
         except BlockingIOError:
             pass
         except OSError:
-            # The reader is gone: writing to the descriptor fails from now on, as without us.
+            # The reader is gone: writing to the descriptor fails from now on, as without a queue.
             self.queue.clear()
             if not self.at_end:
                 os.close(self.source)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Keeps modules that are not used out of the process of the bridge.
+Keeps unused modules out of the process of the bridge.
 
 rclpy and other modules import them; they take 19 MB and delay the start.
 """
@@ -30,14 +30,14 @@ from types import ModuleType
 # The type support of each service imports numpy (12 MB), for a field of the events that service
 # introspection publishes. Only signed frames need the others, which load OpenSSL (4 MB).
 POSTPONED = ('numpy', 'hashlib', 'hmac')
-# The type support of messages tries to import their generator, which brings a parser (4 MB).
+# The type support of messages tries to import their generator, which imports a parser (4 MB).
 LEFT_OUT = ('rosidl_generator_py.generate_py_impl',)
 
 _lock = threading.Lock()
 
 
 class _Placeholder(ModuleType):
-    """Stands for a module, and imports it when one of its attributes is used."""
+    """Replaces a module, and imports it when one of its attributes is used."""
 
     def __getattr__(self, name: str) -> object:
         _remove(self.__name__, self)
@@ -51,7 +51,7 @@ def postponed_imports() -> Iterator[None]:
     """
     Import modules of :data:`POSTPONED` when they are used, and none of :data:`LEFT_OUT`.
 
-    This concerns the ``import`` statements that run meanwhile, not later ones.
+    This applies to the ``import`` statements that run in the context, not to later ones.
     """
     added: dict[str, ModuleType | None] = {
         **{name: _Placeholder(name) for name in POSTPONED}, **dict.fromkeys(LEFT_OUT)}
@@ -67,7 +67,7 @@ def postponed_imports() -> Iterator[None]:
 
 
 def _remove(name: str, module: ModuleType | None) -> None:
-    # Another thread must not put the imported module there between the two.
+    # Another thread must not insert the imported module between the check and the removal.
     with _lock:
         if sys.modules.get(name) is module:
             sys.modules.pop(name, None)

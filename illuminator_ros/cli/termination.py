@@ -33,7 +33,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # s from the signal to the exit, even if something hangs.
 LIMIT = 0.85
 # s in which queued output must be written: at an exit without a signal, since a busy machine may
-# need more than 0.1 s; at least, after an orderly end by a signal; and after one that hangs.
+# need more than 0.1 s; the least time after an orderly end by a signal; and after an end that
+# hangs.
 OUTPUT_LIMIT = 1.0
 HURRIED_OUTPUT_LIMIT = 0.1
 OVERDUE_OUTPUT_LIMIT = 0.02
@@ -86,7 +87,7 @@ class Termination:
 
     def finish(self) -> None:
         """
-        Exit if a signal has requested it; all parts have ended.
+        Exit if a signal has requested it; call this when all parts have ended.
 
         An exit by the interpreter and the middleware takes 0.1 s, on a busy machine much longer,
         and no thread could then enforce the limit.
@@ -103,7 +104,7 @@ class Termination:
             end = self._end
         # Without ``end`` nothing has been started.
         if end is not None:
-            # In another thread, so that the deadline applies whatever it waits for.
+            # In another thread, so that the deadline applies whatever ``end`` waits for.
             _run_in_thread(end)
             time.sleep(max(self._deadline - time.monotonic(), 0.0))
             if self._last is not None:
@@ -125,7 +126,7 @@ class Termination:
 
 
 def _run_in_thread(function: Callable[[], None]) -> threading.Thread | None:
-    """Call a function in a new thread or, where none can be started, here."""
+    """Call a function in a new thread or, if no thread can be started, in this one."""
     thread = threading.Thread(target=function, name='end', daemon=True)
     try:
         thread.start()

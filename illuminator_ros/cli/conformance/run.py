@@ -60,7 +60,7 @@ from ...payload.simulated_settings import integer, number
 # s to listen before the first command.
 LISTEN_TIME = 4.5
 NOT_OPEN = 'link not open: '
-# Why a link is not open although this computer has done its part; any other reason is its own.
+# Errors of the peer that keep a link closed; any other error is of this computer.
 PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOSTUNREACH,
                errno.ENETUNREACH, errno.EPIPE)
 FIND_TIMEOUT = 10.0
@@ -165,7 +165,7 @@ class Conformance:
         self._requirements: list[AnyRequirement] = [
             one for one in checks.requirements
             if not options.only or one.name in options.only]
-        # Written by the main thread: a blocked terminal must not delay the link's thread.
+        # The main thread writes them: a blocked terminal must not delay the link's thread.
         self._texts: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._table = Table(verbose=options.verbose)
         self._session = checks.session(address, options.target)
@@ -208,7 +208,7 @@ class Conformance:
         report = Report(
             checks.payload, checks.device, options.url, self._describe_device(),
             tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
-        # A failure has given the reason why there is no device.
+        # A failed check has already given the reason why there is no device.
         explained = missing and any(one.verdict is Verdict.FAIL for one in report.results)
         self._write_line('', *(() if explained else (report.device,)), report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
@@ -226,7 +226,7 @@ class Conformance:
             self._written &= _print(*texts)
 
     def _finish(self, main: Main) -> None:
-        """Run a coroutine of the session to its end, and print what comes meanwhile."""
+        """Run a coroutine of the session to its end, and print the texts that come meanwhile."""
         ended = threading.Event()
 
         async def until_end() -> None:
@@ -245,7 +245,7 @@ class Conformance:
         return self._link.snapshot(self._link.clock())
 
     def _link_event(self, event: LinkEvent) -> None:
-        # A problem of this computer ends the run with its reason.
+        # An error of this computer ends the run, which then prints the reason.
         if not event.is_open and (event.was_open or _is_peer_error(event.reason)):
             self._texts.put(str(event))
 
@@ -254,7 +254,7 @@ class Conformance:
             self._texts.put(line)
 
     async def _find(self) -> None:
-        """Find the device; note the others on the link, or why there is none."""
+        """Find the device; record the other components on the link, or why it was not found."""
         session, checks, wait = self._session, self._checks, self._options.wait
         await session.find(wait, LISTEN_TIME)
         state = self._link_state()
@@ -320,7 +320,7 @@ def _is_peer_error(reason: str) -> bool:
 
 
 def _complain(text: str) -> None:
-    # Not through sys.stderr, which a signal may interrupt, and never blocked by its reader.
+    # Do not use sys.stderr, whose writes a signal may interrupt, and do not wait for its reader.
     with contextlib.suppress(OSError):
         if select.select([], [2], [], 0.0)[1]:
             os.write(2, f'conformance: {text}\n'.encode())

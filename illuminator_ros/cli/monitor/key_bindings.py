@@ -53,7 +53,7 @@ class KeyDecoder:
         return bool(self._rest)
 
     def feed(self, data: bytes) -> list[str]:
-        """Return the keys; b'' says that no more bytes have come for a while."""
+        """Return the keys; b'' means that no more bytes have come for a while."""
         text = (self._rest + data).decode('utf-8', errors='replace')
         self._rest = b''
         keys = []
@@ -69,7 +69,7 @@ class KeyDecoder:
 
 
 class Service(Enum):
-    """The service of a light that a request goes to."""
+    """The service of a light that a request calls."""
 
     ENABLE = 'enable'
     REFRESH = 'refresh'
@@ -82,7 +82,7 @@ class Request:
     """
     A request to a light.
 
-    :param text: what the operator reads of it, '' for nothing.
+    :param text: the text for the operator, '' for none.
     :param value: for ENABLE a bool, for SET the parameters by their names, for GET the names.
     """
 
@@ -91,8 +91,8 @@ class Request:
     value: Any = None
 
 
-# Makes a request when it is sent, not when the key is pressed, so that earlier keys count; None
-# if too little is known of the light.
+# Makes a request at the time of sending, not of the key press, so that earlier keys count; returns
+# None if too little is known of the light.
 Ask = Callable[[Light], Request | None]
 
 
@@ -187,11 +187,11 @@ class KeyBindings:
         self.quit = True
 
     def resume(self) -> None:
-        """Note that the shell has continued the job."""
+        """Record that the shell has continued the job."""
         self.stop = False
 
     def update(self, lights: Sequence[Light]) -> None:
-        """Keep the selection while its light is there, else select the light before it."""
+        """Keep the selection while its light is listed, else select the light before it."""
         names = [light.name for light in lights]
         if self.selected not in names:
             before = [name for name in names if name < (self.selected or '')]

@@ -55,10 +55,10 @@ EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 QUERY_INTERVAL = 0.5
 # s for an answer: longer than a bridge takes, whatever its light does.
 ANSWER_LIMIT = 8.0
-# s after an OFF without an answer after which another one is sent.
+# s after an unanswered OFF in which a further OFF waits for its answer.
 OFF_INTERVAL = 0.5
-# The type of each service, and its request from the value of a request of the monitor,
-# untyped: they differ in both.
+# The type of each service, and the function that makes its request from the value of a
+# :class:`Request`; untyped, since the services differ in both.
 SERVICES: dict[Service, tuple[type[Any], Callable[[Any], Any]]] = {
     Service.ENABLE: (SetBool, lambda on: SetBool.Request(data=on)),
     Service.REFRESH: (Trigger, lambda _: Trigger.Request()),
@@ -82,7 +82,8 @@ def lights_among(
     """
     Return the names of the lights among the topics of a graph.
 
-    :param publishers: how many nodes publish a topic: our own subscriptions are topics too.
+    :param publishers: returns the number of publishers of a topic; the monitor's own subscriptions
+        make topics, too.
     """
     types = dict(topics)
     last = f'/{SIGNATURE[0]}'
@@ -102,9 +103,10 @@ class Requests:
     """
     The requests to one light, in the thread of the node's executor.
 
-    Each service has one request at a time. Later ones wait: parameters are merged, so that a key
-    held down is not a hundred commands; of others the newest is kept. An OFF does not wait for an
-    ON, and for an OFF only :data:`OFF_INTERVAL`: its bridge may have been restarted.
+    Each service has one request at a time; later requests wait. Waiting parameters are merged, so
+    that a key held down does not cause a hundred commands; of other requests the newest is kept.
+    An OFF does not wait for an ON, and waits for another OFF only :data:`OFF_INTERVAL`: the bridge
+    may have been restarted.
     """
 
     def __init__(
@@ -194,7 +196,7 @@ class Requests:
         del self._pending[service]
         self._note(one.request, Outcome.DONE if success else Outcome.FAILED, answer)
         waiting = self._waiting.pop(service, None)
-        # After a refusal the next would be refused too, and hide the reason.
+        # After a refusal the next request would be refused, too, and hide the reason.
         if waiting is not None and (success or service is not Service.SET):
             self._send(waiting)
         self._show_wanted()

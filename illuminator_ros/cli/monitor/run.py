@@ -46,10 +46,10 @@ from ...ros.throttled_log import NodeLog
 
 # s between updates of the screen.
 INTERVAL = 0.25
-# s without a new light until the table is taken for complete.
+# s without a new light after which the table counts as complete.
 SETTLING = 1.0
-# s; an interpreter that ends while the thread is inside rclpy aborts. A signal does not wait so
-# long.
+# s to wait for the thread: an interpreter that ends while the thread is inside rclpy aborts. After
+# a signal the process ends sooner.
 END_LIMIT = 5.0
 # Characters; enough for each column of a table for a file or a pipe.
 PLAIN_WIDTH = 400
@@ -115,7 +115,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
             return 2
         termination.calls(lambda: None)
         rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        # Several may run, and none needs to be on /rosout.
+        # Several monitors may run, and they do not need /rosout.
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
     except SystemExit as end:

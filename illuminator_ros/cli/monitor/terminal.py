@@ -42,7 +42,7 @@ def while_it_lasts() -> Iterator[None]:
     except (OSError, termios.error) as error:
         if error.args[0] != errno.EIO:
             raise
-        # The interpreter would write the rest at its exit.
+        # The interpreter would write the remaining output at its exit.
         discard_output()
 
 
@@ -94,7 +94,7 @@ def _request_stop() -> None:
     that SIGCONT, the shell would not send another one.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTSTP])
-    # To this thread: another one would stop later, and this one would use the terminal meanwhile.
+    # Signal this thread: another thread would stop later, while this thread uses the terminal.
     signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
 
 

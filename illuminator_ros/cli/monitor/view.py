@@ -328,7 +328,7 @@ def screen(view: ViewState, width: int, height: int) -> RenderableType:
     room = height - 2
     if selected is None or room < DETAIL_HEIGHT + 3:
         return _stacked(height, (title(view), 1), (table(view, width, room), None), (footer, 1))
-    # The table gets half of the screen at least, and the lines that the details do not need.
+    # The table gets at least half of the screen, and the lines that the details do not need.
     rows = min(rows, max(room - DETAIL_HEIGHT - 7, room // 2))
     heading = Text(f'\n{selected.name}', 'bold', no_wrap=True, overflow='ellipsis')
     return _stacked(height, (title(view), 1), (table(view, width, rows), rows),

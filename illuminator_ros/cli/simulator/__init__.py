@@ -38,8 +38,8 @@ def main(
         from .run import run
         return run(args, termination, payloads)
 
-    # The live view needs the terminal itself; only the view waits while that is stopped. The exit
-    # status after --help depends on whether the text was written.
+    # The live view needs the terminal itself; only the view waits while the terminal is stopped.
+    # The exit status after --help depends on whether the text was written.
     texts = {'-h', '--help', '--version'}.intersection(sys.argv[1:] if args is None else args)
     live = sys.stdout is not None and sys.stdout.isatty()
     return run_program('simulator', start, queued=[2] if live or texts else [1, 2])

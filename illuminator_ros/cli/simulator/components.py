@@ -62,7 +62,7 @@ class Scenario:
     The content of a file.
 
     :param common: the settings of all components, by the noun of their type.
-    :param listed: the components; none leaves them to the command line.
+    :param listed: the components; if there are none, the command line selects them.
     """
 
     url: str = ''

@@ -29,7 +29,7 @@ Execute = Callable[[list[str], float], str | None]
 
 
 def _fault(component: Component, words: list[str], now: float) -> None:
-    # Without an interval, a restart is an event.
+    # Without an interval, the fault "reboot" is a single restart.
     if words == ['reboot']:
         component.restart(now)
     else:
@@ -101,11 +101,11 @@ def execute(line: str, components: Sequence[Component], now: float) -> str:
     if name == 'help':
         faults = '\n'.join(device.faults.describe() for device in devices)
         return f'{describe_commands(devices)}\nfaults:\n{faults}'
-    # The option --fault names a component in another way than the console.
+    # The option --fault has another syntax for a component than the console.
     component, colon, fault = words[-1].rpartition(':')
     if colon and words[:-1] in ([], ['fault'], ['--fault']):
         return f'for one component: {component} fault {fault}'
-    # A fault works as --help shows it, too.
+    # A fault in the syntax of --help is a command, too.
     if name not in known and any(name.partition('=')[0] in one.faults for one in devices):
         name, rest = 'fault', [name, *rest]
     targets = [commands[name] for commands in selected or bound if name in commands]

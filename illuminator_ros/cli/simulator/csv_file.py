@@ -43,7 +43,7 @@ class CsvFile:
             raise SettingError(f'{path}: {error.strerror}') from error
 
     def append(self, record: Sequence[str]) -> None:
-        """Append a record; a file that could not be written once gets no further ones."""
+        """Append a record; a file that could not be written once gets no further records."""
         if self._failed:
             return
         try:

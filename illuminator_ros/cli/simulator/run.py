@@ -82,10 +82,10 @@ class _Simulation:
         """Run until a signal or ``quit``."""
         termination.calls(self._end)
         self._link.start()
-        # A background job that reads from its terminal is stopped, if it does not ignore this.
+        # SIGTTIN would stop a background job that reads from its terminal.
         signal.signal(signal.SIGTTIN, signal.SIG_IGN)
         threading.Thread(target=self._listen, name='console', daemon=True).start()
-        # From here on this thread waits for its terminal while that is stopped.
+        # From here on this thread waits while its terminal is stopped.
         self._view.say(self._headline)
         # Lines before a "quit" have answers that may still be queued.
         while not (self._ended.is_set() and self._texts.empty()):

@@ -41,7 +41,7 @@ class Look:
         return '  '.join(filter(None, (f'{self.name:12}', self.snapshot.text, self.faults)))
 
     def differs(self, other: Look | None) -> bool:
-        """Return whether it deserves a line after another one."""
+        """Return whether it differs enough from the last shown one for a new line."""
         return other is None or (
             (self.snapshot.state, self.faults) != (other.snapshot.state, other.faults)
             or abs(self.snapshot.drift - other.snapshot.drift) >= 1)
@@ -112,7 +112,7 @@ class LiveView:
         """
         Write a text, and the components below it again.
 
-        :param typed: the line that it answers; the cursor then stands below that.
+        :param typed: the line that it answers; the cursor is then below that line.
         """
         answered = '' if typed is None else f'{self.PROMPT}{typed}\r\n'
         text = text.replace('\n', '\r\n')
