@@ -221,7 +221,7 @@ class Gimbal:
         return max(self._announced_at, self._device_heard_at)
 
     def heard(self, address: Address, now: float, autopilot: int) -> None:
-        """Note the heartbeat of a component, which may be the device or one of its managers."""
+        """Take the heartbeat of a component, which may be the device or one of its managers."""
         manager = self._managers.get(address)
         is_device = address == self.key.address and not self.key.number
         if manager is not None:

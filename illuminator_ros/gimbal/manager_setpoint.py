@@ -117,7 +117,7 @@ class GimbalModel:
         return cls(capabilities, ranges)
 
     def lacks(self, flags: int) -> MountFlags:
-        """Return those of the flags that the gimbal cannot follow."""
+        """Return the flags that the gimbal cannot follow."""
         lacking = _NO_FLAGS
         if not flags & _NEEDING:
             return lacking
@@ -293,7 +293,7 @@ class Setpoint(NamedTuple):
 
     @property
     def operation(self) -> int:
-        """Return the flags without those of the yaw frame."""
+        """Return the flags without the flags of the yaw frame."""
         return self.flags & _PASSED_BITS
 
     @property
@@ -332,7 +332,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
 
 
 def stopped(setpoint: Setpoint, now: float) -> Setpoint:
-    """Return the setpoint that ends the motion of another one."""
+    """Return a setpoint without its motion."""
     if setpoint.is_pose:
         return setpoint
     attitude = setpoint.at(now)

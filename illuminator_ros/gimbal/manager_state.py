@@ -59,7 +59,7 @@ class ManagerInput(Enum):
     MANAGER_LOST = 'manager lost'
 
 
-# Inputs that are not here leave the state as it is.
+# Inputs that are not listed do not change the state.
 TRANSITIONS: dict[tuple[ManagerState, ManagerInput], ManagerState] = {
     (ManagerState.NO_DEVICE, ManagerInput.DEVICE_HEARD): ManagerState.LISTENING,
     (ManagerState.LISTENING, ManagerInput.TIME_OVER): ManagerState.ACTIVE,

@@ -128,7 +128,7 @@ class GimbalProperties:
     """
     The properties of a simulated gimbal.
 
-    :param manager: the only component that a device obeys, None for one that announces itself.
+    :param manager: the only component that a device obeys, None for the first that announces it.
     :param status_interval: s between messages with its attitude.
     """
 
@@ -183,7 +183,7 @@ class SimulatedMount:
         """
         Return the status of this moment, None if it sends none.
 
-        :param failures: GIMBAL_DEVICE_ERROR_FLAGS besides those of the axes.
+        :param failures: GIMBAL_DEVICE_ERROR_FLAGS besides the flags of the axes.
         """
         if not behaviour.reports:
             return None

@@ -15,10 +15,10 @@
 """
 A simulated gimbal with a gimbal manager of its own: one component, no messages between the two.
 
-https://mavlink.io/en/services/gimbal_v2.html, "Standalone Integrated Camera/Gimbal". Rules for
-what the specification leaves open: control goes to any component that takes it; a command without
-control gets MAV_RESULT_DENIED; the angles of secondary control are added to the angles of primary
-control, up to :data:`NUDGE_LIMIT`.
+https://mavlink.io/en/services/gimbal_v2.html, "Standalone Integrated Camera/Gimbal". Rules where
+the specification is open: control goes to any component that takes it; a command without control
+gets MAV_RESULT_DENIED; the angles of secondary control are added to the angles of primary control,
+up to :data:`NUDGE_LIMIT`.
 """
 
 from __future__ import annotations

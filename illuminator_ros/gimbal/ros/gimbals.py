@@ -112,7 +112,7 @@ class Gimbals(ServedPayload):
         controlled = [one for one in self._client.gimbals.values() if one.has_any_control]
         for gimbal in controlled:
             gimbal.release_control(now, functools.partial(done, gimbal.key))
-        return {one.key: f'control of gimbal {one.key} may not be released: no confirmation'
+        return {one.key: f'this node may still control gimbal {one.key}: no confirmation'
                 for one in controlled}
 
 
