@@ -150,7 +150,7 @@ class IlluminatorClient(Payload):
 
 def enable_all(
     lights: Sequence[Light], on: bool, now: float, done: Done, *,
-    name: Callable[[Light], str], detail: str = '',
+    name: Callable[[Light], str], detail: str = '', is_stream: bool = False,
 ) -> None:
     """
     Switch all connected lights on or off, in parallel.
@@ -158,7 +158,7 @@ def enable_all(
     :param done: called once, when the last light has answered. It is a success if all connected
         lights succeeded, of which there must be one; the message has the outcome of each.
     :param name: returns the name of a light, for people.
-    :param detail: as for :meth:`Light.enable`.
+    :param detail: as for :meth:`Light.enable`, and ``is_stream``.
     """
     connected = [light for light in lights if light.connected]
     outcomes: dict[Light, Result] = {}
@@ -168,18 +168,22 @@ def enable_all(
         if len(outcomes) == len(connected):
             done(_summary(on, [
                 (name(one), outcomes.get(one) or Result(False, one.unreachable(now)))
-                for one in lights], [outcomes[one].success for one in connected]), now)
+                for one in lights], [outcomes[one] for one in connected]), now)
 
     for light in connected:
-        light.enable(on, now, functools.partial(outcome, light), detail=detail)
+        light.enable(on, now, functools.partial(outcome, light), detail=detail,
+                     is_stream=is_stream)
     if not connected:
         lost = '; '.join(f'{name(light)}: {light.unreachable(now)}' for light in lights)
         done(Result(False, lost or 'no light has been heard yet'), now)
 
 
 def _summary(
-    on: bool, outcomes: list[tuple[str, Result]], successes: list[bool],
+    on: bool, outcomes: list[tuple[str, Result]], connected: list[Result],
 ) -> Result:
-    done = f'{sum(successes)} of {len(successes)} {"on" if on else "off"}'
-    return Result(all(successes), '; '.join(
-        [done, *(f'{name}: {result.message}' for name, result in outcomes)]))
+    failures = [result for result in connected if not result.success]
+    done = f'{len(connected) - len(failures)} of {len(connected)} {"on" if on else "off"}'
+    return Result(
+        not failures,
+        '; '.join([done, *(f'{name}: {result.message}' for name, result in outcomes)]),
+        superseded=all(result.superseded for result in failures))

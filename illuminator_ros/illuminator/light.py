@@ -33,7 +33,16 @@ from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.identity import Identity, IdentityQuery
 from ..payload.rate_limit import RepeatLimit
-from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
+from ..payload.request import (
+    at_any_time,
+    Change,
+    Done,
+    Report,
+    Request,
+    RequestQueue,
+    Result,
+    Target,
+)
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
@@ -375,6 +384,7 @@ class Light:
 
     def enable(
         self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
+        is_stream: bool = False,
     ) -> None:
         """
         Switch the light on or off; ``done`` is called once with the result.
@@ -384,17 +394,11 @@ class Light:
         Off overtakes: requests to switch on that are not accepted yet are cancelled.
 
         :param detail: how it was asked for, which :class:`LightSwitched` repeats.
+        :param is_stream: whether a later one of a stream replaces it while it waits.
         """
         if self._can_reach(now, done, self._claim(source, now, enabled=on)):
             self._automatic = None
-            self._switch(on, now, done, detail)
-
-    def note_request(self, now: float, source: str = '') -> None:
-        """Note that a source has commanded the light, though its command must wait."""
-        self.was_commanded = True
-        self._requested_at = now
-        if source:
-            self._sources.renew(source, now)
+            self._switch(on, now, done, detail, is_stream=is_stream)
 
     def is_held_by_other(self, source: str) -> bool:
         """Return whether another source holds the light, so that a request is not sent."""
@@ -402,7 +406,6 @@ class Light:
 
     def release(self, source: str, now: float) -> None:
         """Note that a source needs the light no more: the next lower one gets it."""
-        self.note_request(now)
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.release(source, now), now)
         self._changed(self, now)
@@ -412,7 +415,8 @@ class Light:
         brightness: float | None = None,
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
-        self.note_request(now)
+        self.was_commanded = True
+        self._requested_at = now
         self._changed(self, now)
         if not self._sources.are_ranked:
             return ''
@@ -465,7 +469,9 @@ class Light:
         if desired.brightness is not None:
             self._configuration.set_brightness(desired.brightness, now)
 
-    def _switch(self, on: bool, now: float, done: Done, detail: str | None) -> None:
+    def _switch(
+        self, on: bool, now: float, done: Done, detail: str | None, *, is_stream: bool = False,
+    ) -> None:
         """Submit a request; ``detail`` is None where its caller reports the change itself."""
         change = SWITCHES[on]
         was_on: bool | None = None
@@ -487,14 +493,10 @@ class Light:
             if result.success and was_on is not on and detail is not None:
                 self._emit(events.LightSwitched(self.address, on, events.Origin.REQUEST, detail))
 
-        limit = now + PROGRESS_LIMIT
-        if on:
-            self._switching.submit(Request(
-                self._target, prepare, finished, now=now, limit=limit,
-                earliest_start=self._earliest_on), now)
-        else:
-            self._switching.overtake(Request(
-                self._target, prepare, finished, now=now, limit=limit, overtakes=True), now)
+        self._switching.submit(Request(
+            self._target, prepare, finished, now=now, limit=now + PROGRESS_LIMIT,
+            is_stream=is_stream, overtakes=not on,
+            earliest_start=self._earliest_on if on else at_any_time), now)
 
     def _earliest_on(self) -> float:
         """

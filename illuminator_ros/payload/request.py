@@ -202,7 +202,7 @@ class Result(NamedTuple):
     :param refused: whether the device answered with another result than ACCEPTED.
     :param permanent: whether the same request will fail again.
     :param contradicted: whether the device accepted it and then showed something else.
-    :param superseded: whether the device accepted it, and a newer one was sent then.
+    :param superseded: whether a newer request replaced it.
     :param note: a change that was not asked for but came with it, for people, '' if none.
     """
 
@@ -216,6 +216,11 @@ class Result(NamedTuple):
 
 
 Done = Callable[[Result, float], None]
+
+
+def at_any_time() -> float:
+    """Return the earliest start of a request that need not wait, s."""
+    return -math.inf
 
 
 class Phase(Enum):
@@ -259,7 +264,7 @@ class Request(Generic[S]):
     :param done: called once, with the result, the change and the status that shows it; None
         stands for a change that was not sent, and for a status that did not come.
     :param limit: the time by which it ends, s.
-    :param is_stream: whether it is one of a stream of setpoints, which a newer one replaces.
+    :param is_stream: whether it is one of a stream: a newer one replaces it while it waits.
     :param overtakes: whether its command is sent beside one of its kind that is in progress.
     :param earliest_start: returns the time before which it must not be sent, s; called at each
         poll.
@@ -269,7 +274,7 @@ class Request(Generic[S]):
         self, target: Target, prepare: Callable[[float], Change[S]],
         done: Callable[[Result, Change[S] | None, S | None, float], None], *, now: float,
         limit: float, is_stream: bool = False, overtakes: bool = False,
-        earliest_start: Callable[[], float] = lambda: -math.inf,
+        earliest_start: Callable[[], float] = at_any_time,
     ) -> None:
         self.phase = Phase.WAITING
         self.limit = limit
@@ -305,6 +310,11 @@ class Request(Generic[S]):
     def is_confirming(self) -> bool:
         """Whether the device has acknowledged, and the status is awaited."""
         return self.phase is Phase.CONFIRMING
+
+    @property
+    def is_contradicted(self) -> bool:
+        """Whether the device has acknowledged, and then shown something else."""
+        return self.is_confirming and bool(self._contradiction)
 
     @property
     def is_accepted(self) -> bool:
@@ -347,7 +357,7 @@ class Request(Generic[S]):
         self._outcome = outcome
         accepted = outcome.accepted
         if outcome.status is command_sender.CommandStatus.CANCELLED:
-            self.fail(OVERTAKEN, now)
+            self.replace(now)
         elif accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
         elif accepted or outcome.may_answer_earlier(now):
@@ -409,7 +419,7 @@ class Request(Generic[S]):
             self._shown_by.clear()
             self._shown_since = math.inf
             if not self.is_accepted and now >= self._acknowledged_at + ASK_INTERVAL:
-                self._unconfirmed(now)
+                self.end_unconfirmed(now)
         else:
             # Each of several devices that report in turn must show it.
             self._shown_by.add(report.sender)
@@ -422,7 +432,7 @@ class Request(Generic[S]):
         if not self.is_confirming:
             return
         if now >= self._confirm_until:
-            self._unconfirmed(now)
+            self.end_unconfirmed(now)
         elif now >= self._ask_at:
             self._ask_at = now + ASK_INTERVAL
             self._target.request_status(now)
@@ -443,6 +453,11 @@ class Request(Generic[S]):
         if not self.is_finished:
             self._finish(Result(False, message), now)
 
+    def replace(self, now: float) -> None:
+        """End without a success, if it has not ended: a newer request replaces it."""
+        if not self.is_finished:
+            self._finish(Result(False, OVERTAKEN, superseded=True), now)
+
     def _refused(self, now: float) -> None:
         answer = self._answer
         answered = answer.status is command_sender.CommandStatus.ANSWERED
@@ -453,7 +468,8 @@ class Request(Generic[S]):
             self._end(f'{"refused: " if answered else ""}{answer.describe()}', now,
                       refused=answered, permanent=answered and answer.result in PERMANENT_RESULTS)
 
-    def _unconfirmed(self, now: float) -> None:
+    def end_unconfirmed(self, now: float) -> None:
+        """End without a confirmation, which may be a success where the device sends no status."""
         name, kind = self._target.status_name, self._target.kind
         if not self.is_accepted:
             self._refused(now)
@@ -519,24 +535,24 @@ class RequestQueue(Generic[S]):
         return len(self._requests)
 
     def submit(self, request: Request[S], now: float) -> None:
-        """Send a request, or let it wait: behind the others, or until its earliest start."""
-        if len(self._requests) >= MAX_WAITING:
+        """
+        Send a request, or let it wait: behind the others, or until its earliest start.
+
+        One that overtakes replaces those that do not, and one of a stream replaces those of a
+        stream that wait.
+        """
+        replaced = [one for one in self._requests if request.overtakes and not one.overtakes
+                    or request.is_stream and one.is_stream and one.phase is Phase.WAITING]
+        if replaced:
+            self._requests = [one for one in self._requests if one not in replaced]
+        if len(self._requests) < MAX_WAITING:
+            self._requests.append(request)
+            self._start_next(now)
+        else:
             request.fail(f'{MAX_WAITING} requests are waiting for {self._target.kind} '
                          f'{self._target.address} already', now)
-            return
-        self._requests.append(request)
-        if len(self._requests) == 1:
-            self._start_next(now)
-
-    def overtake(self, request: Request[S], now: float) -> None:
-        """Send a request before those that do not overtake, which are cancelled."""
-        overtaken: list[Request[S]] = []
-        if self._requests:
-            overtaken = [one for one in self._requests if not one.overtakes]
-            self._requests = [one for one in self._requests if one.overtakes]
-        self.submit(request, now)
-        for one in overtaken:
-            one.fail(OVERTAKEN, now)
+        for one in replaced:
+            one.replace(now)
 
     def cancel(self, message: str, now: float, *, only_waiting: bool = False) -> None:
         """End all requests, or only those that wait."""
@@ -551,7 +567,7 @@ class RequestQueue(Generic[S]):
         if self._requests:
             first = self._requests[0]
             first.take(report, now)
-            if first.phase is Phase.FINISHED:
+            if first.phase is Phase.FINISHED or len(self._requests) > 1:
                 self._start_next(now)
 
     def poll(self, now: float) -> None:
@@ -570,6 +586,9 @@ class RequestQueue(Generic[S]):
                 del self._requests[0]
             elif first.phase is Phase.WAITING and now >= first.earliest_start():
                 first.start(self._status, now)
+            elif first.is_contradicted and len(self._requests) > 1 and (
+                    self._requests[1].overtakes):
+                first.end_unconfirmed(now)
             else:
                 break
 

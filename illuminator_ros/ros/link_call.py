@@ -97,35 +97,29 @@ class LatestOnly(Generic[T]):
 
     :param start: starts a request, given its value, the time (s), and the function to call with
         the time when it has ended.
-    :param overtakes: returns whether a value does not wait for the end of a request with another.
     """
 
-    def __init__(
-        self, start: Callable[[T, float, Callable[[float], None]], None],
-        overtakes: Callable[[T], bool] = lambda value: False,
-    ) -> None:
+    def __init__(self, start: Callable[[T, float, Callable[[float], None]], None]) -> None:
         self._start = start
-        self._overtakes = overtakes
         self._waiting: list[T] = []
-        self._running: list[T] = []
+        self._is_running = False
 
     def offer(self, value: T, now: float) -> None:
         """Carry out a request, unless a newer one comes before it is sent."""
         self._waiting[:] = [value]
-        if not self._running or self._overtakes(value) and value not in self._running:
+        if not self._is_running:
             self._start_next(now)
 
     def _start_next(self, now: float) -> None:
-        value = self._waiting.pop()
-        self._running.append(value)
+        self._is_running = True
 
         def ended(now: float) -> None:
-            self._running.remove(value)
-            if self._waiting and not self._running:
+            self._is_running = False
+            if self._waiting:
                 self._start_next(now)
 
         try:
-            self._start(value, now, ended)
+            self._start(self._waiting.pop(), now, ended)
         except Exception:
-            self._running.remove(value)
+            self._is_running = False
             raise

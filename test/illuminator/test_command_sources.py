@@ -223,12 +223,11 @@ def test_the_highest_source_wins_within_one_turn_and_only_its_requests_are_sent(
         if act in ('die', 'revive'):
             alive[source] = act == 'revive'
         elif alive[source] and act != 'wait':
-            last_heard = pair.now
             model.expire(pair.now)
             if act == 'release':
                 model.heard.pop(source, None)
             else:
-                model.heard[source] = pair.now
+                last_heard = model.heard[source] = pair.now
             if act == 'enable':
                 desired[source].append(on := draw.random() < 0.5)
                 shared.enable(source, on)

@@ -234,6 +234,56 @@ def test_off_overtakes_the_requests_before_it(pair: Pair) -> None:
     assert [answer.result.success for answer in answers] == [False, True, False, False, True]
 
 
+def test_of_a_stream_of_switches_only_the_newest_waits(fake: FakeLight, faked: Pair) -> None:
+    fake.results[ON_OFF] = None
+    first, *replaced, last = [faked.ask_enable(True, is_stream=True) for _ in range(10)]
+    assert all(answer.result.superseded for answer in replaced)
+    fake.results.clear()
+    assert faked.wait_for(first).success
+    assert faked.wait_for(last).success
+
+
+def test_an_on_of_a_stream_that_waits_is_not_sent_after_a_later_off(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.applies = False
+    answers = [faked.ask_enable(True, is_stream=True) for _ in range(2)]
+    faked.run(0.2)
+    fake.applies = True
+    asked_at = faked.now
+    assert faked.enable(False).success
+    faked.run(10.0)
+    assert not any(m.param1 for m in faked.commands(ON_OFF, since=asked_at))
+    assert [answer.result.superseded for answer in answers] == [True, True]
+
+
+def test_an_on_of_a_stream_that_waits_fails_when_the_light_is_lost(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[ON_OFF] = None
+    faked.ask_enable(False, is_stream=True)
+    answer = faked.ask_enable(True, is_stream=True)
+    faked.close()
+    assert 'is lost' in answer.result.message
+    fake.results.clear()
+    faked.open()
+    faked.run(10.0)
+    assert not any(m.param1 for m in faked.commands(ON_OFF))
+
+
+def test_an_off_does_not_wait_for_one_that_a_status_contradicts(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    change(fake, applies=False, fields={'enable': 1})
+    first, second = faked.ask_enable(False), faked.ask_enable(False)
+    faked.run_until(lambda: any(
+        isinstance(m, mav.CommandAck) and m.command == ON_OFF for _, _, m in faked.near.received))
+    fake.applies = True
+    assert faked.wait_for(second).success
+    assert second.seconds < 0.2
+    assert 'shows on' in first.result.message
+
+
 def test_switches_and_configurations_do_not_wait_for_each_other(
     fake: FakeLight, faked: Pair,
 ) -> None:
@@ -483,10 +533,10 @@ def three() -> Pair:
     return Pair([IlluminatorProperties(mav.Address(1, one)) for one in (243, 244, 245)]).settle()
 
 
-def ask_all(pair: Pair) -> Answer:
+def ask_all(pair: Pair, on: bool = True, *, is_stream: bool = False) -> Answer:
     answer = Answer(pair.now)
-    enable_all(list(pair.controller.lights.values()), True, pair.now, answer,
-               name=lambda light: f'lamp {light.address}')
+    enable_all(list(pair.controller.lights.values()), on, pair.now, answer,
+               name=lambda light: f'lamp {light.address}', is_stream=is_stream)
     pair.turn()
     return answer
 
@@ -517,6 +567,19 @@ def test_the_answer_of_all_lights_names_the_outcome_of_each(
     assert three.now - at < 2.1
     assert len({m.target_component for m in three.commands(ON_OFF, since=at)
                 }) == int(texts[0][5] if texts[0][0].isdigit() else 0)
+
+
+def test_an_off_of_all_lights_reaches_each_at_once_though_one_has_not_answered_the_last(
+    three: Pair,
+) -> None:
+    deafen(three)
+    first = ask_all(three, on=False, is_stream=True)
+    three.run(0.1)
+    pressed_at = three.now
+    ask_all(three, on=False, is_stream=True)
+    three.run(0.1)
+    assert not first.results
+    assert {one.target_component for one in three.commands(ON_OFF, since=pressed_at)} >= {244, 245}
 
 
 def test_without_a_light_a_request_to_all_fails_at_once() -> None:

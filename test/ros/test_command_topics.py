@@ -92,6 +92,24 @@ def test_off_message_is_sent_while_the_light_has_not_acknowledged_an_on(
     eventually(lambda: not light.commands(ON_OFF)[-1].param1)
 
 
+@pytest.mark.parametrize('name', ['enable', 'enable_all'])
+def test_on_message_that_waits_is_not_sent_after_the_light_was_switched_off(
+    ros: Ros, light: ServedLight, name: str,
+) -> None:
+    light.fake.applies = False
+    ros.publish(Bool, f'/illuminator/cmd/{name}', True, True)
+    light.wait_for(ON_OFF)
+    light.fake.applies = True
+
+    assert ros.enable(False).success
+    answered = ros.enable(False)
+
+    # The queue is empty once a second OFF was confirmed.
+    assert answered.success
+    assert light.fake.fields['enable'] == 0
+    assert not light.commands(ON_OFF)[-1].param1
+
+
 def test_best_effort_publisher_is_heard(
     ros: Ros, light: ServedLight, parameters: Parameters,
 ) -> None:

@@ -227,10 +227,12 @@ class Pair:
 
     # Requests
 
-    def ask_enable(self, on: bool, light: Light | None = None) -> Answer:
+    def ask_enable(
+        self, on: bool, light: Light | None = None, *, is_stream: bool = False,
+    ) -> Answer:
         """Begin to switch a light on or off."""
         answer = Answer(self.now)
-        (light or self.light).enable(on, self.now, answer)
+        (light or self.light).enable(on, self.now, answer, is_stream=is_stream)
         self.turn()
         return answer
 

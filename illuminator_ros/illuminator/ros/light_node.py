@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import functools
 import itertools
-import operator
 
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float32, String
@@ -40,7 +39,6 @@ from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
 from ...ros.diagnostics import DISCOVERY_GRACE
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.link_call import LatestOnly
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import DeviceParameters, ParameterError
 from ...ros.payload import Host
@@ -179,18 +177,10 @@ class LightNode:
     def _command_topics(
         self, source: str, prefix: str,
     ) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
-        switching = LatestOnly(
-            functools.partial(self._switch, source, prefix), overtakes=operator.not_)
-
-        def enable(on: bool, now: float) -> None:
-            if light := self._light():
-                # The switch before may be under way for longer than the source may be silent.
-                light.note_request(now, source)
-            switching.offer(on, now)
-
         return (
             ros_node.CommandTopic(
-                f'{prefix}cmd/enable', Bool, enable, qos=ros_node.SWITCH_QOS),
+                f'{prefix}cmd/enable', Bool, functools.partial(self._switch, source, prefix),
+                qos=ros_node.SWITCH_QOS),
             ros_node.CommandTopic(
                 f'{prefix}cmd/brightness', Float32,
                 functools.partial(self._set_brightness, source, prefix),
@@ -212,18 +202,20 @@ class LightNode:
             light.enable(on, now, lambda result, now: answer(result.success, result.message),
                          detail=way, source=source)
 
-    def _switch(
-        self, source: str, prefix: str, on: bool, now: float, ended: Callable[[float], None],
-    ) -> None:
-        def answer(success: bool, message: str) -> None:
+    def _switch(self, source: str, prefix: str, on: bool, now: float) -> None:
+        def warn(success: bool, message: str) -> None:
+            topic = f'{prefix}cmd/enable'
+            self._log.warning(f'~/{topic}: {message}', topic)
+
+        def done(result: Result, now: float) -> None:
             light = self._light()
             # A source that repeats its request while a higher one holds the light is not at fault.
-            if not success and not (light and light.is_held_by_other(source)):
-                topic = f'{prefix}cmd/enable'
-                self._log.warning(f'~/{topic}: {message}', topic)
-            ended(self._host.link.clock())
+            if not (result.success or result.superseded
+                    or light and light.is_held_by_other(source)):
+                warn(False, result.message)
 
-        self._request_enable(source, on, now, f'{prefix}topic', answer)
+        if light := self._light_or_refusal(now, warn):
+            light.enable(on, now, done, detail=f'{prefix}topic', source=source, is_stream=True)
 
     def _refresh(self, request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):

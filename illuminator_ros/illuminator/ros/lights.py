@@ -16,11 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Hashable, Mapping
 import functools
 import logging
 import math
-import operator
 
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -32,9 +31,8 @@ from ..client import enable_all, IlluminatorClient
 from ..light import Light
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
-from ...payload.request import Result
+from ...payload.request import Done, Result
 from ...ros.device_nodes import DeviceNodes
-from ...ros.link_call import LatestOnly
 from ...ros.node import Answer, CommandTopic, RequestService, SWITCH_QOS
 from ...ros.parameters import Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
@@ -55,13 +53,12 @@ class Lights(ServedPayload):
         self._host = host
         self._selection = parameters.Selection(host.values, host.node.get_name())
         geometry = parameters.BeamGeometry.of(host.values)
-        self._switching = LatestOnly(self._switch_all, overtakes=operator.not_)
         self._nodes = DeviceNodes[Address, LightNode](
             host, 'light', LightNode(
                 host.node, host, host.log, client, geometry,
                 services=(RequestService('enable_all', SetBool, self._enable_all),),
                 commands=(CommandTopic(
-                    'cmd/enable_all', Bool, self._switching.offer, qos=SWITCH_QOS),)),
+                    'cmd/enable_all', Bool, self._switch_all, qos=SWITCH_QOS),)),
             lambda node, log: LightNode(node, host, log, client, geometry.declare(node)),
             LightNode.bind)
         self._second_reported = False
@@ -106,21 +103,22 @@ class Lights(ServedPayload):
     # Requests to all lights
 
     def _enable_all(self, request: SetBool.Request, now: float, answer: Answer) -> None:
-        lights = self._client.lights_by_address
-        if lights:
-            enable_all(lights, request.data, now,
-                       lambda result, now: answer(result.success, result.message),
-                       name=self._name_of, detail='enable_all')
+        self._switch(request.data, now,
+                     lambda result, now: answer(result.success, result.message))
+
+    def _switch_all(self, on: bool, now: float) -> None:
+        def done(result: Result, now: float) -> None:
+            if not (result.success or result.superseded):
+                self._host.log.warning(f'~/cmd/enable_all: {result.message}', 'cmd/enable_all')
+
+        self._switch(on, now, done, is_stream=True)
+
+    def _switch(self, on: bool, now: float, done: Done, *, is_stream: bool = False) -> None:
+        if lights := self._client.lights_by_address:
+            enable_all(lights, on, now, done, name=self._name_of, detail='enable_all',
+                       is_stream=is_stream)
         else:
-            answer(False, self._nodes.first.absence(now))
-
-    def _switch_all(self, on: bool, now: float, ended: Callable[[float], None]) -> None:
-        def answer(success: bool, message: str) -> None:
-            if not success:
-                self._host.log.warning(f'~/cmd/enable_all: {message}', 'cmd/enable_all')
-            ended(self._host.link.clock())
-
-        self._enable_all(SetBool.Request(data=on), now, answer)
+            done(Result(False, self._nodes.first.absence(now)), now)
 
     def _name_of(self, light: Light) -> str:
         node = self._nodes.get(light.address)
