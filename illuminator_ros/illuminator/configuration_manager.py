@@ -456,6 +456,9 @@ class ConfigurationManager:
     ) -> bool:
         """Undo what another sender has changed, unless that was done often enough."""
         names = unexpected_differences(confirmed, reported, status.error_flags, step=True)
+        if status.enabled is False and not status.brightness:
+            # Where brightness is the switch, it would be an ON.
+            names = [name for name in names if name != 'brightness']
         if not names:
             return False
         due = self._undoing.take(now)

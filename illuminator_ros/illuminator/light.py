@@ -37,6 +37,7 @@ from ..payload.request import (
     at_any_time,
     Change,
     Done,
+    OVERTAKEN,
     Report,
     Request,
     RequestQueue,
@@ -155,6 +156,9 @@ class Light:
         self._late_until = -math.inf
         # The brightness that the light reports while it is off: 0 where that is the switch, too.
         self._off_brightness: float | None = None
+        # Whether the light was seen to report brightness 0 since it was switched off.
+        self._brightness_is_switch = False
+        self._was_dimmed = False
         # When the last request came, or the light was seen to be switched on, s.
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
@@ -240,9 +244,18 @@ class Light:
         before, self._enabled = self._enabled, report.status.enabled
         if self._enabled is False:
             self._off_brightness = report.status.brightness
-        # Several lights at one address seem to switch again and again.
-        if self._enabled and not before and (
-                not report.shared_address or self._requested_at == -math.inf):
+            confirmed = self._configuration.confirmed
+            self._brightness_is_switch |= bool(
+                before and self._off_brightness == 0.0 and confirmed and confirmed.brightness
+                and not self._configuration.is_changing)
+        was_dimmed = self._was_dimmed
+        self._was_dimmed = bool(report.status.error_flags & DIMMING_FLAGS)
+        # Several lights at one address seem to switch again and again, and a light that has
+        # cooled down switches itself on.
+        is_by_other = before is False and not (
+            report.shared_address or was_dimmed or self._was_dimmed or self._switching
+            or now <= self._late_until)
+        if self._enabled and (self._requested_at == -math.inf or is_by_other):
             self._requested_at = now
         if not self._switching:
             if self._automatic and self._enabled is self._automatic.on:
@@ -272,7 +285,7 @@ class Light:
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(self.address, status.enabled, origin))
         # A light is switched on again only where a request has switched it on.
-        if not self.settings.reassert or is_own or not on and before:
+        if not self.settings.reassert or is_own or before and not (on and self._may_stay_on(now)):
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
@@ -281,6 +294,15 @@ class Light:
             self._switch_automatically(_AutomaticSwitch(
                 before, f'external_changes: another sender switched it {change}', due,
                 self._undoing))
+
+    def _may_stay_on(self, now: float) -> bool:
+        """Return whether neither silence nor the lack of a holder switches the light off."""
+        is_free = self._sources.are_ranked and self._sources.holder is None
+        return not (self._is_silent(now) or self.settings.off_on_release and is_free)
+
+    def _is_silent(self, now: float) -> bool:
+        limit = self.settings.off_after_silence
+        return bool(limit) and now >= self._requested_at + limit
 
     def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
         self._automatic = switch
@@ -302,6 +324,8 @@ class Light:
             self._tracker.lost()
             self._emit(events.LightLost(self.address, reason))
             message = self.unreachable(now)
+            if self._automatic and self._automatic.on:
+                self._automatic = None
             # Another try may reach the light after a restart. An OFF may reach it at any time.
             self._commands.end_all(
                 now, CommandStatus.NO_ANSWER, self.address, lambda command: (
@@ -323,7 +347,8 @@ class Light:
     def _restarted(self, now: float) -> None:
         was_on, is_on = self._enabled, self.status.enabled if self.status else None
         self.restarts += 1
-        self._automatic = None
+        if self._automatic and (self._automatic.on or is_on is False):
+            self._automatic = None
         self._emit(events.LightRestarted(self.address, was_on, is_on))
         self._set_up(now)
         self._configuration.restarted(now)
@@ -434,6 +459,8 @@ class Light:
             self._end_requests(f'held by {change.after}', now)
         self._emit(events.LightHeld(self.address, change))
         if change.after is None:
+            self._switching.cancel(
+                f'{change.before} no longer holds it', now, only_waiting=True)
             if self.settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
@@ -445,10 +472,16 @@ class Light:
         if self._automatic and self._automatic.on:
             self._automatic = None
         self._switching.cancel(message, now)
+        self._end_commands(MavCmd.ILLUMINATOR_ON_OFF, now)
+        self._end_configuring(message, now)
+
+    def _end_configuring(self, message: str, now: float) -> None:
         self._configuration.end_requests(message, now)
+        self._end_commands(MavCmd.DO_ILLUMINATOR_CONFIGURE, now)
+
+    def _end_commands(self, kind: MavCmd, now: float) -> None:
         self._commands.end_all(
-            now, CommandStatus.CANCELLED, self.address, lambda command: command.command in (
-                MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE))
+            now, CommandStatus.CANCELLED, self.address, lambda command: command.command == kind)
 
     def _send_desired(self, now: float) -> None:
         """Send the values that the source that holds the light now has requested before."""
@@ -460,19 +493,25 @@ class Light:
 
         if not self._can_reach(now, done):
             return
-        limit = self.settings.off_after_silence or math.inf
-        # A light that went off after silence must not flash.
-        if desired.enabled is not None and (
-                not desired.enabled or now < self._requested_at + limit):
+        way = f'{holder}, which holds the light now'
+        if desired.enabled is False:
             self._automatic = None
-            self._switch(desired.enabled, now, done, f'{holder}, which holds the light now')
-        if desired.brightness is not None:
+            self._switch(False, now, done, way)
+        if desired.brightness is not None and not (
+                desired.enabled is False and self._brightness_is_switch):
             self._configuration.set_brightness(desired.brightness, now)
+        # A light that went off after silence must not flash.
+        if desired.enabled and not self._is_silent(now):
+            self._automatic = None
+            self._switch(True, now, done, way)
 
     def _switch(
         self, on: bool, now: float, done: Done, detail: str | None, *, is_stream: bool = False,
     ) -> None:
         """Submit a request; ``detail`` is None where its caller reports the change itself."""
+        if not on and self._brightness_is_switch:
+            # A brightness that is sent later would be an ON.
+            self._end_configuring(OVERTAKEN, now)
         change = SWITCHES[on]
         was_on: bool | None = None
 
@@ -666,6 +705,9 @@ class Light:
             else:
                 switch.due = due
 
+        if switch.on and not self._may_stay_on(now):
+            self._automatic = None
+            return
         switch.due = math.inf
         self._switch(switch.on, now, done, switch.reason)
 

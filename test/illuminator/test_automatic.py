@@ -21,6 +21,7 @@ from typing import Any
 from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
+from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -101,6 +102,19 @@ def test_a_light_that_was_lost_meanwhile_goes_off_when_it_is_heard_again() -> No
     assert light.fields['enable'] == 0
 
 
+def test_a_light_that_overheats_and_cools_down_goes_off_after_silence() -> None:
+    light = FakeLight()
+    pair = silenced(light)
+    assert pair.enable(True).success
+    pair.run(SILENCE - 2.0)
+    for fields in ({'enable': 0, 'error_status': 2}, {'enable': 1, 'error_status': 0}):
+        light.fields |= fields
+        pair.run(1.1)
+    pair.run(1.0)
+
+    assert light.fields['enable'] == 0
+
+
 @pytest.mark.parametrize(('before', 'change', 'undone'), [
     ({}, {'brightness': 30.0, 'strobe_period': 1.0}, True),
     ({}, {'mode': 2}, True),
@@ -154,3 +168,104 @@ def test_a_sender_that_insists_is_left_alone_after_three_times_in_a_row(
 
     assert light.fields != light.fields | fields
     assert math.isfinite(pair.light.next_deadline())
+
+
+def switched_off_twice(pair: Pair, light: FakeLight) -> None:
+    """Let another sender switch a light off, so that the second time is undone 2 s later."""
+    for _ in range(2):
+        light.fields['enable'] = 0
+        light.send(light.status(pair.now))
+        pair.turn()
+        pair.run(0.1)
+    assert light.fields['enable'] == 0
+
+
+def test_an_on_that_undoes_a_change_is_not_sent_after_a_loss() -> None:
+    light, pair = reasserting()
+    assert pair.enable(True).success
+    switched_off_twice(pair, light)
+    pair.close()
+    pair.run(10.0)
+    pair.open()
+    pair.run(5.0)
+
+    assert light.fields['enable'] == 0
+
+
+@pytest.mark.parametrize('is_lost', [False, True])
+def test_an_off_by_another_sender_is_not_undone_after_silence(is_lost: bool) -> None:
+    light = FakeLight()
+    pair = Pair(light, settings=Settings(reassert=True, off_after_silence=SILENCE)).settle()
+    assert pair.enable(True).success
+    pair.run(SILENCE - 1.5)
+    if is_lost:
+        pair.close()
+        light.fields['enable'] = 0
+        pair.run(SILENCE)
+        pair.open()
+    else:
+        switched_off_twice(pair, light)
+    pair.run(SILENCE)
+
+    assert light.fields['enable'] == 0
+
+
+def test_an_off_of_a_light_that_no_source_holds_is_not_undone_where_release_is_off() -> None:
+    light = FakeLight(heartbeat_type=None)
+    pair = Pair(light, settings=Settings(
+        reassert=True, sources=SourceSettings(('default',), 3.0), off_on_release=True)).settle()
+    assert pair.enable(True).success
+    pair.close()
+    pair.run(10.0)
+    light.fields['enable'] = 0
+    light.delay_status(-10.0)
+    reopened_at = pair.now
+    pair.open()
+    pair.run(5.0)
+
+    assert not any(command.param1 for command in pair.commands(ON_OFF, since=reopened_at))
+
+
+# Lights for which brightness is the switch
+
+@pytest.mark.parametrize('by_request', [True, False])
+def test_an_off_is_not_undone_by_a_brightness_where_that_is_the_switch(by_request: bool) -> None:
+    light, pair = reasserting(enable=1)
+    light.brightness_is_switch = True
+    pair.run(5.0)
+    if by_request:
+        assert pair.enable(True).success
+        pair.run(5.0)
+        pair.ask_enable(False)
+        # It is carried out, and no status arrives for longer than an effect is expected.
+        pair.run_until(lambda: light.fields['enable'] == 0)
+        pair.far.wire.switch(is_open=False)
+        pair.run(2.5)
+        pair.far.wire.switch(is_open=True)
+    else:
+        light.fields |= {'enable': 0, 'brightness': 0.0}
+    pair.run(10.0)
+
+    assert light.fields['enable'] == 0
+
+
+@pytest.mark.parametrize('setpoints', [[30.0], [30.0, 35.0]], ids=['sent again', 'waiting'])
+def test_a_brightness_from_before_an_off_is_not_sent_after_it_where_that_is_the_switch(
+    setpoints: list[float],
+) -> None:
+    light = FakeLight(brightness=50.0)
+    light.brightness_is_switch = True
+    pair = Pair(light).settle()
+    # The bridge learns from the first OFF that brightness is the switch.
+    for on in (True, False, True):
+        assert pair.enable(on).success
+        pair.run(5.0)
+    light.results[CONFIGURE] = [None, None, MavResult.ACCEPTED]
+    for brightness in setpoints:
+        pair.light.set_brightness(brightness, pair.now)
+        pair.turn()
+    pair.run(0.05)
+
+    assert pair.enable(False).success
+    pair.run(10.0)
+    assert light.fields['enable'] == 0

@@ -149,6 +149,83 @@ def test_a_light_that_no_source_holds_stays_or_goes_off_as_configured(
     assert shared.light.fields['enable'] == enabled
 
 
+def test_an_on_that_waits_is_not_sent_after_its_source_has_released_the_light() -> None:
+    shared = Shared()
+    shared.pair.settle()
+    # Its restart is checked when it is heard again.
+    shared.pair.close()
+    shared.pair.run(5.0)
+    shared.pair.open()
+    shared.pair.run_until(lambda: shared.pair.light.connected)
+    answer = shared.enable('operator', True)
+    shared.release('operator')
+    shared.pair.run(5.0)
+
+    assert answer.result.message == 'operator no longer holds it'
+    assert shared.sent(ON_OFF) == []
+
+
+def test_a_light_that_restarts_on_after_its_source_fell_silent_goes_off_where_release_is_off() -> (
+        None):
+    shared = Shared(off_on_release=True)
+    shared.enable('operator', True)
+    shared.pair.close()
+    shared.pair.run(TIMEOUT + 1.0)
+    shared.light.restart(shared.pair.now, enable=1)
+    shared.pair.open()
+    shared.pair.run(5.0)
+
+    assert shared.light.fields['enable'] == 0
+
+
+def test_the_brightness_that_the_next_source_requested_is_sent_before_its_on() -> None:
+    shared = Shared()
+    shared.pair.settle()
+    shared.enable('safety', False)
+    shared.enable('operator', True)
+    shared.dim('operator', 20.0)
+    shared.pair.run(1.0)
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert shared.light.shone == [20.0]
+
+
+def test_the_brightness_before_an_off_is_not_sent_with_it_where_that_is_the_switch() -> None:
+    light = FakeLight(brightness=50.0)
+    light.brightness_is_switch = True
+    shared = Shared(light=light, timeout=60.0)
+    shared.pair.settle()
+    shared.dim('operator', 20.0)
+    shared.pair.run(1.0)
+    shared.enable('operator', False)
+    shared.pair.run(1.0)
+    shared.enable('safety', True)
+    shared.pair.run(1.0)
+    shared.release('safety')
+    shared.pair.run(5.0)
+
+    assert light.fields['enable'] == 0
+
+
+@pytest.mark.parametrize('act', [
+    lambda shared: shared.release('safety'), lambda shared: None], ids=['release', 'nothing'])
+def test_neither_a_release_nor_the_state_that_is_sent_for_a_source_counts_as_a_request(
+    act: Callable[[Shared], None],
+) -> None:
+    shared = Shared(timeout=SILENCE + 2.0)
+    shared.pair.settle()
+    shared.enable('safety', False)
+    shared.pair.run(3.0)
+    shared.enable('operator', True)
+    requested_at = shared.pair.now
+    while shared.pair.now < requested_at + SILENCE + 1.5:
+        shared.pair.run(0.5)
+        act(shared)
+
+    assert shared.light.fields['enable'] == 0
+
+
 def test_a_takeover_ends_the_requests_of_the_lower_source_and_their_resends() -> None:
     shared = Shared(light=FakeLight(
         brightness=50.0, results={ON_OFF: None, CONFIGURE: None}))

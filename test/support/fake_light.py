@@ -45,6 +45,7 @@ class FakeLight(Endpoint):
     :ivar results: the answers to commands by MAV_CMD, by default MAV_RESULT_ACCEPTED; None means
         no answer. A list is used up from its front; its last entry is kept.
     :ivar applies: whether an accepted command changes the light.
+    :ivar brightness_is_switch: whether it is on where the brightness is above 0 (ArduSub).
     :ivar apply_after: s from the acknowledgement to the change.
     :ivar stream: s between statuses, 0 for none.
     :ivar answers: the message ids that it sends on request.
@@ -67,6 +68,7 @@ class FakeLight(Endpoint):
         self.beats = heartbeat_type is not None
         self.results: dict[int, Any] = dict(results or {})
         self.applies = True
+        self.brightness_is_switch = False
         self.apply_after = 0.0
         self.stream = stream
         self.answers = {STATUS_ID, mav.INFORMATION_ID}
@@ -133,6 +135,10 @@ class FakeLight(Endpoint):
             self.fields |= {
                 'mode': int(message.param1), 'brightness': message.param2,
                 'strobe_period': message.param3, 'strobe_duty_cycle': message.param4}
+        if self.brightness_is_switch:
+            if message.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+                self.fields['brightness'] = 50.0 if message.param1 else 0.0
+            self.fields['enable'] = int(self.fields['brightness'] > 0)
         if self.pushes:
             self.send(self.status(now))
 
