@@ -227,7 +227,7 @@ class Light:
         if self._is_shared is not report.shared_address:
             self._is_shared = report.shared_address
             self._emit(events.AddressShared(self.address, self._is_shared))
-        self._take_report(report, now, restarted=restarted)
+        self._take_report(report, now, was_lost=was_lost, restarted=restarted)
         self._restart_check_until = -math.inf
         if is_awaited:
             self._publish(status, now)
@@ -240,7 +240,9 @@ class Light:
     def _publish(self, status: Status, now: float) -> None:
         self._emit(events.StatusReceived(self.address, status, now, self.temperature))
 
-    def _take_report(self, report: Report[Status], now: float, *, restarted: bool) -> None:
+    def _take_report(
+        self, report: Report[Status], now: float, *, was_lost: bool, restarted: bool,
+    ) -> None:
         before, self._enabled = self._enabled, report.status.enabled
         if self._enabled is False:
             self._off_brightness = report.status.brightness
@@ -261,7 +263,7 @@ class Light:
             if self._automatic and self._enabled is self._automatic.on:
                 self._automatic = None
             if not restarted:
-                self._follow_switch(before, report, now)
+                self._follow_switch(before, report, now, was_lost=was_lost)
         self._switching.take(report, now)
         self._configuration.take(
             report, now, can_follow=self._tracker.conflict.can_follow,
@@ -271,7 +273,9 @@ class Light:
                 refresh.outcomes['ILLUMINATOR_STATUS'] = ''
             self._check_refreshes(now)
 
-    def _follow_switch(self, before: bool | None, report: Report[Status], now: float) -> None:
+    def _follow_switch(
+        self, before: bool | None, report: Report[Status], now: float, *, was_lost: bool,
+    ) -> None:
         """Report that the light was switched without a request under way."""
         status = report.status
         if (before is None or status.enabled is None or before == status.enabled
@@ -285,7 +289,9 @@ class Light:
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(self.address, status.enabled, origin))
         # A light is switched on again only where a request has switched it on.
-        if not self.settings.reassert or is_own or before and not (on and self._may_stay_on(now)):
+        if not self.settings.reassert or is_own:
+            return
+        if before and (was_lost or not on or not self._may_stay_on(now)):
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:

@@ -180,11 +180,14 @@ def switched_off_twice(pair: Pair, light: FakeLight) -> None:
     assert light.fields['enable'] == 0
 
 
-def test_an_on_that_undoes_a_change_is_not_sent_after_a_loss() -> None:
+@pytest.mark.parametrize('before_loss', [True, False])
+def test_an_off_by_another_sender_is_not_undone_after_a_loss(before_loss: bool) -> None:
     light, pair = reasserting()
     assert pair.enable(True).success
-    switched_off_twice(pair, light)
+    if before_loss:
+        switched_off_twice(pair, light)
     pair.close()
+    light.fields['enable'] = 0
     pair.run(10.0)
     pair.open()
     pair.run(5.0)
