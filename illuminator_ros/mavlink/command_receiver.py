@@ -31,7 +31,7 @@ from . import messages as mav
 
 # Commands whose result is remembered, one of each kind from each sender.
 MAX_RESULTS = 256
-# s since the last frame of a command within which one with a higher confirmation repeats it.
+# s since the last frame of a command in which a frame with a confirmation above 0 repeats it.
 REPEAT_TIME = 5.0
 
 AnyCommand = mav.CommandLong | mav.CommandInt
@@ -62,8 +62,8 @@ class CommandReceiver:
         """
         Take a command and return its acknowledgement.
 
-        :return: None for a command to another component, and for one to all components that is
-            not supported.
+        :return: None for a command to another component, and for an unsupported one to all
+            components.
         """
         target = mav.Address(command.target_system, command.target_component)
         if target.system not in (self._address.system, 0) or target.component not in (
@@ -88,7 +88,7 @@ class CommandReceiver:
             result: mav.MavResult | None = last.result
         else:
             result = execute(source, command, now)
-        # A command that was rejected temporarily is repeated to be executed.
+        # A repeat of a temporarily rejected command must be executed.
         if result not in (None, mav.MavResult.TEMPORARILY_REJECTED):
             self._executed[key] = _Executed(payload, result, now)
             if len(self._executed) > MAX_RESULTS:

@@ -34,31 +34,31 @@ from typing import NamedTuple
 from . import messages
 from .messages import Address, MavResult, Message
 
-# s between two reports of progress. The specification leaves it open; MAVSDK also takes 3 s.
+# s between two reports of progress. The specification does not define it; MAVSDK also uses 3 s.
 PROGRESS_TIMEOUT = 3.0
 # s between tries of a command that was temporarily rejected: the first, doubling up to the last.
 REJECTED_BACKOFF = (0.1, 0.8)
 # Commands of one kind that may wait for one target. More are refused, so memory is bounded.
 MAX_WAITING = 32
-# s. A shorter time-out is unsafe on a 57,600 baud line, where another frame may be on the wire
-# for 49 ms before ours and another before the answer.
+# s. A shorter time-out is unsafe on a 57,600 baud line, where another frame may be on the wire for
+# 49 ms before our command and another before the answer.
 MIN_TIMEOUT = 0.2
-# Round-trip times of one target, and targets with round-trip times.
+# The most round-trip times of one target, and the most targets with round-trip times.
 MAX_SAMPLES = 64
 MAX_TARGETS = 128
-# Before this many samples the given time-out holds.
+# With fewer samples than this the given time-out is used.
 MIN_SAMPLES = 4
 # s for which an acknowledgement, or a copy of it, may be under way.
 ACK_LIFETIME = 5.0
 # COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
 GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
 DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
-# COMMAND_INT: stands for NaN in x and y.
+# COMMAND_INT: represents NaN in x and y.
 INT32_UNSET = 0x7FFFFFFF
 
 
 class CommandStatus(Enum):
-    """How a command ended. Each ends in exactly one of these."""
+    """How a command ended. Each command ends in exactly one of these."""
 
     ANSWERED = 'answered'
     NO_ANSWER = 'no acknowledgement'
@@ -121,7 +121,7 @@ class Command(NamedTuple):
     @property
     def key(self) -> Key:
         """Return the kind: commands of one kind wait for each other."""
-        # As in MAVSDK: a request for one message must not wait for that of another.
+        # As in MAVSDK: a request for one message must not wait for a request for another.
         is_request = self.command == messages.MavCmd.REQUEST_MESSAGE and self.params
         return self.target, self.command, self.params[0] if is_request else 0.0
 
@@ -149,8 +149,8 @@ class EarlierCommand(NamedTuple):
     :param ended_at: s, on the clock of the calls.
     :param tries: how often it was sent.
     :param elapsed: s, from the first sending to the end.
-    :param last_ack_at: from when on an acknowledgement answers the last try, so that ``elapsed``
-        was a round trip; infinity where it was none.
+    :param last_ack_at: from then on an acknowledgement answers the last try, so that ``elapsed``
+        was the round trip of the first; infinity where it was not one.
     """
 
     command: Command
@@ -187,10 +187,10 @@ class CommandResult(NamedTuple):
 
     def may_answer_earlier(self, now: float) -> bool:
         """
-        Return whether the acknowledgement may be one of the earlier command of this kind.
+        Return whether the acknowledgement may belong to the earlier command of this kind.
 
-        It may where that command got the same result, which may come twice, or none, which may
-        still come; a status must then decide.
+        That is possible if the earlier command got the same result, which may come twice, or none,
+        which may still come. A status must then decide.
 
         :param now: when this command was answered.
         """
@@ -234,7 +234,7 @@ class RttEstimator:
 
     def __init__(self) -> None:
         self._ambiguous_until = -math.inf
-        # Each with whether it is unambiguous.
+        # Each sample, and whether it is unambiguous.
         self._samples: list[tuple[float, bool]] = []
         self._sorted: list[float] = []
 
@@ -262,10 +262,11 @@ class RttEstimator:
         """
         Return a time after a command within which no answer to it can come, s.
 
-        Where the line stays ambiguous, its last unambiguous samples may be those of another delay.
+        While the line stays ambiguous its delay may change, so the last unambiguous samples may be
+        outdated.
 
-        :return: a quartile of the last eight unambiguous ones of the samples, or the median of all
-            if there are none; 0 while acknowledgements are not ambiguous.
+        :return: the lower quartile of the last eight unambiguous samples, or the median of all
+            samples if there are none; 0 while acknowledgements are not ambiguous.
         """
         if now >= self._ambiguous_until:
             return 0.0
@@ -289,10 +290,10 @@ class RequestState(Enum):
     The state of a command that has not ended.
 
     SENT waits for an acknowledgement, BACKOFF to send a rejected command again, IN_PROGRESS for
-    the next report of progress. WAITING was not sent: another of its kind was.
+    the next report of progress. WAITING was not sent, since another of its kind was.
     """
 
-    # Enum's own takes a call in Python for each lookup in the table of transitions.
+    # Enum.__hash__ is a call in Python for each lookup in the table of transitions.
     __hash__ = object.__hash__
 
     WAITING = 'waiting'
@@ -322,7 +323,7 @@ class _Request:
     state: RequestState = RequestState.WAITING
     as_int: bool = False
     tries: int = 0
-    # Tries that were answered with a reason to try again: those are not lost frames.
+    # Tries that were answered with a reason to try again: these were not lost.
     rejected: int = 0
     first_sent: float = 0.0
     last_sent: float = 0.0
@@ -333,10 +334,10 @@ class _Request:
 
     def answers_another_try(self, result: int) -> bool:
         """
-        Return whether an acknowledgement is for a try that does not matter any more.
+        Return whether an acknowledgement is for a try whose answer has no effect.
 
-        A try that meets an earlier one at work, or its own copy, is rejected for that. And a
-        COMMAND_LONG may be refused once more after the COMMAND_INT was sent.
+        A target rejects a try that arrives while it executes an earlier try or a copy of it. It
+        may also refuse another COMMAND_LONG after the COMMAND_INT was sent.
         """
         if result == MavResult.COMMAND_INT_ONLY:
             return self.as_int
@@ -364,7 +365,7 @@ class CommandSender:
     :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
         :data:`MAX_TARGETS`.
-    :raises ValueError: if one of the two is out of its range.
+    :raises ValueError: if ``timeout`` or ``retries`` is out of its range.
     """
 
     address: Address
@@ -401,9 +402,9 @@ class CommandSender:
         Send a command, or queue it behind the one of its kind that was sent.
 
         :param done: called once, with the outcome and the time.
-        :param limit: the time by which it ends whatever happens, progress or not.
-        :param overtake: end all commands of its kind that wait or are not acknowledged with
-            CANCELLED, and send this one at once, beside a command in progress.
+        :param limit: the time by which it ends, even if it is in progress.
+        :param overtake: end all commands of its kind that are not in progress, with CANCELLED, and
+            send this one at once, even beside a command in progress.
         """
         if now >= limit:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
@@ -415,7 +416,7 @@ class CommandSender:
         if not kind or overtake:
             requests.append(request)
             self._begin(request, now)
-            # Those that wait first, so that none is sent in the place of another.
+            # End the waiting ones first, so that none is sent in the place of another.
             for other in reversed(kind):
                 if other.state is not RequestState.IN_PROGRESS:
                     self._end(other, CommandStatus.CANCELLED, now)
@@ -449,9 +450,9 @@ class CommandSender:
         """
         Receive a COMMAND_ACK.
 
-        It counts where source and command match a command that was sent, and where it is
-        addressed to us or to 0, as the extension fields may be missing. It answers the oldest of
-        several commands, but progress belongs to the command in progress.
+        It counts if its source and command match a command that was sent, and if its target is our
+        address or 0, since the extension fields may be missing. It answers the oldest of several
+        commands, but progress belongs to the command in progress.
         """
         ours = self.address
         if (ack.target_system not in (0, ours.system)
@@ -463,7 +464,7 @@ class CommandSender:
             if (request.command.command == ack.command
                     and request.state is not RequestState.WAITING):
                 is_expected = True
-                # A command in progress is not rejected: another one is, which is beside it.
+                # A rejection belongs not to a command in progress but to a command sent beside it.
                 if not request.answers_another_try(ack.result):
                     self._answered(request, ack, now)
                     return
@@ -475,9 +476,9 @@ class CommandSender:
         """
         Take the round trip of a command whose last try is acknowledged as late as the first was.
 
-        One that comes sooner may be a copy. Otherwise each command would be sent twice for ever
-        where a line has become slower than the wait for one try, since a command that is sent
-        again is not measured.
+        An earlier acknowledgement may be a copy. Without this, each command would be sent twice
+        for ever where a line has become slower than the wait for one try, since a resent command
+        is not measured.
         """
         for key, earlier in self._earlier.items():
             if key[:2] == (source, command) and now >= earlier.last_ack_at:
@@ -487,7 +488,8 @@ class CommandSender:
 
     def _answered(self, request: _Request, ack: messages.CommandAck, now: float) -> None:
         if request.tries == 1 and request.result is None:
-            # An acknowledgement after a resend may be that of either try: no measure (RFC 6298).
+            # An acknowledgement after a resend may be of either try and is not measured (RFC
+            # 6298).
             self._estimator(request.command.target).add(now - request.last_sent, now)
         request.result = ack.result
         state = TRANSITIONS.get((request.state, ack.result))
@@ -499,7 +501,7 @@ class CommandSender:
             request.due = now + min(first * 2 ** min(request.rejected, 8), last)
             request.rejected += 1
             if request.due >= min(request.deadline, request.limit):
-                # A try that was never answered may be what keeps the target busy.
+                # The target may be busy with a try that was never answered.
                 self._end(request, CommandStatus.ANSWERED if request.rejected == request.tries
                           else CommandStatus.OUT_OF_TIME, now)
                 return
@@ -548,7 +550,7 @@ class CommandSender:
         """
         End commands that were started, to one target or to all.
 
-        :param ends: returns whether one of them ends.
+        :param ends: returns whether a command ends.
         """
         requests = [request for one in self._requests.values() for request in one
                     if (target is None or request.command.target == target)

@@ -83,9 +83,9 @@ class Endpoint(MessageHandler):
     """
     The handler of all messages of a link.
 
-    A :class:`~.link.Link` calls it from its thread only and sends what it leaves in ``outgoing``.
+    A :class:`~.link.Link` calls it only in its turns, and sends the messages in ``outgoing``.
 
-    :ivar inspect: looks at the frame of a message, of this class, before that is received.
+    :ivar inspect: called with the frame and the class of a message before that is received.
     :ivar outgoing: messages to send, each with the address that sends it.
     """
 
@@ -105,7 +105,7 @@ class Payload(MessageHandler):
     """
 
     def receive_conflicting(self, message: Message, now: float) -> None:  # noqa: B027 - optional
-        """Receive a message, of one of these classes, of another sender with our address."""
+        """Receive a message of one of these classes from another sender with our address."""
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """
@@ -151,7 +151,7 @@ class Component(Endpoint):
     The endpoint of one address.
 
     :param commands: sends for all payloads, so that an acknowledgement has one receiver.
-    :param payloads: get each message from another address, and the link's state.
+    :param payloads: receive each message from another address, and the link's state.
     :param mav_type: MAV_TYPE of the heartbeat.
     """
 
@@ -163,7 +163,7 @@ class Component(Endpoint):
         self.commands = commands
         self.address = commands.address
         self._payloads = tuple(payloads)
-        # HEARTBEAT and COMMAND_ACK show an address conflict where no payload needs them.
+        # HEARTBEAT and COMMAND_ACK show an address conflict even where no payload needs them.
         self.messages = tuple(dict.fromkeys(
             (Heartbeat, CommandAck, *(cls for one in payloads for cls in one.messages))))
         self.sends = tuple(dict.fromkeys(cls for one in payloads for cls in one.sends))
@@ -197,7 +197,7 @@ class Component(Endpoint):
             # A component with system id 0 cannot be addressed: 0 is the broadcast address.
             return
         if source == self.address:
-            # The link has dropped our own frames that came back.
+            # The link has already dropped our own frames that returned.
             self._conflict_at = now
             for payload in self._receivers.get(type(message), ()):
                 payload.receive_conflicting(message, now)

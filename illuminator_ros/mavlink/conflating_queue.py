@@ -38,7 +38,7 @@ class ConflatingQueue:
 
     def __init__(self, groups: Sequence[StreamGroup]) -> None:
         self.dropped = 0
-        # Of each class its group, and its position there.
+        # The group of each class, and its position in the group.
         self._places = {cls: (place, position) for place, group in enumerate(groups)
                         for position, cls in enumerate(group)}
         self._held: list[list[tuple[Address, Message]]] = [[] for _ in groups]

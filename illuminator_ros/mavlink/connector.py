@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Opening a transport again and again, beside the link's thread: it may block."""
+"""Repeated opening of a transport, in a thread beside the link's, since it may block."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ class Connector:
     """
     Tries to open a connection URL, in a thread that ends when it has succeeded.
 
-    Every try counts as failed until ``backoff.succeeded()`` says otherwise: a channel that can be
-    opened need not lead anywhere.
+    Every try counts as failed until ``backoff.succeeded()`` is called: a channel that can be
+    opened may be lost at once.
 
     :param report: called in that thread with the open channel, never after :meth:`stop`; with the
         reason after each failure; with None if the thread ends without a channel.
@@ -91,12 +91,12 @@ class Connector:
         self._stopping = threading.Event()
         # s that the last try took.
         self._spent = 0.0
-        # Held while a channel is handed over, so that none is after the stop.
+        # Held while a channel is handed over, so that none is handed over after the stop.
         self._handing_over = threading.Lock()
 
     def start(self) -> None:
         """
-        Start to try; the first try is immediate unless the last channel was of no use.
+        Start to try; the first try is immediate unless the last channel did not last.
 
         :raises RuntimeError: if no thread can be started.
         """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""When many things have something to do, found without looking at each."""
+"""The earliest of many deadlines, found without a search through all of them."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class DeadlineQueue(Generic[K]):
     """
     The next deadline of each of many keys.
 
-    Postponing, which every heartbeat does, costs next to nothing: the entry in the heap stays
-    and is looked at again when its old time comes.
+    Postponing, which every heartbeat does, takes little time: the entry in the heap stays and is
+    checked when its old time comes.
 
     :param deadline_of: returns the deadline of a key that was noted by ``changed``.
     :ivar changed: must be called with a key whose deadline may have changed; ``deadline_of`` is
@@ -79,7 +79,7 @@ class DeadlineQueue(Generic[K]):
                 return deadline
             heapq.heappop(self._heap)
             if is_current:
-                # Postponed since, so the entry is only now put where it belongs.
+                # The deadline was postponed, so the key is only now entered at its new time.
                 del self._entered[key]
                 if deadline < math.inf:
                     self._enter(key, deadline)

@@ -15,10 +15,9 @@
 """
 MAVLink frames from and to bytes; no I/O and no clock.
 
-MAVLink 1 and 2 (MAVLink guide, "Packet Serialization"). A frame
-counts only when its checksum is right. After anything else the search goes on one byte later,
-never behind the length that a bad header claims: whatever stands between good frames, no good
-frame is lost.
+MAVLink 1 and 2 (MAVLink guide, "Packet Serialization"). A frame is valid only if its checksum is
+right. After anything else the search continues one byte later and never skips the length that a
+bad header claims. So no valid frame is lost, whatever bytes are between valid frames.
 """
 
 from __future__ import annotations
@@ -80,7 +79,7 @@ class ForeignFrames:
     """
     Consecutive valid frames of one source that the receiver only counts.
 
-    :param sequences: of each frame, in order.
+    :param sequences: the sequence number of each frame, in order.
     """
 
     source: Address
@@ -127,7 +126,7 @@ def encode_frame(
 @dataclass
 class Decoder:
     """
-    Checked frames from a stream of bytes, in whatever pieces it comes.
+    Decodes checked frames from a stream of bytes, which may come in any pieces.
 
     Keeps at most one incomplete frame (:data:`MAX_FRAME` bytes). Frames with an id that is not
     in ``layouts`` cannot be checked and are never returned.
@@ -140,16 +139,16 @@ class Decoder:
     counters: DecoderCounters = field(default_factory=DecoderCounters)
     taken: int = 0
     rest: bytes = b''
-    # How much of the rest may be the signature of the frame before.
+    # Bytes of the rest that may belong to the signature of the frame before.
     _signature_end: int = 0
 
     @property
     def incomplete(self) -> int | None:
-        """Where in the stream the frame begins whose rest is awaited, None if there is none."""
+        """Return the position of the frame whose rest is awaited, None if there is none."""
         return self.taken - len(self.rest) if self.rest else None
 
     def give_up(self, position: int) -> list[Frame]:
-        """Return the good frames behind beginnings before a position whose rest does not come."""
+        """Drop incomplete frames that begin before a position; return the valid frames in them."""
         frames: list[Frame] = []
         while self.incomplete is not None and self.incomplete < position:
             rest, self.rest = self.rest[1:], b''
@@ -169,8 +168,8 @@ class Decoder:
         """
         Return the frames that ``data`` completes, in order, and foreign ones as runs.
 
-        :param foreign: the messages that are only counted: CRC_EXTRA, as a byte, by id.
-            A frame that is signed, cut in two or of MAVLink 1 is returned all the same.
+        :param foreign: the messages that are only counted: CRC_EXTRA, as a byte, by id. Frames
+            that are signed, cut in two or of MAVLink 1 are returned, too.
         """
         self.taken += len(data)
         if self.rest:
@@ -214,8 +213,8 @@ class Decoder:
             self.counters.skipped_bytes += start - end
             position = end = start + size
             if frame.signature is not None:
-                # The checksum does not cover the signature. Where that was cut short, what looks
-                # like its end is the beginning of the next frame.
+                # The checksum does not cover the signature. If the signature was cut short, its
+                # apparent end is the beginning of the next frame.
                 within = data.find(STX_V2, end - SIGNATURE, end)
                 position = within if within >= 0 else end
                 signature_end = end
@@ -263,12 +262,12 @@ class Decoder:
         return start
 
     def _is_frame(self, data: bytes, start: int) -> bool:
-        """Return whether a whole and good frame begins here."""
+        """Return whether a whole and valid frame begins here."""
         found = self._read(data, start) if data[start:start + 1] in STARTS else None
         return found is not None and found[1] is not None
 
     def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
-        """Return size and frame at ``start``, no frame if it is not one, None if it is cut."""
+        """Return size and frame at ``start``, no frame if invalid, None if incomplete."""
         version, header, at = (
             (2, HEADER_V2, start + 4) if data[start] == STX_V2 else (1, HEADER_V1, start + 2))
         if len(data) - start < header:
@@ -278,8 +277,8 @@ class Decoder:
         message_id = int.from_bytes(data[at + 3:start + header], 'little')
         layout = self.layouts.get(message_id)
         # "Incompatibility flags": a frame with a flag that is not understood must be dropped.
-        # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting
-        # for the rest of it would hold back the good frames behind.
+        # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting for
+        # the rest of it would delay the valid frames after it.
         if layout is None or flags & ~FLAG_SIGNED or version == 1 and length > layout.size:
             return 1, None
         end = start + header + length + CHECKSUM

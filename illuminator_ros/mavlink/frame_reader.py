@@ -33,7 +33,7 @@ STALL = 0.5
 
 
 class _Wait(NamedTuple):
-    """For the rest of a frame: where it begins, what had come of the stream, and when (s)."""
+    """The wait for the rest of a frame: its position, the bytes taken by then, the time (s)."""
 
     start: int
     taken: int
@@ -51,11 +51,11 @@ class _Stream:
 
 class FrameReader:
     """
-    The way in of a link: framing and signing.
+    The receiving side of a link: framing and signing.
 
     :param handled: ids of the messages that are read; frames of others are only counted, unless
         their signatures matter.
-    :ivar counters: what was met, over all peers and since it was made.
+    :ivar counters: totals over all peers since it was made.
     """
 
     def __init__(self, signing: Signing, handled: Collection[int]) -> None:
@@ -84,7 +84,7 @@ class FrameReader:
         if decoder.rest or self._waits:
             self._watch(peer, decoder, now)
         if frames:
-            # A frame without a signature passes where signing is off, here without a call.
+            # An unsigned frame is accepted where signing is off; this test saves a call.
             frames = [one for one in frames if isinstance(one, ForeignFrames)
                       or self._signing_is_off and one.signature is None
                       or self._signing.accepts(one, unix_time)]
@@ -93,7 +93,7 @@ class FrameReader:
 
     def _new_stream(self, peer: Peer) -> _Stream:
         if len(self._streams) >= MAX_DECODERS:
-            # Garbage from ever new ports takes nothing from those that send good frames.
+            # Garbage from ever new ports must not displace peers that send valid frames.
             oldest = next((old for old, stream in self._streams.items() if not stream.good),
                           next(iter(self._streams)))
             del self._streams[oldest]
@@ -110,7 +110,7 @@ class FrameReader:
 
     def give_up(self, now: float, unix_time: float) -> list[tuple[Peer, Frame]]:
         """
-        Return the frames behind what looked like the beginning of one for too long.
+        Return the valid frames behind beginnings of frames that are older than :data:`STALL`.
 
         Later bytes may be the beginning of a valid frame, and are kept.
         """
@@ -133,6 +133,6 @@ class FrameReader:
         return min(wait.since for wait in self._waits.values()) + STALL
 
     def clear(self) -> None:
-        """Forget what is incomplete: the link is closed."""
+        """Forget all peers and incomplete frames: the link is closed."""
         self._streams.clear()
         self._waits.clear()

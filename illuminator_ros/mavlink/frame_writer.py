@@ -83,7 +83,7 @@ class FrameWriter:
 
     def frame(self, source: Address, message: Message, now: float, unix_time: float) -> bytes:
         """
-        Return a message as it goes on the wire.
+        Return the frame of a message.
 
         :raises ValueError: if MAVLink 1 cannot carry the message.
         :raises struct.error: if a value does not fit into its field.
@@ -106,5 +106,5 @@ class FrameWriter:
         return frame
 
     def is_loopback(self, frame: Frame, now: float) -> bool:
-        """Return whether a frame is one of our own, returned."""
+        """Return whether a frame is one of our own that has returned."""
         return frame.source in self.sequences and self._loopback.has(frame, now)

@@ -45,37 +45,39 @@ from .statistics import Traffic
 from .transport import Channel, Peer
 from .url import Url
 
-# s of one wait, not longer than for the acknowledgement of a command: a caller's turn that sends
-# one then need not wake the thread, which would take a processor from the component that answers.
+# s; the longest wait of the thread, not longer than the wait for an acknowledgement. So a caller's
+# turn that sends a command need not wake the thread, which would take a processor from the
+# component that answers.
 MAX_WAIT = 0.2
 # To wake the loop costs as much as ten foreign frames. Where more than BATCH_THRESHOLD come per
-# second, the loop lets them collect for BATCH_TIME s, or until BATCH_SIZE are expected; a UDP
-# socket has room for 250. A call ends that, and it does not begin within ANSWER_TIME s of a
-# message that may be answered.
+# second, the loop pauses for BATCH_TIME s, or until BATCH_SIZE are expected; a UDP socket has room
+# for 250. A call ends the pause. No pause begins within ANSWER_TIME s of a message that may be
+# answered.
 BATCH_THRESHOLD = 1000.0
 BATCH_TIME = 0.02
 BATCH_SIZE = 128
 ANSWER_TIME = 1.0
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
-# s for which a caller waits at most for the answer to what it has sent.
+# s; the longest wait of a caller for the answer to its messages.
 CALLER_WAIT = 0.002
-# Bytes that a caller decodes at once. The worst take a microsecond each.
+# The most bytes that a caller decodes. The worst take a microsecond each.
 CALLER_BYTES = 4096
-# s that a channel stays open until it is proved without a frame.
+# s; a channel that stays open for this time is proved without a frame.
 PROOF_TIME = 1.0
 # s for which the line may still be busy when the next group of a stream is written, so that it has
 # no gaps. The most urgent group may wait behind one more in the line.
 WRITE_AHEAD = 0.002
 URGENT_WRITE_AHEAD = 0.02
-# s without a frame from any peer until the endpoint announces itself again, longer than between
-# heartbeats; and then between announcements. A router that has restarted forwards nothing to us
-# until it has heard us.
+# s without a frame from any peer until the endpoint announces itself again, longer than the
+# interval of heartbeats; and s between these announcements. A router that has restarted forwards
+# nothing to us until it has heard us.
 SILENCE = 1.5
 ANNOUNCE_INTERVAL = 0.25
 # s until a thread that could not be started is tried again.
 THREAD_RETRY_INTERVAL = 0.25
-# s; after a fault of ours the loop goes on no faster, and logs no more of them, than this.
+# s; the pause of the loop after an exception, and the shortest time between log lines on
+# exceptions.
 FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
 
@@ -90,10 +92,10 @@ class LinkThreadError(RuntimeError):
 
 class Link:
     """
-    Runs an endpoint over a connection URL in a thread of its own, and reopens what is lost.
+    Runs an endpoint over a connection URL in a thread of its own, and reopens lost transports.
 
-    All of the endpoint is called in turns of the link, one after the other. That thread takes
-    them; while it waits, :meth:`run_turn` takes one in the thread of its caller.
+    All methods of the endpoint are called in turns of the link, one after the other. The link's
+    thread takes the turns; while it waits, :meth:`run_turn` takes one in the thread of its caller.
 
     :param on_event: called in a turn when the link is opened, lost, or cannot be
         opened at first; at a limited rate.
@@ -135,10 +137,10 @@ class Link:
         self._channel: Channel | None = None
         self._receiver = FrameReader(self._signing, self._classes)
         self._router = RoutingTable()
-        # From which address and peer the last frame came, and when, s.
+        # The address and the peer that the last frame came from, and its time, s.
         self._heard_last: tuple[Address, Peer, float] | None = None
         self._traffic = Traffic()
-        # Messages that wait for the line, and when it will have sent everything written, s.
+        # Messages that wait for the line, and when the line will have sent all written bytes, s.
         self._streams = ConflatingQueue(endpoint.streams)
         self._line_free_at = -math.inf
         self._status = LinkStatus(label, clock())
@@ -147,11 +149,11 @@ class Link:
         self._frame_received = False
         self._announce_at = math.inf
         self._store_due = 0.0
-        # When there is something to do next, s, and whether there may be before that.
+        # When there is work next, s, and whether there may be work before.
         self._due = 0.0
         self._work_pending = False
-        # Foreign frames received until the last pass of the loop that had some, when that was, and
-        # until when an answer is expected, s.
+        # Foreign frames received by the end of the last pass of the loop that had some, the time
+        # of that pass, and the time until which an answer is expected, s.
         self._foreign_before = 0
         self._foreign_at = -math.inf
         self._answer_expected_until = -math.inf
@@ -165,17 +167,17 @@ class Link:
         self._calls_only.register(self._wake_out, select.POLLIN)
         self._stopping = threading.Event()
         self._starting = threading.Lock()
-        # s that the loop must wait at least next time: there was a fault.
+        # The shortest next wait of the loop, s, after an exception.
         self._pause = 0.0
         self._fault_log_due = -math.inf
-        # Held during each turn: by the thread always, except while it waits. Then until when it
-        # waits, s, unless it is woken before.
+        # Held during each turn. The link thread holds the lock, except while it waits.
         self._turn = threading.Lock()
         self._turn.acquire()
+        # The time until which the link thread waits, s, unless it is woken before.
         self._waits_until = -math.inf
         # The thread of the caller that has taken the turn.
         self._taker: int | None = None
-        # Whether a caller has received meanwhile, so that what was ready may be so no longer.
+        # Whether a caller has received meanwhile, so that ready handles may not be ready any more.
         self._received_by_caller = False
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
 
@@ -216,7 +218,7 @@ class Link:
         return self._thread.is_alive()
 
     def call(self, function: Callable[[float], None]) -> None:
-        """Have ``function(now)`` called in the thread, unless that has ended."""
+        """Have ``function(now)`` called in the link's thread, unless the thread has ended."""
         self._calls.append(function)
         self._wake()
 
@@ -226,11 +228,11 @@ class Link:
         """
         Call ``function(now)`` in a turn here if the link's thread waits, else as :meth:`call`.
 
-        The function and the sending of what follows take less time than a change of threads. The
+        The function and the sending of its messages take less time than a change of threads. The
         caller must not hold a lock that is taken in a turn.
 
-        :param is_done: where it is given, the caller receives what comes, in this turn, until it
-            returns True, for :data:`CALLER_WAIT` at most.
+        :param is_done: if it is given, the caller receives frames in this turn until it returns
+            True, for :data:`CALLER_WAIT` at most.
         """
         if self._calls or not self._turn.acquire(blocking=False):
             self.call(function)
@@ -241,8 +243,8 @@ class Link:
             self._flush()
             if is_done is not None and not is_done():
                 self._receive_until(is_done)
-            # The component that answers may wait for this processor. Where nothing was received,
-            # all else is due as before.
+            # Wake the thread only if it is needed: the component that answers may wait for this
+            # processor. Where nothing was received, the other deadlines have not changed.
             is_complete = self._received_by_caller or self._channel is None
             self._due = self._next_deadline() if is_complete else min(
                 self._due, self.endpoint.next_deadline(), self._stream_due())
@@ -318,7 +320,7 @@ class Link:
         self._wake_in.close()
 
     def _run_once(self) -> None:
-        """Wait for the transport, a call or a deadline, and do what follows."""
+        """Wait for the transport, a call or a deadline, and handle it."""
         due = min(self._due, self._receiver.next_deadline())
         now = self.clock()
         wait = min(max(due - now, self._pause), MAX_WAIT)
@@ -396,7 +398,7 @@ class Link:
                 self._store.keep, self._signing.timestamp, self._wall_clock(), last)
 
     def _serve(self, handle: object, events: int, *, by_caller: bool = False) -> None:
-        """Send or receive on a handle that is ready; a caller leaves much to the thread."""
+        """Send or receive on a handle that is ready; a caller leaves large data to the thread."""
         assert self._channel is not None
         try:
             if events & selectors.EVENT_WRITE:
@@ -425,7 +427,7 @@ class Link:
                 if isinstance(frame, Frame):
                     self._accept(channel, peer, frame, now)
                 elif frame.source not in self._writer.sequences:
-                    # Those from our own address are our own, returned, or an address conflict.
+                    # Frames from our own address have returned, or show an address conflict.
                     self._traffic.count_run(frame.source, frame.sequences)
                     self._heard(channel, peer, frame.source, now)
             self._flush()
@@ -454,7 +456,7 @@ class Link:
         """Note that frames from an address have come from a peer."""
         heard = source, peer, now
         if heard == self._heard_last:
-            # In the same datagram.
+            # The last frame was in the same datagram.
             return
         self._heard_last = heard
         if not self._frame_received:
@@ -471,7 +473,7 @@ class Link:
 
     def _poll_channel(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
-            # The channel has lasted, so its loss is answered immediately.
+            # The channel has lasted, so the next try after its loss is immediate.
             self._proven_at = math.inf
             self._connector.backoff.succeeded()
             self._status.take(LinkInput.PROVED, now, channel.name)
@@ -507,7 +509,7 @@ class Link:
         self._traffic.frames_dropped += streams.dropped - dropped
 
     def _stream_due(self) -> float:
-        """Return when messages of streams can be sent, infinity if the channel will tell."""
+        """Return when messages of streams can be sent; infinity while the channel is full."""
         if (not self.endpoint.streams or self._channel is None or self._channel.is_waiting
                 or not self._streams):
             return math.inf
@@ -626,14 +628,14 @@ class Link:
         self._heard_last = None
 
     def _safe_call(self, function: Callable[..., None], *arguments: object) -> None:
-        """Call what is not ours: its fault must not end the thread."""
+        """Call a function; its exception must not end the thread."""
         try:
             function(*arguments)
         except Exception:
             self._fault()
 
     def _fault(self) -> None:
-        """Note the exception that is handled: the loop must not repeat it without a pause."""
+        """Log the exception that is handled, and have the loop pause before it may occur again."""
         self._pause = FAULT_PAUSE
         self._log_fault()
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The connection state of a link, and what other threads learn of it."""
+"""The connection state of a link, and its snapshot for other threads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .statistics import TrafficSnapshot
 # Different reasons for not opening that are reported before the first opening.
 MAX_REASONS = 16
 # Events that are reported at once, and s until one more may be: a server that accepts and closes
-# would fill the log.
+# connections would fill the log.
 MAX_EVENTS = 20
 EVENT_INTERVAL = 10.0
 
@@ -43,9 +43,9 @@ class LinkState(Enum):
                                   v
                               RETRYING -- opened --> DOUBTFUL -- proved --> OPEN
 
-    A transport is proved by a frame, or by staying open for a time. It counts as open until it
-    is lost, but one that follows an unproven one does not: a TCP server that closes each
-    connection is not a link.
+    A transport is proved by a frame, or by staying open for a time. An unproven transport counts
+    as open, but not if it follows another unproven one: a TCP server that closes each connection
+    is not a link.
     """
 
     OPENING = 'opening'
@@ -94,7 +94,7 @@ class LinkEvent:
 
     :param name: the transport, or the URL where there is none.
     :param reason: why it is not open.
-    :param was_open: whether it is lost, and not just not open yet.
+    :param was_open: whether it was open before.
     :param unreported: number of earlier openings and losses without a report.
     """
 
@@ -114,7 +114,7 @@ class LinkEvent:
 
 class LinkSnapshot(NamedTuple):
     """
-    A link at a moment, made by its thread and never changed; for any thread.
+    A link at one moment; it never changes, so any thread may read it.
 
     :param since: when it was opened or lost, on the link's clock, s.
     :param openings: how often it was opened.
@@ -183,7 +183,7 @@ class LinkStatus:
     def failed(self, reason: str) -> None:
         """Note why a transport could not be opened."""
         self.reason = reason
-        # Once it has been open, its loss was one line in the log and its return will be another.
+        # After the first opening only losses and openings are reported.
         if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self.openings:
             self._reasons.add(reason)
             self._report(LinkEvent(False, self._label, reason))

@@ -84,8 +84,8 @@ class Message:
     :cvar name: name in the XML definition.
     :cvar crc_extra: seeds the checksum, so that both sides have the same definition.
     :cvar base_size: bytes of the payload without extension fields, as MAVLink 1 sends it.
-    :ivar sender: of a received message, which of several senders with one address has sent it,
-        as far as their sequence numbers tell; see :class:`~.statistics.SequenceCounter`.
+    :ivar sender: of a received message, which of several senders with one address has sent it, as
+        far as their sequence numbers distinguish them; see :class:`~.statistics.SequenceCounter`.
     """
 
     sender: int = 0
@@ -175,9 +175,9 @@ def decode_payload(cls: type[M], payload: bytes, sender: int = 0) -> M:
     """
     Return the message of a checked payload.
 
-    A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension
-    fields). Bytes beyond the known fields are ignored, as extensions must be: there is a 38-byte
-    ILLUMINATOR_STATUS in the field.
+    A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension fields).
+    Bytes beyond the known fields are ignored, as extensions must be: some lights send a 38-byte
+    ILLUMINATOR_STATUS.
     """
     message: M = cls.codec.decode(payload, sender)
     return message
@@ -212,7 +212,7 @@ _RESULT_NAMES = {int(result): f'MAV_RESULT_{result.name}' for result in MavResul
 
 
 class MavType(IntEnum):
-    """The values of MAV_TYPE that matter here."""
+    """The values of MAV_TYPE that this package uses."""
 
     GCS = 6
     SUBMARINE = 12
@@ -347,7 +347,7 @@ INFORMATION_ID = ComponentInformationBasic.id
 
 
 def time_boot_ms(seconds: float) -> int:
-    """Return the field of a time since the start, s: ms, wrapping after 49.7 days."""
+    """Return a field value for a time since the start, s: ms, wrapping after 49.7 days."""
     return int(seconds * 1000) & 0xFFFFFFFF
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which peers lead to which component (MAVLink guide, "Routing")."""
+"""The peers that lead to each component (MAVLink guide, "Routing")."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class RoutingTable:
         return len(self._routes)
 
     def peer_count(self, now: float) -> int:
-        """Return how many peers lead to a component."""
+        """Return how many peers lead to any component."""
         return len({peer for route in self._routes.values()
                     for peer, heard in route.items() if now - heard <= EXPIRY})
 

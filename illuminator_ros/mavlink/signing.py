@@ -16,8 +16,8 @@
 MAVLink 2 message signing, on frames; no I/O, and time is passed in.
 
 https://mavlink.io/en/guide/message_signing.html. A frame is checked in this order: checksum (by
-the decoder), signature, time stamp; and only then is anything remembered of it. A forged frame
-changes nothing.
+the decoder), signature, time stamp. The frame is remembered only after these checks, so a forged
+one changes nothing.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ TICKS_PER_SECOND = 100_000
 MAX_TICKS = (1 << 48) - 1
 # A stream that is not known yet may be this far behind ("Timestamp Handling").
 NEW_STREAM_TICKS = 60 * TICKS_PER_SECOND
-# How far ahead of our clock a peer is followed: 10 years. A computer without a battery may wake
-# up some years in the past; a receiver that forgets the rollover of GPS weeks is 19.6 years off.
+# How far ahead of our clock a peer is followed: 10 years. The clock of a computer without a
+# battery may start some years behind; a receiver that ignores the rollover of GPS weeks is 19.6
+# years off.
 FOLLOWED_TICKS = 10 * 365 * 86_400 * TICKS_PER_SECOND
 # A clock that is behind the time stamps of this link by less than this counts as correct: another
 # clock was ahead. A clock further behind has no battery.
@@ -48,11 +49,11 @@ KEY_SIZE = 32
 
 class SigningMode(Enum):
     """
-    Which frames are signed, and which are accepted.
+    The rule by which frames are signed and accepted.
 
-    ``off``: nothing is signed, and every frame is taken. ``sign``: what we send is signed;
-    unsigned frames are taken, wrongly signed ones are not. ``require``: only rightly signed
-    frames are taken.
+    ``off``: no frame is signed, and every frame is accepted. ``sign``: sent frames are signed;
+    unsigned frames are accepted, wrongly signed ones are not. ``require``: sent frames are signed;
+    only rightly signed frames are accepted.
     """
 
     OFF = 'off'
@@ -62,13 +63,13 @@ class SigningMode(Enum):
 
 @dataclass(slots=True)
 class SigningCounters:
-    """Frames by what their signature was found to be."""
+    """Received frames by the result of the check of their signature."""
 
     good: int = 0
     bad: int = 0
     replayed: int = 0
     unsigned: int = 0
-    # Signed, but not looked at: the mode is off.
+    # Signed, but not checked, since the mode is off.
     unchecked: int = 0
 
 
@@ -93,7 +94,7 @@ class Signing:
     Signs sent frames and checks received ones.
 
     :param key: 32 bytes; may be missing only where the mode is off.
-    :param link_id: 0..255, our id for this link in what we sign.
+    :param link_id: 0..255, our id for this link in the frames that we sign.
     :param timestamp: the last time stamp used, in ticks; from a former run.
     :raises ValueError: if the mode needs a key and there is none of 32 bytes.
     """
@@ -114,13 +115,14 @@ class Signing:
             raise ValueError(f'signing needs a key of bytes, not {type(self.key).__name__}')
         if len(self.key) != KEY_SIZE:
             raise ValueError(f'signing needs a key of {KEY_SIZE} bytes, not {len(self.key)}')
-        # The bridge imports both modules when they are used: now, and not for the first frame.
+        # The bridge imports hmac and hashlib when they are first used: now, not for the first
+        # frame.
         self._is_equal = hmac.compare_digest
         signature(self.key, b'')
 
     @property
     def signs(self) -> bool:
-        """Whether what we send is signed."""
+        """Whether sent frames are signed."""
         return self.mode is not SigningMode.OFF
 
     def sign(self, frame: bytes, unix_time: float) -> bytes:
@@ -172,7 +174,7 @@ class Signing:
         Return the time stamp that new streams are compared with.
 
         It is not the last one used, which may be ahead of the right time: after a crash, or after
-        a clock of ours or of a peer was wrong for a moment.
+        our clock or that of a peer was wrong for a moment.
         """
         clock = ticks(unix_time)
         return clock if self.timestamp - clock <= CLOCK_TOLERANCE_TICKS else self.timestamp
@@ -181,9 +183,9 @@ class Signing:
         """
         Return whether one more stream can be remembered.
 
-        Forgetting a stream must not let its old frames in again: only those go that are so old
-        that their replay would be refused as too old for a new stream, now and after a step of
-        the clock.
+        Old frames of a forgotten stream must not be accepted again. So only streams are forgotten
+        that are so old that their replay would be refused as too old for a new stream, now and
+        after a step of the clock.
         """
         if len(self._streams) >= MAX_STREAMS:
             self._forgotten = oldest

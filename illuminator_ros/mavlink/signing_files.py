@@ -125,7 +125,7 @@ class TimestampStore:
         """
         Return the time stamp to begin a run with: the stored one or, where it is ahead, the clock.
 
-        So what is stored first, before anything is signed, already holds for a crash.
+        So the first stored time stamp, from before any frame is signed, is valid after a crash.
         """
         return max(self.load(), ticks(unix_time))
 
@@ -173,10 +173,10 @@ def load_signing(
     mode: SigningMode, key_file: str, name: str, unix_time: float,
 ) -> tuple[Signing, TimestampStore | None]:
     """
-    Return what signs with the key of a file, and where its time stamps are kept.
+    Return the signing with the key of a file, and the store of its time stamps.
 
     :param key_file: '' for none.
-    :param name: whose time stamps those are.
+    :param name: of the component whose time stamps are stored.
     :param unix_time: now, s.
     :raises KeyFileError: if the key cannot be used, or is given and not used, which would look
         like protection.

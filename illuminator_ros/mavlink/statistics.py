@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Counting what a link carries, and what it loses."""
+"""Counts of the bytes and frames that a link carries and loses."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _CONSECUTIVE = bytes(range(256)) * 8
 # many frames, by at most this many.
 INTERLEAVED = 32
 CONTINUED = 4
-# Of the hash of a frame that is kept.
+# Bits of the hash of a frame that are kept.
 _HASH_BITS = 24
 _HASH_MASK = (1 << _HASH_BITS) - 1
 # s
@@ -82,7 +82,7 @@ class SourceCounts(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Where a sender left off: see the fields of :class:`SequenceCounter`."""
+    """The state in which a sender left off, see the fields of :class:`SequenceCounter`."""
 
     sender: int
     newest: int
@@ -97,13 +97,13 @@ class SequenceCounter:
     Frames of one source by their sequence numbers (0..255, wrapping).
 
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
-    loss. Behind a router that leaves out messages, what it leaves out looks lost.
+    loss. Messages that a router leaves out look lost.
 
-    Two senders with one address count each for itself, so the numbers jump back and forth, or
-    frames with one number differ.
+    Two senders with one address count independently, so the numbers jump back and forth, or frames
+    with the same number differ.
 
-    :ivar sender: of the newest frame. A sender that was heard before keeps its number; one that
-        loses many frames gets a new one.
+    :ivar sender: the number of the sender of the newest frame. A sender that was heard before
+        keeps its number; a sender that loses many frames gets a new one.
     """
 
     received: int = 0
@@ -113,8 +113,8 @@ class SequenceCounter:
     sender: int = 0
     _senders: int = 1
     _left: _Place | None = None
-    # By sequence number: how many frames had been received by then, and below it the hash; None
-    # while no hash is known. A dict takes 45 KB.
+    # By sequence number: how many frames had been received by then and, in the low bits, the hash;
+    # None while no hash is known. A dict takes 45 KB.
     _contents: array[int] | None = None
     _newest: int = -1
     # The number that follows, -1 while that is not known.
@@ -155,7 +155,7 @@ class SequenceCounter:
 
     def _add_irregular(self, sequence: int, content: int | None) -> None:
         if self._newest < 0:
-            # Nothing is known of what went before, so nothing of it is missing.
+            # The frames before the first one are not known, so they do not count as lost.
             self._newest, self._seen = sequence, _ALL_SEEN
             return
         back = (self._newest - sequence) & 0xFF
@@ -167,7 +167,7 @@ class SequenceCounter:
         if not is_late and self._return_to_left(sequence):
             back = (self._newest - sequence) & 0xFF
         elif is_seen or back >= WINDOW and 256 - back > WINDOW:
-            # Of another sender, or after a long loss.
+            # The frame is of another sender, or comes after a long loss.
             self.lost += 255 - back if not is_seen and back >= 128 else 0
             self._left = self._place()
             self.sender, self._senders = self._senders, self._senders + 1
@@ -184,7 +184,7 @@ class SequenceCounter:
             self._newest = sequence
 
     def _differs(self, sequence: int, content: int | None) -> bool:
-        """Return whether a frame that has come had the same number and another content."""
+        """Return whether an earlier frame with this number had another content."""
         known = self._contents[sequence] if self._contents else 0
         if content is None or not known:
             return False
@@ -195,7 +195,7 @@ class SequenceCounter:
         return _Place(self.sender, self._newest, self._seen, self._contents, self.received)
 
     def _return_to_left(self, sequence: int) -> bool:
-        """Return whether a number continues those of the sender before."""
+        """Return to the sender before if its numbers continue; return whether they do."""
         left = self._left
         if left is None or self.received - left.left_at > INTERLEAVED:
             return False
@@ -208,7 +208,7 @@ class SequenceCounter:
         return True
 
     def restart(self) -> None:
-        """Forget the numbers but not the counts: what comes next follows on nothing."""
+        """Forget the numbers but not the counts: the next frame has no predecessor."""
         self._newest = self._next = -1
         self._left = None
         self._contents = None
@@ -233,9 +233,9 @@ class TrafficSnapshot(NamedTuple):
     """
     The traffic of a link at one moment.
 
-    :param bytes_received: all, good or not.
-    :param frames_received: those that came with the right checksum.
-    :param frames_dropped: those that found no room to go out.
+    :param bytes_received: all bytes, valid or not.
+    :param frames_received: frames with a right checksum.
+    :param frames_dropped: frames that were dropped before they were sent.
     :param received_rate: bytes per second recently, and ``sent_rate``.
     """
 

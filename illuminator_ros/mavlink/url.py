@@ -282,7 +282,7 @@ class _Parser:
 
 
 def _ip_version(host: str) -> int:
-    """Return 4 or 6, 0 for what is not an IP address."""
+    """Return 4 or 6, 0 if it is not an IP address."""
     try:
         return ipaddress.ip_address(host).version
     except ValueError:

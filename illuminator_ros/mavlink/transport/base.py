@@ -49,7 +49,7 @@ class Channel(ABC):
     """
     An open transport, used from one thread and never blocking.
 
-    :ivar name: how logs and errors name it.
+    :ivar name: its name in logs and errors.
     :ivar dropped: frames that were not sent because the line or the kernel was full.
     :ivar more: whether the last read may have left bytes.
     :ivar rate: of the line, bytes/s; infinity where it is not known.
@@ -74,7 +74,7 @@ class Channel(ABC):
         """
         Read from a registered handle; return bytes with their origin.
 
-        Nothing is lost where only the first bytes are taken from the iterator.
+        No bytes are lost if only the first ones are taken from the iterator.
 
         :raises ChannelLost: if the channel is closed.
         """
@@ -186,7 +186,7 @@ class StreamChannel(Channel):
         except BlockingIOError:
             self.more = False
         except OSError as error:
-            # The next call meets the same error.
+            # The next call raises the same error.
             if not data:
                 raise ChannelLost(error.errno, error.strerror) from None
         else:
@@ -205,7 +205,7 @@ class StreamChannel(Channel):
         try:
             with contextlib.suppress(BlockingIOError):
                 while self._queue:
-                    # In one call: each takes longer than making the frames.
+                    # Write in one call: each call takes longer than making the frames.
                     self._queue.written(os.write(self._descriptor, self._queue.unwritten()))
         except OSError as error:
             raise ChannelLost(error.errno, error.strerror) from None
@@ -224,7 +224,7 @@ SocketName = tuple[str, int] | tuple[str, int, int, int]
 
 def resolve(address: HostPort, kind: socket.SocketKind) -> list[tuple[int, SocketName]]:
     """
-    Return families and socket addresses; IPv4 first, since most MAVLink programs have no other.
+    Return families and socket addresses; IPv4 first, since most MAVLink programs use only that.
 
     :param address: an empty host means all IPv4 interfaces.
     :raises OSError: if the name cannot be resolved.

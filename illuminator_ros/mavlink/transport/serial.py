@@ -46,7 +46,7 @@ MAX_UNREAD = 2048
 
 def open_serial(url: SerialUrl) -> Channel:
     """
-    Open a serial port, exclusively: a second reader would steal bytes.
+    Open a serial port, exclusively: a second reader would take some of the bytes.
 
     :raises OSError: if it is missing, in use, or not accessible.
     """
@@ -115,7 +115,7 @@ def _remove_link(link: Path, device: str) -> None:
 
 
 def _discard_unread(near: int) -> None:
-    """Discard what no program reads: the next one would take it for new."""
+    """Discard bytes that no program has read: the next program would take them for new ones."""
     unread, = struct.unpack('i', fcntl.ioctl(near, termios.FIONREAD, bytes(4)))
     if unread > MAX_UNREAD:
         termios.tcflush(near, termios.TCIFLUSH)

@@ -85,7 +85,7 @@ class UdpChannel(Channel):
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
-        # Before a generator runs: it is mostly the only datagram, and an answer may wait for it.
+        # Read the first datagram without a generator: it is mostly the only one, and is urgent.
         try:
             datagram, peer = self._socket.recvfrom(65536)
         except (BlockingIOError, ConnectionError):
@@ -102,7 +102,7 @@ class UdpChannel(Channel):
         """
         Read the datagrams that wait behind the first one of a sender.
 
-        :param size: of that one.
+        :param size: of the first datagram, bytes.
         """
         receive = self._socket.recvfrom
         # Datagrams of one peer, except the first, are decoded together, at a third of the cost.
