@@ -27,7 +27,7 @@ K = TypeVar('K', bound=Hashable)
 
 class Policy(Enum):
     """
-    When a source takes a device from the source that holds it.
+    The condition on which a source takes a device from the source that holds it.
 
     ``hold``: never. ``priority``: when it ranks higher. ``takeover``: always. An overruling source
     takes it under each policy.
@@ -39,7 +39,7 @@ class Policy(Enum):
 
 
 class Cause(Enum):
-    """Why a device has another holder."""
+    """The reason why the holder of a device has changed."""
 
     CLAIM = 'claim'
     RELEASE = 'release'
@@ -49,7 +49,7 @@ class Cause(Enum):
 @dataclass(frozen=True)
 class HolderChanged(Generic[K]):
     """
-    A device has another holder.
+    The holder of a device has changed.
 
     :param before: the source that held it, None if none did.
     :param after: the source that holds it now, None if none does.
@@ -74,7 +74,7 @@ class Arbiter(Generic[K]):
         The highest of these gets the device when its holder's claim ends. Without this a source
         must claim again.
     :ivar holder: the source that holds the device, None if none does.
-    :ivar since: when that began, s.
+    :ivar since: when the holder changed last, s.
     """
 
     def __init__(
@@ -88,11 +88,11 @@ class Arbiter(Generic[K]):
         self._lease = lease
         self._overruling = overruling
         self._remembers = remembers
-        # The time of the last sign of life of each source that claims the device.
+        # The time of the last claim or renewal of each source that claims the device.
         self._claims: dict[K, float] = {}
 
     def claim(self, source: K, now: float) -> HolderChanged[K] | None:
-        """Take a claim of a source; it is granted if the source is :attr:`holder` then."""
+        """Take a claim of a source; it is granted if the source is :attr:`holder` afterwards."""
         granted = self.may_hold(source)
         if granted and not self._remembers:
             self._claims.clear()
@@ -105,7 +105,7 @@ class Arbiter(Generic[K]):
         return source in self._claims
 
     def renew(self, source: K, now: float) -> None:
-        """Note a sign of life of a source."""
+        """Note that a source is not silent."""
         if source in self._claims:
             self._claims[source] = now
 

@@ -23,7 +23,7 @@ from .arbitration import Arbiter, Cause, HolderChanged, Policy
 
 # The source of a request that names none.
 DEFAULT = 'default'
-# Why a source no longer holds a device.
+# The reasons why a source no longer holds a device.
 _REASONS = {
     Cause.CLAIM: ', which has taken it from {}',
     Cause.RELEASE: ': {} has released it',
@@ -47,7 +47,7 @@ class Sources(Arbiter[str]):
     """
     Decides which source holds a device. No I/O.
 
-    :param settings: None where all sources are alike, so that none holds the device.
+    :param settings: None if commands have no sources, so that none holds the device.
     :ivar are_ranked: whether one of them may hold the device.
     """
 
@@ -68,7 +68,7 @@ class Sources(Arbiter[str]):
 
     @property
     def shown_holder(self) -> str | None:
-        """Return the holder for snapshots: '' for none, None where all sources are alike."""
+        """Return the holder for snapshots: '' for none, None if commands have no sources."""
         return self.holder or '' if self.are_ranked else None
 
 

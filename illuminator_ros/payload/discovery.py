@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Discovery of devices by what they send, and their liveness.
+Discovery of devices by their messages, and their liveness.
 
 A device is announced once it has proved that it is one, by a valid status or by an answer to a
-request: a heartbeat alone can be forged for any number of addresses. Until then it is a
-candidate, which a newer candidate may push out.
+request: a heartbeat alone can be forged for any number of addresses. Until then it is a candidate,
+which a newer candidate may replace.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from ..mavlink.messages import Address
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
-# Candidates; one more takes the place of the oldest, if that has had its time to answer, s.
+# Candidates; one more replaces the oldest, if that has had CANDIDATE_TIME, s, to answer.
 MAX_CANDIDATES = 32
 CANDIDATE_TIME = 1.0
 # Ignored devices that are remembered, to name them where the target is missing.
 MAX_IGNORED = 8
-# s after the loss of a device that was never commanded, after which it is forgotten.
+# s from the loss of a device that was never commanded until it is forgotten.
 FORGET_AFTER = 60.0
 
 
 class Device(Protocol):
-    """A device, for the discovery."""
+    """The part of a device that the discovery uses."""
 
     @property
     def address(self) -> Address:
@@ -148,7 +148,7 @@ class Discovery(Generic[D]):
         return device
 
     def prove(self, address: Address, now: float) -> None:
-        """Note a valid status or an answer, by which a candidate is announced."""
+        """Note a valid status or an answer, which announces a candidate."""
         if address in self._candidates and len(self.devices) < MAX_DEVICES:
             del self._found_at[address]
             device = self.devices[address] = self._candidates.pop(address)

@@ -15,8 +15,8 @@
 """
 The faults of a simulated component, and the behaviour that each changes.
 
-Each payload has one table: its names are what ``--fault``, the YAML file and the console take,
-its descriptions are what ``--help`` and doc/simulator.md show.
+Each payload has one table: ``--fault``, the YAML file and the console take its names, ``--help``
+and doc/simulator.md show its descriptions.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from ..mavlink import messages
 @dataclass(frozen=True)
 class Behaviour:
     """
-    How a simulated component behaves; the defaults follow the protocol.
+    The behaviour of a simulated component; the defaults follow the protocol.
 
     :param heartbeat_type: MAV_TYPE.
     :param heartbeat_autopilot: MAV_AUTOPILOT.
@@ -63,7 +63,7 @@ class Behaviour:
     :param ignores_changes: whether accepted changes are not applied.
     :param silence: s for which it neither receives nor sends.
     :param reboot_interval: s, 0 for never.
-    :param refuse: result of each change, None to consider it.
+    :param refuse: result of each change, None to execute it.
     :param rejections: how many changes get MAV_RESULT_TEMPORARILY_REJECTED.
     :param progress: s of MAV_RESULT_IN_PROGRESS before a change is applied.
     :param slow: s from a command to its acknowledgement.

@@ -26,9 +26,9 @@ from ..mavlink.messages import ComponentInformationBasic, result_name
 
 # s from the acknowledgement to the message.
 MESSAGE_TIMEOUT = 0.5
-# A message that was acknowledged and did not come is asked for this often: it may be lost.
+# How often the message is requested if it is acknowledged and does not come: it may be lost.
 MAX_QUESTIONS = 3
-# s after which an id for the component is made from its address.
+# s from the first request until the identity counts as unknown.
 SETTLING_TIME = 2.0
 
 Done = Callable[[str, float], None]
@@ -46,7 +46,7 @@ class Identity:
 
     @classmethod
     def from_message(cls, message: ComponentInformationBasic) -> Identity:
-        """Read a message; a field that is full has no terminator, and some have odd bytes."""
+        """Read a message; a full field has no terminator, and some fields are not printable."""
         return cls(*map(text, (
             message.vendor_name, message.model_name, message.software_version,
             message.hardware_version, message.serial_number)))
@@ -63,7 +63,7 @@ class IdentityQuery:
     Asks one component for its identity.
 
     :ivar identity: None before the component has sent it.
-    :ivar failure: why it was not sent, '' while that is open or it was.
+    :ivar failure: why the component did not send it, '' if it did or an answer is awaited.
     """
 
     def __init__(self, target: Target) -> None:
@@ -82,7 +82,7 @@ class IdentityQuery:
                 or now >= self._first_asked + SETTLING_TIME)
 
     def ask(self, now: float, done: Done | None = None) -> None:
-        """Ask; ``done`` is called with '' once the message has come, else with the reason."""
+        """Ask; ``done`` is called with '' once the message has come, else with the failure."""
         if done is not None:
             self._waiting.append(done)
         if not self._asking:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Events: frozen dataclasses that any number of listeners take."""
+"""Events, which any number of listeners take."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Listeners(Generic[E]):
         self._listeners.append(listener)
 
     def emit(self, event: E) -> None:
-        """Give an event to each listener, whether or not others raise an exception."""
+        """Give an event to each listener, even if others raise an exception."""
         for listener in self._listeners:
             try:
                 listener(event)

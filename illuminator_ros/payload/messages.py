@@ -45,7 +45,7 @@ class Attitude(mav.Message):
 
     @property
     def is_finite(self) -> bool:
-        """Return whether it is a rotation."""
+        """Return whether all angles are finite."""
         return all(map(math.isfinite, (self.roll, self.pitch, self.yaw)))
 
 

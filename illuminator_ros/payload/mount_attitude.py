@@ -76,7 +76,7 @@ _LOCK_BIT = int(MountFlags.YAW_LOCK)
 
 
 def names_frame(flags: int) -> bool:
-    """Return whether flags name a yaw frame, as those of old implementations do not."""
+    """Return whether flags name a yaw frame; those of old implementations do not."""
     return bool(flags & (MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME))
 
 
@@ -84,7 +84,7 @@ def yaw_frame(flags: int) -> YawFrame:
     """
     Return the yaw frame of a message with quaternion and flags.
 
-    Without a flag of a frame it follows from YAW_LOCK (GIMBAL_DEVICE_ATTITUDE_STATUS).
+    Without a flag of a frame the frame follows from YAW_LOCK (GIMBAL_DEVICE_ATTITUDE_STATUS).
 
     :raises ValueError: if the flags name both frames.
     """

@@ -27,10 +27,10 @@ class PayloadType(NamedTuple):
     Each part is named as ``module:ATTRIBUTE``, '' for a part that does not exist, so that the
     simulator runs without ROS and the bridge without the checks.
 
-    :param name: what ``--payload`` and the parameter ``payloads`` call it.
+    :param name: its name in ``--payload`` and in the parameter ``payloads``.
     :param ros: its node, topics, services and parameters.
     :param simulated: its simulated device.
-    :param checks: what ``conformance`` requires of a device.
+    :param checks: the requirements that ``conformance`` checks.
     """
 
     name: str

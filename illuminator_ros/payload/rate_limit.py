@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Limits on how often a peer can make something happen."""
+"""A limit on repeated changes by another sender."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@
 """
 A request to a device: a command, its acknowledgement, and the status that shows the change.
 
-MAV_RESULT_ACCEPTED says that the command is valid and was taken on, not that it is done
+MAV_RESULT_ACCEPTED says that the command is valid and is executed, not that it is completed
 (command protocol). So a request waits for a status, and requests one if none follows within
 :data:`ASK_DELAY`. Only a status that was sent after the command and shows the change makes the
 request a success.
@@ -39,14 +39,14 @@ CONFIRMATION_TIMEOUT = 1.0
 # its answer may be lost.
 ASK_DELAY = 0.001
 ASK_INTERVAL = 0.25
-# s from a status that is too old to tell to the next request, doubled each time: it may have been
-# sent in the same millisecond as the command.
+# s from a status that may be older than the command to the next request, doubled each time: it may
+# have been sent in the same millisecond as the command.
 OUTDATED_INTERVAL = 0.001
 # Requests that may wait for one device.
 MAX_WAITING = 32
-# The result of a request that was not carried out since another one overtook it.
+# The result of a request that was not executed, since another one overtook it.
 OVERTAKEN = 'cancelled by a later request'
-# s by which the statuses of a device without a clock may be late, until that was measured.
+# s by which the statuses of a device without a clock may be late, until that is measured.
 UNKNOWN_DELAY = 0.75
 # The last delays of statuses, from which the next delay is estimated.
 MAX_DELAYS = 8
@@ -64,7 +64,7 @@ class Target:
     """
     The device that requests go to.
 
-    :param ended: called with each command that has ended, after its own receiver.
+    :param ended: called with the result of each command, after its own ``done``.
     :param kind: a noun for it, such as ``light``.
     :param status_id: the message id of its status.
     :param status_sender: the component that sends the status, if another one executes commands.
@@ -138,7 +138,7 @@ class Target:
         return 1.25 * max(self._delays) + 0.05 if self._delays else UNKNOWN_DELAY
 
     def note_status_delay(self, seconds: float) -> None:
-        """Note how long after a command the first status showed the change."""
+        """Note the time from a command to the first status that showed the change."""
         self._delays = [*self._delays[1 - MAX_DELAYS:], seconds]
 
 
@@ -181,7 +181,7 @@ class Change(Protocol[S_contra]):
 
     @property
     def note(self) -> str:
-        """Describe a change that was not asked for but comes with it, '' if there is none."""
+        """Describe a change that was not requested but comes with it, '' if there is none."""
 
     def shown_by(self, status: S_contra) -> bool:
         """Return whether a status shows the change."""
@@ -226,7 +226,7 @@ def at_any_time() -> float:
 class Phase(Enum):
     """The phase of a request."""
 
-    # Enum's own takes a call in Python, which a lookup in a table of transitions makes twice.
+    # Enum.__hash__ is a call in Python; a lookup in the table of transitions makes two.
     __hash__ = object.__hash__
 
     WAITING = 'waiting'
@@ -258,7 +258,7 @@ TRANSITIONS: dict[tuple[Phase, Step], Phase] = {
 
 class Request(Generic[S]):
     """
-    A change on its way.
+    A request to change the state of a device.
 
     :param prepare: returns the change when it is sent: requests before it may affect it.
     :param done: called once, with the result, the change and the status that shows it; None
@@ -287,14 +287,14 @@ class Request(Generic[S]):
         self._done = done
         self._submitted = now
         self._sent_at = math.inf
-        # Times that it is sent again since acknowledgements of earlier commands may come.
+        # How often it must be sent again, since acknowledgements of an earlier command may come.
         self._repeats: int | None = None
         self._was_repeated = False
         self._outcome: command_sender.CommandResult | None = None
         self._before: S | None = None
         self._has_status = False
         self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
-        # How a status contradicts, and whether one was too old to tell.
+        # How a status contradicts, and whether a status may be older than the command.
         self._contradiction = ''
         self._is_outdated = False
         self._outdated_wait = OUTDATED_INTERVAL
@@ -344,7 +344,8 @@ class Request(Generic[S]):
 
     def _send(self, step: Step, now: float) -> None:
         self.phase = TRANSITIONS[self.phase, step]
-        # A status from between two repeats may show what an earlier command still undoes.
+        # A status from before the last repeat may show a change that an earlier command still
+        # undoes.
         self._sent_at = now
         change = self._sent
         self._target.send(
@@ -372,8 +373,9 @@ class Request(Generic[S]):
         """
         Return whether the acknowledgement may belong to an earlier, unacknowledged command.
 
-        That one may be carried out only now and undo this one, which itself may be lost. So it
-        is sent until there were more acknowledgements than tries of the earlier command.
+        The earlier command may be executed only now and undo this one, and this one may be lost.
+        So this one is sent until there are more acknowledgements than tries of the earlier
+        command.
         """
         if self._repeats is None:
             earlier = outcome.earlier
@@ -390,8 +392,8 @@ class Request(Generic[S]):
         """
         Take a status that is newer than all before.
 
-        One that was on its way already when the command was sent says nothing about it: with a
-        late acknowledgement, it would even confirm a change that was never made.
+        A status that was sent before the command does not show its effect: with a late
+        acknowledgement, it would even confirm a change that was never made.
         """
         self._has_status = True
         if self.phase is not Phase.CONFIRMING:
@@ -428,7 +430,7 @@ class Request(Generic[S]):
                 self._succeed(change.evidence(report.status), now, report.status)
 
     def poll(self, now: float) -> None:
-        """Request the status, or end."""
+        """Request the status, or end the request."""
         if not self.is_confirming:
             return
         if now >= self._confirm_until:
@@ -510,7 +512,7 @@ class RequestQueue(Generic[S]):
     """
     The requests of one kind to one device, in the order in which they were made.
 
-    Each may wait for the same time, so that the first one that waits is the first to give up.
+    All of them may wait for the same time, so that the first one that waits ends first.
     """
 
     def __init__(self, target: Target) -> None:
@@ -520,7 +522,7 @@ class RequestQueue(Generic[S]):
 
     @property
     def current(self) -> Request[S] | None:
-        """Return the request that is on its way."""
+        """Return the request that is under way."""
         if not self._requests or self._requests[0].phase is Phase.WAITING:
             return None
         return self._requests[0]
@@ -531,7 +533,7 @@ class RequestQueue(Generic[S]):
         return bool(self._requests) and self._requests[0].phase is Phase.CONFIRMING
 
     def __len__(self) -> int:
-        """Return how many requests are on their way or wait."""
+        """Return how many requests are under way or wait."""
         return len(self._requests)
 
     def submit(self, request: Request[S], now: float) -> None:
@@ -571,7 +573,7 @@ class RequestQueue(Generic[S]):
                 self._start_next(now)
 
     def poll(self, now: float) -> None:
-        """Do what is due, and start the request that has waited."""
+        """Do what is due, and start the next request."""
         while (late := self._first_waiting) and now >= late.limit:
             self._requests.remove(late)
             late.fail('not sent: earlier requests took too long', now)

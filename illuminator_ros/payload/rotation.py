@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 Vector = tuple[float, float, float]
 
-# Sine of the pitch beyond which rounding errors hide which of roll and yaw an attitude has.
+# Sine of the pitch beyond which rounding errors prevent the separation of roll and yaw.
 _SINGULAR = 1.0 - 1e-12
 
 
@@ -136,5 +136,5 @@ def enu_flu(attitude: Quaternion) -> Quaternion:
 
 
 def flip(rotation: Quaternion) -> Quaternion:
-    """Return the rotation between two FRD bodies, given that between their FLU bodies."""
+    """Return the rotation between two FRD bodies, given the one between their FLU bodies."""
     return Quaternion(rotation.w, rotation.x, -rotation.y, -rotation.z)

@@ -64,8 +64,8 @@ class Snapshot(NamedTuple):
     The state of a simulated device at a moment, for people.
 
     :param text: one line.
-    :param state: differs between two snapshots if the second deserves a line of its own.
-    :param drift: a slow quantity, in steps; a change by one step deserves a line, too.
+    :param state: differs between two snapshots if the second gets a line of its own.
+    :param drift: a slow quantity, in steps; a change by one step gets a line, too.
     """
 
     text: str
@@ -97,7 +97,7 @@ class ConsoleCommand(Generic[T_contra, R_co]):
 
 class SimulatedDevice(ABC):
     """
-    The part of a simulated component that is its payload's: state, commands and messages.
+    The part of a simulated component that belongs to a payload: state, commands, messages.
 
     No I/O; ``now`` is s on the link's clock.
 
@@ -143,7 +143,7 @@ class SimulatedDevice(ABC):
         return ()
 
     def sender(self, message: Message, own: Address) -> Address:
-        """Return the address from which it sends a message, if that is not its own."""
+        """Return the address from which it sends a message, by default its own."""
         return own
 
     def poll(self, now: float) -> Iterable[Message]:
@@ -185,7 +185,7 @@ class SimulatedType(Generic[D]):
     """
     The simulated side of a payload, as the simulator offers it.
 
-    :param noun: names one device; the option ``--light`` and messages have it.
+    :param noun: names one device, as in the option ``--light`` and in messages.
     :param plural: the key of the YAML file.
     :param device: the class, for its faults and its console.
     :param make: makes a device from settings, its address, and whether there are several;
@@ -289,8 +289,8 @@ class SimulatedComponent(Generic[D]):
         return self.device.behaviour
 
     def power_on(self, now: float) -> None:
-        """Begin; the faults that last for a time last from now on."""
-        # Until then it neither receives nor sends, s.
+        """Start; the faults that last for a time begin now."""
+        # The time until which it neither receives nor sends, s.
         self._silent_until = now + (self.device.behaviour.silence or -math.inf)
         self.restart(now)
 
@@ -342,7 +342,7 @@ class SimulatedComponent(Generic[D]):
             system == 0 or system == self.address.system and component == 0))
 
     def receive(self, source: Address, message: Message, now: float) -> None:
-        """Take a command or a message for this component, or for no one in particular."""
+        """Take a command or a message for this component, or a broadcast one."""
         behaviour = self.device.behaviour
         if now < self._silent_until:
             return
@@ -361,7 +361,7 @@ class SimulatedComponent(Generic[D]):
         self._changed()
 
     def _after(self, delay: float, action: Callable[[float], None], now: float) -> None:
-        """Act after some time, s, or at once."""
+        """Call an action after a delay, s, or at once."""
         if not delay:
             action(now)
         elif len(self._schedule) < MAX_DELAYED:
@@ -408,7 +408,7 @@ class SimulatedComponent(Generic[D]):
                            min(now + PROGRESS_INTERVAL, begun + duration))
 
     def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
-        """Acknowledge a command and do what it asks for."""
+        """Acknowledge a command and execute it."""
         behaviour = self.device.behaviour
         if message.command == messages.MavCmd.REQUEST_MESSAGE:
             requested = self._requested(message.param1, now)
@@ -441,7 +441,7 @@ class SimulatedComponent(Generic[D]):
         return MavResult.ACCEPTED if self.device.behaviour.accepts_unknown else result
 
     def _set_interval(self, message: AnyCommand, now: float) -> MavResult:
-        """MAV_CMD_SET_MESSAGE_INTERVAL: param2 is µs, -1 stops, 0 is the default rate."""
+        """Execute MAV_CMD_SET_MESSAGE_INTERVAL: param2 in µs, -1 to stop, 0 for the default."""
         behaviour, microseconds = self.device.behaviour, message.param2
         stream = next((one for id_, one in self._streams.items() if id_ == message.param1), None)
         if stream is None or not math.isfinite(microseconds):

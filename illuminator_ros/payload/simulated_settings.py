@@ -69,7 +69,7 @@ def geo_point(text: str) -> tuple[float, float, float]:
     """
     Read ``LAT,LON,ALT``: degrees, and m above mean sea level.
 
-    :raises ValueError: if it is not that.
+    :raises ValueError: if the text has another form.
     """
     parts = text.split(',')
     if len(parts) != 3:

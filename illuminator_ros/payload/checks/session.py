@@ -437,7 +437,7 @@ class Session(Endpoint):
 
     @property
     def device(self) -> Address:
-        """Return the address of the device, which has been heard."""
+        """Return the address of the device, which must have been heard."""
         assert self.found is not None
         return self.found
 
