@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     __version__: str
 else:
     def __getattr__(name):
-        """Look ``__version__`` up when it is asked for (PEP 562): the import takes 20 ms."""
+        """Look ``__version__`` up when it is used (PEP 562): the import takes 20 ms."""
         if name != '__version__':
             raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
         from importlib.metadata import PackageNotFoundError, version

@@ -33,17 +33,17 @@ from ..payload.identity import Identity
 from ..payload.listeners import Listeners
 from ..payload.request import Done, Result
 
-# Lost lights that are asked for a status at once, so that a slow line is not filled.
+# How many lost lights are asked for a status when the link opens: more would fill a slow line.
 MAX_ASKED = 8
 
 
 class IlluminatorClient(Payload):
     """
-    Finds illuminators on a link by what they send, never by their ids.
+    Finds illuminators on a link by their messages, never by their ids.
 
-    A component is one if its HEARTBEAT says so (MAV_TYPE_ILLUMINATOR) or if it sends
+    A component is an illuminator if its HEARTBEAT has MAV_TYPE_ILLUMINATOR or if it sends
     ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own. It is announced once it
-    has sent a status or an answer, and forgotten after a minute of silence if no user has ever
+    has sent a status or an answer, and forgotten a minute after its loss if no user has ever
     commanded it.
 
     :param commands: the command sender of the component that carries this payload.
@@ -52,7 +52,7 @@ class IlluminatorClient(Payload):
     :ivar events: the events of all lights.
     :ivar lights: the announced lights by address, in the order of their announcement.
     :ivar mounts: the directions of gimbals.
-    :ivar mount_moved: takes the system id of each mount that sends its attitude.
+    :ivar mount_moved: the system id of each mount that sends its attitude.
     """
 
     def __init__(
@@ -72,12 +72,12 @@ class IlluminatorClient(Payload):
 
     @property
     def lights_by_address(self) -> list[Light]:
-        """Return every light that may be on, by address."""
+        """Return the announced lights in the order of their addresses."""
         return [self.lights[address] for address in sorted(self.lights)]
 
     @property
     def ignored(self) -> tuple[Address, ...]:
-        """Return the first lights that are not wanted."""
+        """Return the addresses of the first lights that are not wanted."""
         return tuple(self._discovery.ignored)
 
     @property
@@ -109,7 +109,7 @@ class IlluminatorClient(Payload):
         """See :meth:`Payload.link_opened`."""
         for light in self._discovery:
             light.link_opened(now)
-        # A returning light answers immediately; its own heartbeat may take a second.
+        # A light that is heard again answers immediately; its next heartbeat may take a second.
         lost = (light for light in self.lights.values() if not light.connected)
         for light in itertools.islice(lost, MAX_ASKED):
             light.request_status(now)
@@ -155,8 +155,9 @@ def enable_all(
     """
     Switch all connected lights on or off, in parallel.
 
-    :param done: called once, when the last light has answered. It is a success if all connected
-        lights succeeded, of which there must be one; the message has the outcome of each.
+    :param done: called once, when the last light has answered. The result is a success if at least
+        one light is connected and all connected lights succeeded; the message has the outcome of
+        each light.
     :param name: returns the name of a light, for people.
     :param detail: as for :meth:`Light.enable`, and ``is_stream``.
     """

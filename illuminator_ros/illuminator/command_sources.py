@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The sources of the commands to one light: which of them holds it, and what each requests."""
+"""The sources of the commands to one light: its holder, and the values that each requests."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ..payload.command_sources import Sources, SourceSettings
 
 class DesiredState(NamedTuple):
     """
-    The last values that a source has requested, None for values that it has not.
+    The last values that a source has requested, None for values that it has not requested.
 
     :param brightness: %.
     """
@@ -46,7 +46,7 @@ class LightSources(Sources):
         return self._desired.get(self.holder or '', DesiredState())
 
     def claim(self, source: str, now: float) -> HolderChanged[str] | None:
-        """Take a request of a source, which holds the light from then on if it may."""
+        """Take a request of a source; it then holds the light, unless a higher one does."""
         if not self.is_claimed_by(source):
             self._desired.pop(source, None)
         return super().claim(source, now)

@@ -34,7 +34,7 @@ def _with_flags(shown: str, status: Status) -> str:
 
 
 class Switch(NamedTuple):
-    """Switches all lights of a component on or off: those of one cannot be selected."""
+    """Switches all lights of a component on or off; the command cannot select one of them."""
 
     on: bool
     note: str = ''
@@ -72,7 +72,7 @@ class Configure(NamedTuple):
     """
     Configures a light; the command carries all four fields.
 
-    :param names: the fields that are to change.
+    :param names: the fields that must change.
     """
 
     configuration: Configuration

@@ -38,18 +38,19 @@ from .model import (
 from ..payload.rate_limit import RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
-# s; rqt_reconfigure gives up after 1.0 s, and the answer must have come by then. The middleware
-# waits up to 0.1 s before it sends an answer to a client that it does not know yet.
+# s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
+# up to 0.1 s before it sends an answer to a client that it has not discovered yet.
 CONFIGURE_LIMIT = 0.78
 # s between tries of overrides and restored configurations that got no answer.
 RESTORE_INTERVAL = 2.0
 # Attempts before giving up on a light that accepts a configuration but does not apply it.
 MAX_CONTRADICTIONS = 3
-# s without a status after which a complete set of overrides is sent all the same.
+# s to wait for the first status before a complete set of overrides is sent without one.
 FIRST_STATUS_TIMEOUT = 3.0
-# %; set together with a strobe period where the duty cycle is 0, at which nothing strobes.
+# %; set together with a strobe period where the duty cycle is 0, at which a light does not strobe.
 DEFAULT_DUTY_CYCLE = 50.0
-# s after a command of ours in which a light may show what it asks for, and what it implies.
+# s after a command of ours in which a change to a commanded value counts as its late effect, and a
+# change of another value as implied by it.
 LATE_TIME = 30.0
 IMPLIED_TIME = 2.0
 # How often in a row a change by another sender is undone, and s between two of these commands.
@@ -58,7 +59,7 @@ REPEAT_INTERVAL = 2.0
 
 
 class PendingReason(Enum):
-    """Why values must be sent."""
+    """The reason why values must be sent."""
 
     OVERRIDE = 'override'
     RESTART = 'restart'
@@ -66,16 +67,17 @@ class PendingReason(Enum):
     OTHER_SENDER = 'other sender'
 
 
-# Their further repeats are limited by a RepeatLimit.
+# Values with these reasons are dropped when the light has accepted and not applied them; a
+# RepeatLimit limits further attempts.
 _SENT_ONCE = (PendingReason.LIMIT, PendingReason.OTHER_SENDER)
 
 
 @dataclass
 class Pending:
     """
-    Values to be sent: overrides, or what a restart or another sender has undone.
+    Values that must be sent, see :class:`PendingReason`.
 
-    :param attempts: how often the light has accepted them and shown others.
+    :param attempts: how often the light has accepted them but then reported others.
     :param due: when they are sent next, s.
     :param has_ended: whether a command with them has ended, or none can be sent.
     """
@@ -102,13 +104,13 @@ class ConfigurationManager:
     Keeps one light configured.
 
     :param emit: takes the events.
-    :param limits: hold for each command that is sent.
+    :param limits: apply to each command that is sent.
     :param reassert: whether changes by other senders are undone.
-    :ivar confirmed: the configuration that was last accepted from us or, where another sender
-        has changed it since, reported; None before the first status.
-    :ivar discrepancy: how the light differs from a configuration that it has accepted, ''
-        if it does not.
-    :ivar limit_exceeded: how the light differs from the limits.
+    :ivar confirmed: the configuration that the light last accepted from us or, if another sender
+        has changed it since, last reported; None before either.
+    :ivar discrepancy: why the light does not have a configuration that it should have, '' if it
+        has.
+    :ivar limit_exceeded: how the light exceeds the limits.
     """
 
     def __init__(
@@ -133,9 +135,9 @@ class ConfigurationManager:
         self._setpoint: float | None = None
         self._pending: Pending | None = None
         self._sent: _Sent | None = None
-        # A configuration that the light has accepted and then not shown.
+        # A configuration that the light has accepted but does not report.
         self._unapplied: Configuration | None = None
-        # Whether it is open how the last command ended: it failed, or was superseded.
+        # Whether the effect of the last command is unknown, since it failed or was superseded.
         self._is_unconfirmed = False
         # The last configuration that was requested or reported as changed: small steps away
         # from it add up to a change.
@@ -177,7 +179,7 @@ class ConfigurationManager:
 
     def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
-        Change some fields with one command; the light is connected.
+        Change some fields with one command; the light must be connected.
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         :param done: called once with the result.
@@ -192,7 +194,7 @@ class ConfigurationManager:
         self._submit(values, now, done)
 
     def set_brightness(self, brightness: float, now: float) -> None:
-        """Take a setpoint of a stream, %, checked; the light is connected."""
+        """Take a setpoint of a stream, %, checked; the light must be connected."""
         try:
             self._limits.check('brightness', brightness)
         except InvalidValue as error:
@@ -202,7 +204,7 @@ class ConfigurationManager:
         if (current is not None and current.is_stream and not current.is_finished
                 and isinstance(current.change, Configure)
                 and current.change.configuration.brightness == brightness):
-            # Under way already; the setpoint in between is overtaken.
+            # A command with this value is under way; a setpoint that waits is outdated.
             self._setpoint = None
             return
         self._setpoint = brightness
@@ -210,7 +212,7 @@ class ConfigurationManager:
 
     def set_desired(self, values: Changes, now: float) -> None:
         """
-        Have values sent as soon as the light has reported its configuration.
+        Send values as soon as the light has reported its configuration.
 
         :param values: by name, checked, except against the limits that the light reports.
         """
@@ -220,7 +222,7 @@ class ConfigurationManager:
         return now if self.confirmed else now + FIRST_STATUS_TIMEOUT
 
     def _want(self, values: Changes, reason: PendingReason, due: float) -> None:
-        """Have values sent; those that already wait keep their origin."""
+        """Send values when they are due; the reason of values that already wait is kept."""
         self._pending = Pending(values, self._pending.reason if self._pending else reason, due)
 
     @property
@@ -228,18 +230,18 @@ class ConfigurationManager:
         return self._pending.values if self._pending else {}
 
     def cancel(self, now: float) -> None:
-        """End all changes, and drop the values that were not sent."""
+        """End all requests, and drop the pending values."""
         self._pending = None
         self.end_requests('cancelled', now)
 
     def end_requests(self, message: str, now: float) -> None:
-        """End all changes, except the values that must be sent in any case."""
+        """End all requests, but keep the pending values."""
         self._setpoint = None
         self._queue.cancel(message, now)
         self.retry_pending(now)
 
     def _drop_pending(self, names: Container[str]) -> None:
-        """Note that fields have another value by now, or must not be sent."""
+        """Remove fields from the pending values."""
         if self._pending:
             self._pending.values = {name: value for name, value in self._pending.values.items()
                                     if name not in names}
@@ -267,19 +269,19 @@ class ConfigurationManager:
             if (values.get('strobe_period') and 'strobe_duty_cycle' not in values
                     and not self.confirmed.strobe_duty_cycle):
                 values = {**values, 'strobe_duty_cycle': DEFAULT_DUTY_CYCLE}
-                note = ('strobe_duty_cycle was 0 %, at which nothing strobes, and was set to '
-                        f'{DEFAULT_DUTY_CYCLE:g} %')
+                note = ('strobe_duty_cycle was 0 %, at which the light does not strobe, and was '
+                        f'set to {DEFAULT_DUTY_CYCLE:g} %')
             goal = replace(self._sendable(self.confirmed, values), **values)
-        # Here, since each command is made here: no way to the light passes around the limits.
+        # Each command is made here, so the limits apply to every command.
         limited = self._limits.clipped(goal, self._strobe_range)
         return Configure(limited, list(dict.fromkeys((*values, *goal.differences(limited)))),
                          note)
 
     def _sendable(self, confirmed: Configuration, changes: Changes) -> Configuration:
         """
-        Return the confirmed configuration without values that the light's limits rule out.
+        Return the confirmed configuration, with reported values where its own are out of range.
 
-        A light that has once reported such a value would deny every change that carries it.
+        Otherwise a light that once reported a value out of its range would deny every change.
         """
         if self._status is None:
             return confirmed
@@ -303,7 +305,7 @@ class ConfigurationManager:
             return
 
         def prepare(now: float) -> Configure:
-            # Requests before it in the queue may have changed the other fields.
+            # Requests before this one may have changed the other fields.
             change = self._goal(values)
             self._sent = _Sent(change.configuration, change.names, now)
             return change
@@ -334,21 +336,21 @@ class ConfigurationManager:
     # Reports
 
     def restarted(self, now: float) -> None:
-        """Note that the light has restarted, so that its configuration may be gone."""
+        """Note that the light has restarted, so that its configuration may be lost."""
         if self._restore and self.confirmed is not None:
             confirmed = self.confirmed
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
-            # Overrides that have not been sent yet replace the values from before.
+            # Overrides that have not been sent yet replace confirmed values.
             self._pending = Pending({**values, **self._wanted}, PendingReason.RESTART, now)
         elif self._pending and self._pending.reason in _SENT_ONCE:
             # The light has other values now.
             self._pending = None
-        # The light has forgotten that it was brought within the limits.
+        # The restart may have undone the command that brought the light within the limits.
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
 
     def retry_pending(self, now: float) -> None:
-        """Make values that were not sent due: the light is heard, or a command was cancelled."""
+        """Make pending values due, since the light is heard or a command was cancelled."""
         pending = self._pending
         if pending and pending.due < math.inf:
             pending.due, pending.has_ended = self._first_due(now), False
@@ -356,7 +358,8 @@ class ConfigurationManager:
     def lost(self, message: str, now: float) -> None:
         """Note that the light is lost: no request must take effect when it is heard again."""
         self._queue.cancel(message, now)
-        # It may restart before, which cannot be noticed where several lights share the address.
+        # It may restart meanwhile, which cannot be detected where several lights share the
+        # address.
         self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
         if self._setpoint is not None:
             self._setpoint = None
@@ -399,7 +402,7 @@ class ConfigurationManager:
         elif self._pending and self._pending.reason is not PendingReason.OVERRIDE:
             wanted = replace(self.confirmed, **self._pending.values)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
-                # It kept its configuration, or got it back from another sender.
+                # The light has kept the values, or another sender has restored them.
                 self._pending = None
         elif can_follow and not report.shared_address:
             self._follow(status, self.confirmed, reported, switched_at, now)
@@ -433,7 +436,8 @@ class ConfigurationManager:
         self, status: Status, confirmed: Configuration, reported: Configuration,
         switched_at: float, now: float,
     ) -> None:
-        # Under external sync too: another sender may have changed values that the signal hides.
+        # Compare under external sync too: another sender may have changed values that the signal
+        # hides.
         names = unexpected_differences(
             confirmed, reported, status.error_flags, step=False, external=False)
         if not names:
@@ -454,7 +458,7 @@ class ConfigurationManager:
     def _undo_change(
         self, status: Status, confirmed: Configuration, reported: Configuration, now: float,
     ) -> bool:
-        """Undo what another sender has changed, unless that was done often enough."""
+        """Undo another sender's change up to the limit of repeats; return whether it is undone."""
         names = unexpected_differences(confirmed, reported, status.error_flags, step=True)
         if status.enabled is False and not status.brightness:
             # Where brightness is the switch, it would be an ON.
@@ -477,7 +481,7 @@ class ConfigurationManager:
         if exceeded != self.limit_exceeded:
             self.limit_exceeded = exceeded
             self._emit(exceeded)
-        # Values that another sender has changed may be put back only later.
+        # Values that undo a change by another sender may be due only later.
         is_free = self._pending is None or self._pending.reason is PendingReason.OTHER_SENDER
         if exceeded.excess and is_free and (due := self._limiting.take(now)) is not None:
             limited = self._limits.clipped(reported, self._strobe_range)
@@ -502,12 +506,12 @@ class ConfigurationManager:
     def poll(self, now: float, *, connected: bool) -> None:
         """Send pending values, one command at a time."""
         if self._setpoint is not None and (accepted := self._accepted_setpoint):
-            # A newer one need not wait for the status.
+            # A newer setpoint need not wait for the status.
             accepted.supersede(now)
         self._queue.poll(now)
         if self._queue.current is not None or not connected:
             return
-        # First the values that are sent once: a stream of setpoints may not end.
+        # Pending values go first, since a stream of setpoints may never end.
         if self._pending and now >= self._pending.due:
             self._send_pending(self._pending, now)
         if self._setpoint is not None and self._queue.current is None:
@@ -542,7 +546,7 @@ class ConfigurationManager:
         try:
             self._goal(pending.values)
         except InvalidValue as error:
-            # They still wait for a status; but the user should know.
+            # The values stay pending until a status comes; report that once.
             pending.due = math.inf
             pending.has_ended = True
             self.discrepancy = f'{", ".join(pending.values)} not sent: {error}'

@@ -27,7 +27,7 @@ from ..payload.identity import Identity
 
 
 class ChangeCause(Enum):
-    """Why the confirmed configuration has changed."""
+    """The reason why the confirmed configuration has changed."""
 
     FIRST_STATUS = 'first status'
     REQUEST = 'request'
@@ -98,7 +98,7 @@ class LightIdentified(LightEvent):
 @dataclass(slots=True)
 class StatusReceived:
     """
-    A light has sent ILLUMINATOR_STATUS. Not frozen only because that costs time for each status.
+    A light has sent ILLUMINATOR_STATUS. Not frozen, since that costs time for each status.
 
     :param received_at: s on the link's clock.
     :param temperature: degC; None where the light does not measure it, or its sensor fails.
@@ -136,7 +136,7 @@ class ConfigurationChanged(LightEvent):
 
 @dataclass(frozen=True)
 class ConfigurationRestored(LightEvent):
-    """Overrides, or the configuration that a restart has undone, were sent: how that ended."""
+    """The result of sending a configuration without a request, such as after a restart."""
 
     success: bool
     message: str
@@ -151,7 +151,7 @@ class SetpointFailed(LightEvent):
 
 @dataclass(frozen=True)
 class SetpointClipped(LightEvent):
-    """A setpoint of a stream was beyond a limit, and is sent as that limit."""
+    """A setpoint of a stream was beyond a limit; the limit is sent instead."""
 
     message: str
 
@@ -161,7 +161,7 @@ class LimitExceeded(LightEvent):
     """
     A light reports values beyond the limits that the operator has set.
 
-    :param excess: what exceeds which limit, for people; empty once nothing does.
+    :param excess: each value that exceeds a limit, for people; empty if none does.
     :param impossible: why the light cannot strobe within the limits, '' if it can.
     """
 
@@ -171,7 +171,7 @@ class LimitExceeded(LightEvent):
 
 @dataclass(frozen=True)
 class LightHeld(LightEvent):
-    """Another source of commands holds a light."""
+    """The source of commands that holds a light has changed."""
 
     change: HolderChanged[str]
 
@@ -187,10 +187,10 @@ class DesiredStateFailed(LightEvent):
 @dataclass(frozen=True)
 class ChangedByOther(LightEvent):
     """
-    Another sender has changed a light that must stay as it was.
+    Another sender has changed a light whose state must be kept.
 
     :param change: the new values, for people.
-    :param undone: whether it is undone; otherwise that was done often enough.
+    :param undone: whether the change is undone; False once the limit of repeats is reached.
     """
 
     change: str
@@ -203,7 +203,7 @@ class AutomaticSwitch(LightEvent):
     A light is switched without a request.
 
     :param reason: for people.
-    :param failure: why it was not confirmed, '' when it begins. It is repeated.
+    :param failure: why the last command was not confirmed, '' before the first one.
     """
 
     on: bool
@@ -214,9 +214,9 @@ class AutomaticSwitch(LightEvent):
 @dataclass(frozen=True)
 class LightSwitched(LightEvent):
     """
-    A light was switched on or off, which it was not before.
+    A light was switched on or off, and was not in that state before.
 
-    :param detail: how it was asked for, such as ``service``; '' for another sender.
+    :param detail: how it was requested, such as ``service``; '' for another sender.
     """
 
     on: bool
@@ -233,8 +233,9 @@ class LightSnapshot(NamedTuple):
 
     :param status_interval: s between statuses that the light was asked for, 0 for its own rate.
     :param configuration: as confirmed, None before the first status.
-    :param discrepancy: how the light differs from what it has accepted, '' if it does not.
-    :param limit_exceeded: how it differs from the limits that the operator has set.
+    :param discrepancy: why the light does not have a configuration that it should have, '' if it
+        has.
+    :param limit_exceeded: how it exceeds the limits that the operator has set.
     :param identity_is_settled: whether the identity is known, or will not be known soon.
     :param holder: the source of commands that holds it, '' if none does; None without sources.
     :param held_since: when the holder changed last.
@@ -260,7 +261,7 @@ class LightSnapshot(NamedTuple):
     held_since: float = 0.0
 
     def events(self) -> list[AnyLightEvent]:
-        """Return the events that lead to this state, for a listener that comes late."""
+        """Return the events that lead to this state, for a listener that subscribes late."""
         events: list[AnyLightEvent] = [LightConnected(self.address)] if self.connected else []
         if self.identity:
             events.append(LightIdentified(self.address, self.identity))

@@ -50,26 +50,27 @@ STATUS_TIMEOUT = 2.5
 # s for which an ON waits for the statuses that show whether the light has restarted: long enough
 # for two of a light that sends one each second and none on request.
 RESTART_CHECK_TIME = 2.5
-# s; a light that reports progress for longer is not waited for.
+# s; a request ends after this time even if the light still reports progress.
 PROGRESS_LIMIT = 30.0
-# s; two commands one after the other, each with its tries, and the messages after them.
+# s; enough for two commands in sequence, each with its tries, and for their messages.
 REFRESH_LIMIT = 5.0
 
 
 @dataclass(frozen=True)
 class Settings:
     """
-    How lights are treated.
+    The settings of each light.
 
     :param heartbeat_timeout: s, > 0, without a heartbeat or status, after which a light is lost.
-    :param status_interval: s, >= 0, between statuses to ask the light for; 0 leaves its own.
+    :param status_interval: s, >= 0, between statuses that the light is asked for; 0 leaves its
+        own.
     :param restore_configuration: whether a light that has restarted gets its confirmed
         configuration again.
-    :param limits: hold for everything that is sent.
+    :param limits: apply to everything that is sent.
     :param off_after_silence: s without a request after which a light that is on is switched off;
         0 for never.
     :param reassert: whether changes by other senders are undone.
-    :param sources: of commands, None where all are alike.
+    :param sources: the sources of commands, None if commands have no sources.
     :param off_on_release: whether a light is switched off when no source holds it any more.
     """
 
@@ -104,8 +105,8 @@ class Light:
     One component that is an illuminator. No I/O; time is passed in.
 
     :param emit: takes the events.
-    :param changed: called with the light when :meth:`next_deadline` or ``has_answered`` may
-        differ, and the time.
+    :param changed: called with the light and the time when :meth:`next_deadline` or
+        ``has_answered`` may have changed.
     :ivar connected: whether it is heard.
     :ivar status: the newest status, None before the first.
     :ivar lost_at: when it was lost, s; infinity while it is heard.
@@ -145,21 +146,23 @@ class Light:
         self._link_failure = ''
         self._status_due = math.inf
         self._asked_at = -math.inf
-        # s of silence after which the light is asked for a status; its answer takes time, too.
+        # s of silence after which the light is asked for a status, so that its answer arrives
+        # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, settings.heartbeat_timeout / 1.2)
         self._was_lost = False
-        # Until when an ON waits, s, since the light may have restarted.
+        # The time until which an ON waits, s, since the light may have restarted.
         self._restart_check_until = -math.inf
         self._enabled: bool | None = None
         self._last_switch: tuple[bool, float] = False, -math.inf
-        # Until when a switch that was not confirmed may still take effect, s.
+        # The time until which a switch that was not confirmed may still take effect, s.
         self._late_until = -math.inf
-        # The brightness that the light reports while it is off: 0 where that is the switch, too.
+        # The brightness that the light reports while it is off; 0 where a brightness of 0 is off.
         self._off_brightness: float | None = None
         # Whether the light was seen to report brightness 0 since it was switched off.
         self._brightness_is_switch = False
         self._was_dimmed = False
-        # When the last request came, or the light was seen to be switched on, s.
+        # The time of the last request, or at which a status showed that another sender has switched
+        # the light on, s.
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
         self._undoing = RepeatLimit(
@@ -181,7 +184,8 @@ class Light:
             self.lost_at = math.inf
             self._restart_check_until = now + RESTART_CHECK_TIME
             self._configuration.retry_pending(now)
-            # A request that was sent to the silent light may be resent only half a second later.
+            # A status request that was sent to the silent light may be resent only half a second
+            # later.
             self._target.cancel_status_request(now)
             self._set_up(now)
             self._emit(events.LightConnected(self.address))
@@ -199,7 +203,8 @@ class Light:
         was_lost, self._was_lost = self._was_lost, False
         uptime = self._tracker.take_uptime(status, now, was_lost=was_lost)
         # A request that waits for the status is answered before the status is published. Otherwise
-        # it is published first: the comparison with earlier ones would delay it by a quarter.
+        # the status is published first: the comparison with earlier ones would add a quarter to
+        # its delay.
         is_confirming = self._switching.is_confirming or self._configuration.is_confirming
         is_awaited = is_confirming or bool(self._refreshes)
         is_first = uptime is Uptime.RUNNING and not is_awaited
@@ -234,7 +239,7 @@ class Light:
 
     def _note(self, status: Status, now: float) -> None:
         self.status, self.status_at = status, now
-        # Lights that do not measure send 0 (ArduSub), and a sensor rarely says exactly 0.
+        # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
         self._measures_temperature |= bool(status.temperature)
 
     def _publish(self, status: Status, now: float) -> None:
@@ -252,8 +257,8 @@ class Light:
                 and not self._configuration.is_changing)
         was_dimmed = self._was_dimmed
         self._was_dimmed = bool(report.status.error_flags & DIMMING_FLAGS)
-        # Several lights at one address seem to switch again and again, and a light that has
-        # cooled down switches itself on.
+        # Several lights at one address seem to be one light that switches repeatedly, and a light
+        # that has cooled down switches itself on.
         is_by_other = before is False and not (
             report.shared_address or was_dimmed or self._was_dimmed or self._switching
             or now <= self._late_until)
@@ -332,7 +337,8 @@ class Light:
             message = self.unreachable(now)
             if self._automatic and self._automatic.on:
                 self._automatic = None
-            # Another try may reach the light after a restart. An OFF may reach it at any time.
+            # End ON and CONFIGURE: another try may reach the light after a restart. An OFF may
+            # reach it at any time.
             self._commands.end_all(
                 now, CommandStatus.NO_ANSWER, self.address, lambda command: (
                     command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE
@@ -360,7 +366,7 @@ class Light:
         self._configuration.restarted(now)
 
     def _set_up(self, now: float) -> None:
-        """Ask for what the light does not send by itself, when it is found or has restarted."""
+        """Request what a light does not send by itself, when it is heard or has restarted."""
         interval = self.settings.status_interval
         if interval > 0:
             self._target.send(
@@ -389,7 +395,7 @@ class Light:
         """Return why requests cannot reach the light, for people; '' if they can."""
         if self.connected:
             return ''
-        # Without a link nothing can be heard: that is the reason, and silence its consequence.
+        # Without a link no heartbeat can be heard, so the failure of the link is the reason.
         reason = self._link_failure or f'no heartbeat for {format_seconds(now - self.heard_at)}'
         return f'light {self.address} is lost: {reason}'
 
@@ -420,11 +426,11 @@ class Light:
         """
         Switch the light on or off; ``done`` is called once with the result.
 
-        While a higher source holds the light, this is not sent but remembered.
+        While a higher source holds the light, the request is not sent but remembered.
 
-        Off overtakes: requests to switch on that are not accepted yet are cancelled.
+        An OFF overtakes: requests for ON that are not accepted yet are cancelled.
 
-        :param detail: how it was asked for, which :class:`LightSwitched` repeats.
+        :param detail: how it was requested, for :class:`LightSwitched`.
         :param is_stream: whether a later one of a stream replaces it while it waits.
         """
         if self._can_reach(now, done, self._claim(source, now, enabled=on)):
@@ -436,7 +442,7 @@ class Light:
         return bool(self._sources.holder and self._sources.refusal(source))
 
     def release(self, source: str, now: float) -> None:
-        """Note that a source needs the light no more: the next lower one gets it."""
+        """Release the light: the next lower source that has claimed it then holds it."""
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.release(source, now), now)
         self._changed(self, now)
@@ -453,7 +459,7 @@ class Light:
             return ''
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.claim(source, now), now)
-        # A request to a lost light has no effect later, but an OFF replaces the ON before it.
+        # A request to a lost light has no effect later, but an OFF replaces a remembered ON.
         if self.connected or enabled is False:
             self._sources.remember(source, enabled=enabled, brightness=brightness)
         return self._sources.refusal(source)
@@ -490,7 +496,7 @@ class Light:
             now, CommandStatus.CANCELLED, self.address, lambda command: command.command == kind)
 
     def _send_desired(self, now: float) -> None:
-        """Send the values that the source that holds the light now has requested before."""
+        """Send the values that the new holder of the light has requested before."""
         holder, desired = self._sources.holder, self._sources.desired
 
         def done(result: Result, now: float) -> None:
@@ -506,7 +512,7 @@ class Light:
         if desired.brightness is not None and not (
                 desired.enabled is False and self._brightness_is_switch):
             self._configuration.set_brightness(desired.brightness, now)
-        # A light that went off after silence must not flash.
+        # A light that was switched off after silence must not be switched on again.
         if desired.enabled and not self._is_silent(now):
             self._automatic = None
             self._switch(True, now, done, way)
@@ -580,7 +586,7 @@ class Light:
         :param brightness: %, checked.
         """
         def failed(result: Result, now: float) -> None:
-            # While another source holds the light, a setpoint is kept.
+            # While another source holds the light, a setpoint is remembered.
             if not self.is_held_by_other(source):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
@@ -589,7 +595,7 @@ class Light:
 
     def set_desired(self, values: Changes, now: float) -> None:
         """
-        Have values sent as soon as the light has reported its configuration.
+        Send values as soon as the light has reported its configuration.
 
         :param values: by name, checked, except against the limits that the light reports.
         """
@@ -597,7 +603,7 @@ class Light:
         self._changed(self, now)
 
     def cancel(self, now: float) -> None:
-        """End all requests, so that the next one is sent at once: a node's last to its light."""
+        """End all requests, so that the OFF at shutdown is sent at once."""
         self._automatic = None
         self._switching.cancel('cancelled', now)
         self._configuration.cancel(now)
@@ -605,7 +611,7 @@ class Light:
         self._changed(self, now)
 
     def shut_down(self, now: float, done: Done) -> None:
-        """Switch the light off at once, whatever holds it: the last request to it."""
+        """Switch the light off at once, whichever source holds it; no other request may follow."""
         self.cancel(now)
         self._sources = LightSources(None)
         if self._can_reach(now, done):
@@ -638,14 +644,14 @@ class Light:
             refresh.done(refresh.result(now), now)
 
     def request_status(self, now: float) -> None:
-        """Ask for a status, where no such request is under way."""
+        """Ask for a status, unless such a request is under way."""
         self._target.request_status(now)
 
     # Time
 
     def poll(self, now: float) -> None:
         """Do what is due."""
-        # The sum and not the difference, which is what next_deadline() returns: floats differ.
+        # Compute the same sum as next_deadline(); the difference is rounded differently.
         if self.connected and now >= self.heard_at + self.settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
         if now >= self._question_due:
@@ -666,16 +672,16 @@ class Light:
     @property
     def _question_due(self) -> float:
         """
-        When the light is asked for a status.
+        Return the time at which the light is asked for a status, s.
 
-        It may have no heartbeat, and have been asked to send its status less often than that.
+        The light may have no heartbeat, and a status interval above the heartbeat timeout.
         """
         silent_since = max(self.heard_at, self._asked_at) if self.connected else math.inf
         return min(self._status_due, silent_since + self._longest_silence)
 
     @property
     def _silence_due(self) -> float:
-        """When the light is switched off since nothing was requested, s."""
+        """Return the time at which the light is switched off after silence, s."""
         # A light that sends no status may be on if it was switched on.
         may_be_on = self._last_switch[0] if self._enabled is None else self._enabled
         if (not self.settings.off_after_silence or not may_be_on or not self.connected
@@ -687,8 +693,8 @@ class Light:
     def _automatic_due(self) -> float:
         if self._automatic is None or not self.connected:
             return math.inf
-        # Off overtakes a request; on waits for it. It does not wait in the queue, since a restart
-        # of the light ends it.
+        # An OFF overtakes requests. An ON waits for them outside the queue, so that a restart of
+        # the light can cancel it.
         if not self._automatic.on:
             return self._automatic.due
         return math.inf if self._switching else max(self._automatic.due, self._earliest_on())
@@ -741,7 +747,7 @@ class _Refresh:
     """
     A request for COMPONENT_INFORMATION_BASIC and ILLUMINATOR_STATUS.
 
-    It is a success when a status has come: not every light has an identity.
+    It succeeds when a status has come: not every light has an identity.
 
     :param outcomes: '' for a message that has come, else why it has not.
     """

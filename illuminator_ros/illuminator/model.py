@@ -38,12 +38,12 @@ ABSOLUTE_ZERO_C = -273.15
 MAX_TEMPERATURE_C = 1000.0
 # Longest plausible strobe period, s; larger reports are invalid.
 MAX_STROBE_PERIOD = 3600.0
-# A light rounds values to its own steps, which does not make another configuration.
-# % for brightness and duty cycle; relative for the strobe period.
+# A light may round values to its own steps; differences within these are not changes. % for
+# brightness and duty cycle; relative for the strobe period.
 PERCENT_STEP = 0.5
 PERIOD_STEP = 0.01
 FLOAT32_STEP = 1e-6
-# s; a shorter period is a computed 0.
+# s; a shorter period is a 0 with a rounding error.
 SHORTEST_PERIOD = 1e-6
 
 
@@ -85,7 +85,7 @@ class Mode(IntEnum):
         return self.name.lower()
 
 
-# The modes that can be asked for; UNKNOWN can only be reported.
+# The modes that can be commanded; UNKNOWN can only be reported.
 MODES = {mode.label: mode for mode in Mode if mode is not Mode.UNKNOWN}
 _MODES = {int(mode): mode for mode in Mode}
 
@@ -98,7 +98,7 @@ def float32(value: float) -> float:
         return math.copysign(math.inf, value)
 
 
-# A light reports the same numbers again and again.
+# Cached, since a light reports the same numbers repeatedly.
 @lru_cache(maxsize=256)
 def shortest(value: float) -> float:
     """Return the shortest decimal number that is this float32: 60.1 for 60.099998474."""
@@ -115,8 +115,8 @@ class StrobeRange:
     """
     The strobe periods that a light reports to be possible, s.
 
-    As sent, so they may be anything: see :attr:`known`. Both are 0 where they are not known, as
-    in ArduSub.
+    They are as sent and may be invalid, see :attr:`known`. Both are 0 where the light does not
+    know them, as in ArduSub.
     """
 
     min_strobe_period: float = 0.0
@@ -124,7 +124,7 @@ class StrobeRange:
 
     @property
     def known(self) -> bool:
-        """Whether the light reports them."""
+        """Whether the light reports a valid range."""
         low, high = self.min_strobe_period, self.max_strobe_period
         return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
 
@@ -141,7 +141,7 @@ class InvalidValue(ValueError):
 @dataclass(frozen=True, slots=True)
 class Configuration:
     """
-    What MAV_CMD_DO_ILLUMINATOR_CONFIGURE carries.
+    The fields of MAV_CMD_DO_ILLUMINATOR_CONFIGURE.
 
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`; 0 means no strobe.
@@ -157,8 +157,8 @@ class Configuration:
         """
         Return param1 to param4 of the command.
 
-        A light whose mode is unknown is asked for internal control: it is the one mode in which
-        the rest of the command means anything, and 0 would be denied.
+        An unknown mode is sent as internal control: the other parameters take effect only in that
+        mode, and 0 would be denied.
         """
         mode = self.mode or Mode.INTERNAL_CONTROL
         return float(mode), self.brightness, self.strobe_period, self.strobe_duty_cycle
@@ -167,7 +167,7 @@ class Configuration:
         """
         Return the names of the fields in which two configurations differ.
 
-        :param step: whether a light's own rounding is passed over; float32's always is.
+        :param step: whether a light's own rounding is ignored; float32 rounding always is.
         """
         percent = FLOAT32_STEP, PERCENT_STEP if step else 0.0
         period = PERIOD_STEP if step else FLOAT32_STEP, SHORTEST_PERIOD
@@ -203,7 +203,7 @@ def checked(name: str, value: object, strobe_range: StrobeRange | None = None) -
         if isinstance(value, Mode) and value in MODES.values():
             return value
         if not isinstance(value, str) or value not in MODES:
-            raise InvalidValue(f'mode {reprlib.repr(value)} is none of {", ".join(MODES)}')
+            raise InvalidValue(f'mode {reprlib.repr(value)} is not one of {", ".join(MODES)}')
         return MODES[value]
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidValue(f'{name} {reprlib.repr(value)} is not a number')
@@ -218,13 +218,13 @@ def checked(name: str, value: object, strobe_range: StrobeRange | None = None) -
 
 
 def _check_period(period: float, strobe_range: StrobeRange | None) -> None:
-    """Compare as float32, which is what the light compares: 0.1 there is more than 0.1."""
+    """Compare as float32, as the light does: the float32 of 0.1 is above 0.1."""
     sent = float32(period)
     if period and strobe_range and strobe_range.known and not (
             strobe_range.min_strobe_period <= sent <= strobe_range.max_strobe_period):
         raise InvalidValue(
-            f'strobe_period {period:g} s is outside what the light reports: 0 (no strobe) or '
-            f'{shortest(strobe_range.min_strobe_period):g} to '
+            f'strobe_period {period:g} s is outside the range that the light reports: 0 (no '
+            f'strobe) or {shortest(strobe_range.min_strobe_period):g} to '
             f'{shortest(strobe_range.max_strobe_period):g} s')
 
 
@@ -280,7 +280,7 @@ class SafetyLimits:
         if not strobe_range.known or float32(self.min_strobe_period) <= longest:
             return ''
         return (f'min_strobe_period {self.min_strobe_period:g} s is above the '
-                f'{shortest(longest):g} s that the light can do')
+                f'longest period of the light, {shortest(longest):g} s')
 
 
 @dataclass(slots=True)
@@ -289,7 +289,7 @@ class Status:
     An ILLUMINATOR_STATUS. A field that is not plausible is None and named in ``invalid``.
 
     :param uptime_ms: ms since the light started, wrapping at 2**32.
-    :param mode_bitmask: as sent; lights differ in what it means.
+    :param mode_bitmask: as sent; its meaning differs between lights.
     :param error_flags: as sent; see :class:`ErrorFlag`.
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
@@ -313,7 +313,7 @@ class Status:
 
     @classmethod
     def from_message(cls, message: IlluminatorStatus) -> Status:
-        """Read a message. Each content is accepted: a wrong field is marked, not raised."""
+        """Read a message. Any content is accepted: an invalid field is marked, not raised."""
         brightness, duty = message.brightness, message.strobe_duty_cycle
         strobe_range = _strobe_range(message.min_strobe_period, message.max_strobe_period)
         if (message.enable in (0, 1) and message.mode in _MODES and 0.0 <= brightness <= 100.0
@@ -349,14 +349,14 @@ class Status:
 
     @property
     def complete(self) -> bool:
-        """Whether every part of the configuration is believable."""
+        """Whether each number of the configuration is plausible."""
         return None not in (self.brightness, self.strobe_period, self.strobe_duty_cycle)
 
     def configuration(self, otherwise: Configuration) -> Configuration:
         """
         Return the configuration that the light reports.
 
-        :param otherwise: what stands in for a part that is not believable.
+        :param otherwise: its values replace values that are not plausible.
         """
         brightness, duty = self.brightness, self.strobe_duty_cycle
         period = self.strobe_period
@@ -382,8 +382,8 @@ def unexpected_differences(
     There are two good reasons: it dims itself because it is hot, and under external sync its
     output follows another signal.
 
-    :param external: whether external sync is to count as a reason.
-    :param step: whether the light's own rounding is passed over.
+    :param external: whether external sync counts as a reason.
+    :param step: whether the light's own rounding is ignored.
     """
     names = confirmed.differences(reported, step=step)
     # A status without a mode does not contradict.

@@ -21,9 +21,9 @@ from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.rotation import flip, Quaternion
 
-# s for which an attitude counts.
+# s for which an attitude is valid.
 ATTITUDE_LIFETIME = 2.0
-# Mounts, and vehicles; more are ignored.
+# The most mounts, and the most vehicles; more are ignored.
 MAX_MOUNTS = 32
 
 

@@ -50,7 +50,7 @@ from ..payload.simulated import (
 )
 from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 
-# K by which the temperature must change to deserve a line of its own.
+# K by which the temperature must change for a line of its own.
 TEMPERATURE_STEP = 5.0
 # % of a strobe that is started by hand while the duty cycle is 0 %.
 DEFAULT_DUTY_CYCLE = 50.0
@@ -60,7 +60,7 @@ _celsius = number(-273.15, 1000.0)
 
 
 def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Change:
-    # 0 % is dark, so that a period alone would end the light.
+    # With a duty cycle of 0 %, a period alone would switch the light off.
     duty_cycle = (_number(words[1]) if len(words) > 1
                   else light.configuration.strobe_duty_cycle or DEFAULT_DUTY_CYCLE)
     return light.press(now, strobe_period=_number(words[0]), strobe_duty_cycle=duty_cycle)
@@ -207,7 +207,7 @@ class SimulatedIlluminator(SimulatedDevice):
 
     def _switch(self, on: bool) -> None:
         self.enabled = on
-        # With 0 % meaning off, ON restores the last brightness above 0.
+        # Where 0 % means off, ON restores the last brightness above 0 %.
         if (on and self.behaviour.brightness_is_switch and not self.configuration.brightness):
             self.configuration = replace(self.configuration, brightness=self._last_brightness)
 
@@ -334,7 +334,7 @@ def properties(
     settings: Values, address: mav.Address, several: bool = False,
 ) -> IlluminatorProperties:
     """
-    Return the light that settings describe.
+    Return the properties of the light that settings describe.
 
     :param several: whether its serial number must differ from those of other lights.
     :raises ValueError: if they contradict each other.

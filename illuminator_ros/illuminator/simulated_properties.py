@@ -99,8 +99,9 @@ class IlluminatorProperties:
     The properties of a simulated light.
 
     :param modes: the modes that it can be configured to.
-    :param mode_bitmask: as reported; None follows from the modes.
-    :param shifted_bitmask: whether mode_bitmask then has 1 << mode for a mode, else the mode.
+    :param mode_bitmask: as reported; None to compute it from the modes.
+    :param shifted_bitmask: whether it is computed from 1 << mode for each mode, else from the
+        mode.
     :param status_interval: s between statuses by default; 0 sends none.
     :param time_scale: factor by which it heats and cools faster than real time.
     :param behaviour: how it behaves at first, and without faults.

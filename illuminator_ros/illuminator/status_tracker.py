@@ -30,16 +30,16 @@ NO_CLOCK_TIME = 2.0
 # By how much a running light's uptime may lag behind our clock: s, and a share of the time.
 MAX_LAG = 0.5
 DRIFT = 0.05
-# s by which a light may seem to have started before its last status came: that one was late.
+# s by which a light may seem to have started before its last status came, since that was late.
 BOOT_SLACK = 0.05
 # s; a frame is not delayed by more.
 MAX_DELAY = 30.0
-# The same where a second status proves it, s.
+# The same as BOOT_SLACK where a second status proves the restart, s.
 PROVED_BOOT_SLACK = 2.0
 # s between the two statuses that prove a restart, and by how much their clocks may differ.
 RESTART_PROOF_TIME = 0.1
 RESTART_PROOF_ERROR = 0.05
-# The same where the light seems to have started before its last status.
+# The same as RESTART_PROOF_TIME where the light seems to have started before its last status.
 CLOCK_JUMP_PROOF_TIME = 5.0
 # s for which a status is compared with later ones. With an oscillator without a crystal, whose
 # error is 2 %, the second status after a change confirms it.
@@ -55,7 +55,7 @@ def uptime_difference(new_ms: int, old_ms: int) -> int:
 
 
 class Uptime(Enum):
-    """The meaning of an uptime beside those before."""
+    """The meaning of an uptime compared with those before."""
 
     RUNNING = 'running'
     RESTARTED = 'restarted'
@@ -65,12 +65,13 @@ class Uptime(Enum):
 
 class UptimeClock:
     """
-    Tells from uptimes whether a light runs on or has restarted, or whether a frame is late.
+    Determines from uptimes whether a light has restarted, or whether a frame is late.
 
-    A frame that was delayed has a lower uptime, too. So a restart is proved by a second status
-    whose uptime goes on from the first as time does, unless the first is older than frames get.
+    A delayed frame has a lower uptime, too. So a second status must prove a restart: its uptime
+    has advanced from the first uptime by the time that has passed. A status that lags by more than
+    :data:`MAX_DELAY` needs no proof.
 
-    :ivar is_suspecting: whether another status is needed to tell whether the light has restarted.
+    :ivar is_suspecting: whether another status must show whether the light has restarted.
     """
 
     def __init__(self) -> None:
@@ -100,7 +101,7 @@ class UptimeClock:
     ) -> Uptime:
         elapsed = now - last_at
         if uptime_ms == last_ms:
-            # The same status twice or within a millisecond, or a light that has no clock.
+            # A repeated status, two statuses within a millisecond, or a light without a clock.
             is_same = elapsed < NO_CLOCK_TIME and (self._has_clock or not was_lost)
             if is_same:
                 return Uptime.RUNNING
@@ -135,25 +136,26 @@ class UptimeClock:
 
 class SendingTimes:
     """
-    Tells when statuses were sent, at the latest, from their uptimes.
+    Computes from the uptimes the latest time at which each status can have been sent.
 
-    A frame that was delayed has an uptime that lags behind those of quicker frames, by which the
-    difference between the clocks is known. No error of the light's clock is allowed for, since
-    that would make delayed statuses look new: those of a slow clock look old instead, by the
-    error times :data:`COMPARED_TIME` at most.
+    The uptime of a delayed frame lags behind those of quicker frames, which give the difference
+    between the clocks. The light's clock is taken to be exact, since an allowance would make
+    delayed statuses look new. The statuses of a slow clock look old instead, by at most its error
+    times :data:`COMPARED_TIME`.
     """
 
     def __init__(self) -> None:
         self._last: Status | None = None
         self._last_at = -math.inf
-        # Without wraps, from the first status on.
+        # ms since the first status, without wraps.
         self._running_ms = 0
-        # The uptimes differ by multiples of this, 0 means no clock; and whether different
-        # statuses had the same: the light counts in such steps, and not only sends so often.
+        # The uptimes differ by multiples of this, 0 means no clock; and whether different statuses
+        # had the same uptime, so that this is the step of the clock and not just the interval of
+        # the statuses.
         self._step_ms = 0
         self._has_repeated = False
-        # The least difference between our clock and the uptime, s, in this half of the time for
-        # which statuses are compared and in the last one, and when this one ends.
+        # The least difference between our clock and the uptime, s, in this half of COMPARED_TIME
+        # and in the half before, and the end of this half.
         self._least = self._least_before = math.inf
         self._half_ends = -math.inf
 
@@ -161,8 +163,8 @@ class SendingTimes:
         """
         Return the latest time at which a status that has just come can have been sent, s.
 
-        The second value is whether the uptimes show that. Where the light has no clock, or
-        there is nothing to compare with, the status counts as sent when it came.
+        The second value is whether the uptimes show that. Where the light has no clock, or another
+        status to compare is missing, the status counts as sent when it came.
         """
         if self._last is not None:
             ahead_ms = uptime_difference(status.uptime_ms, self._last.uptime_ms)
@@ -176,7 +178,7 @@ class SendingTimes:
         known = min(self._least, self._least_before)
         running, step = self._running_ms / 1000, self._step_ms / 1000
         self._least = min(self._least, now - running)
-        # One of the same millisecond as another one was sent before that one came.
+        # A status with the uptime of the last one was sent before the last one came.
         is_equal = self._last is not None and status.uptime_ms == self._last.uptime_ms
         latest = math.nextafter(self._last_at, 0.0) if is_equal and step <= MAX_STEP else now
         self._last, self._last_at = status, self._last_at if is_equal else now
@@ -187,20 +189,21 @@ class SendingTimes:
         return min(latest, running + known + step), step <= MAX_STEP
 
 
-# Changes back to a state shown before that prove several lights: the sixth status of A B A B A B
-# is the fourth. Another sender that switches a light on, off and on again makes one.
+# Returns to an earlier state that prove several lights: the sixth status of A B A B A B is the
+# fourth return. Another sender that switches a light on, off and on again causes one.
 ENOUGH_EVIDENCE = 4
 # Evidence does not grow beyond this, so that the verdict ends soon after the contradiction does.
 MAX_EVIDENCE = 6
 # Evidence that a status removes if it agrees with its predecessor. One status in ten of two lights
 # may get lost; flashing one light may make each third status differ.
 REPEAT_PENALTY = 2
-# Statuses that are remembered, and states of them, one for each light.
+# How many statuses are remembered, and how many states, one for each light.
 MAX_RECENT = 8
 MAX_STATES = 4
-# s between two starting times that are those of two lights: the delay of a line varies by less.
+# s; starting times that differ by this are those of two lights: the delay of a line varies by
+# less.
 CLOCK_STEP = 1.5
-# s for which a light that was started at another time counts after its last status.
+# s for which a light counts after its last status.
 SENDER_TIME = 10.0
 # Returns to a starting time that prove a light.
 ENOUGH_RETURNS = 2
@@ -209,7 +212,7 @@ GAP_MARGIN = 1.2
 
 
 class _Sender:
-    """A light, by a value that its statuses share: its number, or its starting time."""
+    """A light, identified by a value that its statuses share: sender number or starting time."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -220,7 +223,7 @@ class _Sender:
 
 class _Senders:
     """
-    Lights that a value distinguishes; one is proved when statuses return to it.
+    Lights that a value distinguishes; a light is proved when statuses return to its value.
 
     :param is_same: whether two values are those of one light.
     :ivar newest: the number of the light that has sent the newest status.
@@ -264,7 +267,7 @@ def _is_same_start(start: float, other: float) -> bool:
 
 class AddressConflict:
     """
-    Tells whether several lights send from one address.
+    Determines whether several lights send from one address.
 
     ILLUMINATOR_STATUS does not say which light it is of: ArduSub sends one for each of its
     lights from the autopilot's address, and two lights may have been given the same ids. Lights
@@ -284,7 +287,7 @@ class AddressConflict:
         self.senders: frozenset[int] = frozenset()
         self.can_follow = True
         self._evidence = 0
-        # With the last one at the end, and when each was shown.
+        # The last one is at the end. Each has the time at which it was shown.
         self._states: list[tuple[Status, float]] = []
         self._gaps: list[float] = []
         self._by_start = _Senders(_is_same_start)
@@ -294,7 +297,7 @@ class AddressConflict:
 
     def take(self, status: Status, now: float, *, commanded: bool, sender: int = 0) -> None:
         """
-        Take a status, late ones too.
+        Take a status, even a late one.
 
         :param sender: of the message.
         :param commanded: whether a command of ours may have changed the light.
@@ -304,7 +307,7 @@ class AddressConflict:
         equal = self._recent_uptimes.count(uptime)
         has_clock = equal < len(self._recent)
         if has_clock and equal and status in self._recent:
-            # The same frame, by another way, on which its number may lag far behind.
+            # The same frame by another route, on which its sequence number may lag far behind.
             return
         if has_clock or not self._recent:
             self._by_start.take(now * 1000.0 - uptime, now)
@@ -375,7 +378,7 @@ class StatusTracker:
     """
     Puts the statuses of one address in order.
 
-    :ivar conflict: whether they are those of several lights.
+    :ivar conflict: determines whether they are those of several lights.
     """
 
     def __init__(self) -> None:
@@ -385,7 +388,7 @@ class StatusTracker:
 
     @property
     def is_suspecting(self) -> bool:
-        """Whether another status is needed soon to tell whether the light has restarted."""
+        """Whether another status must soon show whether the light has restarted."""
         return self._clock.is_suspecting
 
     def take_uptime(self, status: Status, now: float, *, was_lost: bool) -> Uptime:
@@ -408,7 +411,7 @@ class StatusTracker:
         conflict = self.conflict
         conflict.take(status, now, commanded=commanded, sender=sender)
         if conflict.detected:
-            # The uptimes of several lights say nothing about one another.
+            # The uptimes of several lights cannot be compared.
             self._clock = UptimeClock()
             return Report(status, now, False, True, conflict.sender, conflict.senders,
                           conflict.span), False

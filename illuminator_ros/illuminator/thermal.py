@@ -35,7 +35,7 @@ class ThermalProperties:
     A first-order thermal model with two thresholds, each with hysteresis.
 
     :param ambient: degC.
-    :param rise: K above ambient that full power leads to in the end.
+    :param rise: K above ambient at full power, in the steady state.
     :param time_constant: s.
     :param throttle_at: degC at which brightness is cut to ``throttle_to`` (a share, 0..1) ...
     :param throttle_until: ... until it is cooler than this, degC.

@@ -38,7 +38,7 @@ class AnswerQueue:
     """
     The answers of one service.
 
-    Answers may come in any thread; all else is for the thread that takes the requests.
+    Methods are for the thread that takes the requests, unless they are callable in any thread.
 
     :param spread: s, the limit in place of :data:`MAX_SPREAD`.
     """

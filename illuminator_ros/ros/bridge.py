@@ -74,7 +74,8 @@ class Bridge:
     :param types: the kinds of payloads that the parameter ``payloads`` may name.
     :param payload: the default of that parameter.
     :param url: the connection URL if the command line has one outside of the parameters, else ''.
-    :raises ParameterError: if a parameter is wrong, or one that restricts something misspelt.
+    :raises ParameterError: if a parameter is wrong, or if one that restricts something is
+        misspelt.
     """
 
     def __init__(
@@ -159,8 +160,8 @@ class Bridge:
         self._nodes.join(deadline)
         for payload in self._payloads:
             payload.close()
-        # At once, so that other nodes learn of the end; the first one last, whose publisher of
-        # parameter events the others use.
+        # Destroy them at once, so that other nodes learn of the end; the first one last, since the
+        # others use its publisher of parameter events.
         for node in reversed(self.nodes):
             node.destroy_node()
 

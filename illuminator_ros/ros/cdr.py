@@ -46,7 +46,7 @@ _field_types = operator.methodcaller('get_fields_and_field_types')
 
 def serializer(type_: type) -> Callable[[object], object]:
     """
-    Return what a publisher publishes for a value of ``data``.
+    Return a function that makes the message to publish from a value of ``data``.
 
     :param type_: a message class; messages of unknown classes are not serialised.
     """
@@ -81,7 +81,8 @@ def deserializer(type_: type[object]) -> Callable[[bytes], tuple[object, ...]]:
     It returns named tuples of the fields, and tuples for arrays. It raises ValueError for bytes
     that are not such a message.
 
-    :raises TypeError: if the class has a sequence, or another type of variable size but a string.
+    :raises TypeError: if the class has a sequence, or another type of variable size except a
+        string.
     """
     formats: list[str] = []
     classes: dict[str, type] = {}
@@ -116,7 +117,7 @@ def _message(type_: type[object], formats: list[str], classes: dict[str, type]) 
     """
     Append the formats of the values of a message; return an expression of ``values`` for it.
 
-    :param classes: the names in it; the message's is added.
+    :param classes: the classes that the expression names; the message's is added.
     """
     fields = {name: _field(field, formats, classes)
               for name, field in _field_types(type_).items()}

@@ -30,7 +30,8 @@ from .parameters import ParameterError, ParameterSpec, Values
 from ..payload.command_sources import DEFAULT, SourceSettings
 
 SOURCE_PARAMETERS = (
-    ParameterSpec('sources', [], 'sources of commands, the highest first; empty = all are alike'),
+    ParameterSpec('sources', [],
+                  'sources of commands, the highest first; empty = commands have no sources'),
     ParameterSpec('source_timeout', 0.0,
                   'silence after which a source loses the device; 0 = never',
                   's', 0.0, 3600.0),
@@ -49,7 +50,7 @@ def source_settings(values: Values) -> SourceSettings | None:
             raise ParameterError('source_timeout: is given, but sources is empty')
         return None
     for name in names:
-        # Names that a topic may have; the plain commands already use one of them.
+        # Names that a topic may have, except ``cmd``, which the plain commands use.
         if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', name) or name == 'cmd':
             raise ParameterError(f'sources: {reprlib.repr(name)} is not a valid name of a source')
         if names.count(name) > 1:
@@ -59,7 +60,7 @@ def source_settings(values: Values) -> SourceSettings | None:
 
 
 def prefixes(sources: SourceSettings | None) -> dict[str, str]:
-    """Return by source with what the names of its topics and services begin."""
+    """Return for each source the prefix of the names of its topics and services."""
     return {DEFAULT: ''} | {
         name: f'{name}/' for name in (sources.names if sources else ()) if name != DEFAULT}
 
@@ -85,7 +86,7 @@ def holder_values(holder: str | None, since: float, now: float) -> dict[str, Val
     Return the source that holds a device for /diagnostics.
 
     :param holder: '' if none does; None without sources.
-    :param since: when that began, s.
+    :param since: when the holder changed last, s.
     """
     if holder is None:
         return {}

@@ -33,7 +33,7 @@ ABSENCE_DELAY = 5.0
 
 
 class DeviceNode(Protocol):
-    """The node of a device, while there is one."""
+    """A node that serves a device, or none yet."""
 
     source: DiagnosticsSource
 

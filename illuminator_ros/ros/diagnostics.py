@@ -94,7 +94,7 @@ class LinkDiagnostics:
     The link at one moment, for any thread.
 
     :param unanswering: the devices whose last command got no acknowledgement.
-    :param values: those of the status ``link`` that are the same for all devices.
+    :param values: the values of the status ``link`` that are the same for all devices.
     :param devices: values of single devices, by address.
     """
 
@@ -188,7 +188,7 @@ def link_report(
 
     :param device: the device of the node, None if there is none yet.
     :param kind: of device, such as ``light``.
-    :param absence: why there is none, for people.
+    :param absence: why the node has no device, for people.
     :param started: when the node was started, s.
     :param count: how many devices of this kind are known, None where there is one at most.
     :param limit_reached: whether there are more, which are ignored.

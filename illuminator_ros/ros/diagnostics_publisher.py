@@ -67,7 +67,7 @@ class DiagnosticsPublisher:
         self._url = url
         self._period = period
         self._lock = threading.Lock()
-        # When each is due, and the levels that were published last.
+        # When each source is due, and the levels that were published last.
         self._sources: dict[DiagnosticsSource, tuple[float, list[bytes]]] = {}
 
     def add(self, source: DiagnosticsSource) -> None:
@@ -88,7 +88,7 @@ class DiagnosticsPublisher:
         """
         Publish everything that is due or has changed.
 
-        :param tolerance: how much too early it may be, s.
+        :param tolerance: how early a publication may be, s.
         """
         with self._lock:
             sources = list(self._sources)

@@ -86,7 +86,7 @@ class NodeExecutor(SingleThreadedExecutor):
         self._log = log
         self._entities: _Entities | None = None
         self._calls: deque[Callable[[], None]] = deque()
-        # Those with answers that wait; only the executor's thread changes the set.
+        # Queues with answers that wait; only the executor's thread changes the set.
         self._queues: set[AnswerQueue] = set()
         self._stale = threading.Event()
         self._stale.set()
@@ -196,8 +196,9 @@ class NodeExecutor(SingleThreadedExecutor):
         response: object,
     ) -> None:
         send = functools.partial(_send, service, header, response)
-        # The middleware waits up to 0.1 s for a client that it does not know yet. Then the
-        # executor's thread sends the answer: it must not hold up the link.
+        # The middleware waits up to 0.1 s before it sends an answer to a client that it has not
+        # discovered yet. The executor's thread then sends the answer, so that the link does not
+        # wait.
         if header.request_id.sequence_number <= 1:
             send = functools.partial(self.call, send)
         now = time.monotonic()
@@ -215,7 +216,7 @@ class NodeExecutor(SingleThreadedExecutor):
     def _timeout(self, timeout: float | None) -> float | None:
         """Return how long to wait for entities, s, None for ever."""
         if self._calls:
-            # One before them has failed.
+            # A call before these has failed.
             return 0.0
         due = min((queue.next_deadline() for queue in self._queues), default=math.inf)
         if due < math.inf:
@@ -290,5 +291,5 @@ class _Entities:
                 [self._subscriptions[one] for one in wait_set.get_ready_entities('subscription')])
 
     def close(self) -> None:
-        """Let the entities go."""
+        """Release the entities."""
         self._stack.close()

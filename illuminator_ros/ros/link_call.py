@@ -55,10 +55,10 @@ class LinkCalls:
         """
         Start a request, and wait for its answer for :data:`~..mavlink.link.CALLER_WAIT` at most.
 
-        It waits only if the last answer came so soon, and no other request waits.
+        It waits only if the last answer came within that time, and no other request waits.
 
         :param answer: called once with the answer, in any thread.
-        :param refusal: returns the answer for a reason why the request cannot be carried out.
+        :param refusal: returns the answer for a reason why the request cannot be executed.
         """
         with self._lock:
             busy = self._pending >= self._limit
@@ -91,7 +91,7 @@ class LinkCalls:
 
 class LatestOnly(Generic[T]):
     """
-    Carries out one request after the other; of those that come meanwhile only the newest.
+    Executes one request after the other; of those that come meanwhile only the newest.
 
     For turns of the link.
 
@@ -105,7 +105,7 @@ class LatestOnly(Generic[T]):
         self._is_running = False
 
     def offer(self, value: T, now: float) -> None:
-        """Carry out a request, unless a newer one comes before it is sent."""
+        """Execute a request, unless a newer one comes before it is started."""
         self._waiting[:] = [value]
         if not self._is_running:
             self._start_next(now)

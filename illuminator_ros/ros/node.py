@@ -43,10 +43,10 @@ STATE_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-# Matches reliable and best-effort publishers. Messages may be lost, the first after a start of the
-# publisher most of all; the next one of a stream replaces them.
+# Matches reliable and best-effort publishers. Messages may be lost, especially the first ones of a
+# publisher; the next one of a stream replaces them.
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-# Of commands that nothing repeats. Matches reliable publishers only.
+# For commands that are not repeated. Matches reliable publishers only.
 SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Requests that the middleware queues while others are taken, so that each gets an answer.
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

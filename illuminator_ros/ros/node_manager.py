@@ -38,7 +38,7 @@ RETRY_DELAYS = (0.5, 30.0)
 @dataclass(eq=False)
 class NodeRequest:
     """
-    A node that is needed; each request is one of its own, also where others have its values.
+    A request for a node; requests with equal values are still different requests.
 
     :param device: the device of the node, for people.
     :param serve: gives the node its interface; called by :meth:`NodeManager.work`.
@@ -84,7 +84,7 @@ class NodeManager:
         """
         Make a node soon; callable from any thread.
 
-        A failure is tried again.
+        A failed attempt is repeated, unless a parameter is wrong.
         """
         with self._lock:
             self._wanted.append(request)
@@ -144,7 +144,8 @@ class NodeManager:
         node = PayloadNode(
             request.name, first=self._first, namespace=self._first.get_namespace(),
             context=self._first.context, cli_args=self._arguments, use_global_arguments=False,
-            # Its types are those of the first node, and the service takes 0.13 MB.
+            # The service takes 0.13 MB, and the service of the first node describes the same
+            # types.
             parameter_overrides=[Parameter('start_type_description_service', value=False)])
         try:
             request.serve(node)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The parameter services of a node whose parameters live in a device.
+The parameter services of a node whose parameters are kept by a device.
 
 rclpy's own answer from synchronous callbacks: while one waits for the device, the executor
 is blocked, and each parameter of a list needs a command of its own. Here a set waits for the
@@ -50,7 +50,7 @@ Messages = Sequence[ParameterMessage]
 MAX_NAMES = 1000
 # Requests that wait in the middleware, each of the size of a few parameters.
 QUEUE_DEPTH = 100
-# s, beside the 0.78 s that a light may take: a set is answered within 0.9 s.
+# s, in addition to the 0.78 s that a light may take: a set is answered within 0.9 s.
 ANSWER_SPREAD = 0.1
 
 # Sets values in the device, in a turn of the link, given the time (s); calls its last argument
@@ -125,7 +125,7 @@ class ParameterServices:
     def _list(
         self, request: srv.ListParameters.Request, respond: Respond[srv.ListParameters.Response],
     ) -> None:
-        """Leave out what is not set, so that the output of ``ros2 param dump`` can be loaded."""
+        """Leave out unset parameters, so that the output of ``ros2 param dump`` can be loaded."""
         result = ListParametersResult()
         if self._is_short(request.prefixes):
             try:
@@ -165,7 +165,7 @@ class ParameterServices:
     def _set_each(
         self, messages: Messages, now: float, answer: Callable[[list[str]], None],
     ) -> None:
-        """Set each parameter for itself, those of the device all with one command."""
+        """Set each parameter separately, but those of the device with one command."""
         reasons = [self._check(message) for message in messages]
         changes = {message.name: _value(message)
                    for message, reason in zip(messages, reasons, strict=True)
@@ -234,5 +234,5 @@ def _result(reason: str) -> SetParametersResult:
 
 def _value(message: ParameterMessage) -> object:
     value = Parameter.from_parameter_msg(message).value
-    # As people write it, for the answer that refuses it.
+    # A list instead of an array, since a refusal quotes it.
     return list(value) if isinstance(value, array) else value

@@ -126,7 +126,7 @@ class ParameterSpec(NamedTuple):
         if wanted is list and isinstance(value, list | tuple):
             value = [entry for entry in value if entry != '']
         if value is False and 'off' in self.choices:
-            # For YAML, on the command line too, a bare off is a boolean.
+            # In YAML, on the command line too, a bare off is a boolean.
             value = 'off'
         if type(value) is not wanted:
             raise ParameterError(f'{self.name}: {value!r} is not {_TYPES[wanted][1]}')
@@ -250,9 +250,9 @@ def declare_read_only(
 
 def given_parameters(node: Node) -> Mapping[str, Parameter]:
     """
-    Return what the command line and parameter files give for a node, by name.
+    Return the parameters that the command line and parameter files give for a node, by name.
 
-    rclpy has no public way to values of the wrong type, such as an integer for a double, and to
+    rclpy has no public access to values of the wrong type, such as an integer for a double, and to
     parameters that are not declared.
 
     :raises RuntimeError: if rclpy has renamed the private attribute.
@@ -308,8 +308,8 @@ def ignored_parameters(node: Node, first: Node) -> list[str]:
                     name, node.list_parameters([], 0).names, 1, 0.75)))
         elif parameter.value not in (None, first.get_parameter(name).value):
             # None is an empty list.
-            warnings.append(f'parameter {name!r} is ignored here: that of '
-                            f'{first.get_fully_qualified_name()} holds')
+            warnings.append(f'parameter {name!r} is ignored here: the value of '
+                            f'{first.get_fully_qualified_name()} applies')
     return warnings
 
 
@@ -341,7 +341,7 @@ def ignored_sections(
 
 # Parameters that each node of rclpy has.
 _OF_RCLPY = {'use_sim_time', 'start_type_description_service'}
-# Of parts of a name in a parameter file (rcl_yaml_param_parser).
+# Patterns for wildcards in a name of a parameter file (rcl_yaml_param_parser).
 _WILDCARDS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
 
 
@@ -388,7 +388,7 @@ class DeviceParameters:
         return {name: given[name].value for name in self.specs if name in given}
 
     def show(self, values: Values) -> str:
-        """Set parameters to what the device reports; return '' or why that failed."""
+        """Set parameters to the reported values; return why that failed, '' if it did not."""
         self._showing = True
         try:
             result = self._node.set_parameters_atomically([
@@ -398,9 +398,10 @@ class DeviceParameters:
         return '' if result.successful else str(result.reason)
 
     def set_high(self, name: str, high: float) -> None:
-        """Show another upper end of the range of a number; its value is limited to it."""
+        """Show another upper end of the range of a number, which is at least its value."""
         value = self._node.get_parameter_or(name).value
-        # rclpy cannot change the descriptor of a parameter without a value; the first value does.
+        # rclpy cannot change the descriptor of a parameter without a value; the call after its
+        # first value can.
         if isinstance(value, float) and math.isfinite(high):
             self._showing = True
             try:

@@ -39,7 +39,7 @@ class Host(NamedTuple):
     The services that the bridge offers to the ROS half of one payload.
 
     :param node: the payload's own node.
-    :param frame_log: knows in which node's log the frames of a device are shown.
+    :param frame_log: shows the frames of a device in the log of its node.
     :param nodes: makes nodes of further devices.
     :param values: of the payload's read-only parameters.
     :param check_diagnostics: checks the levels at once; callable from any thread.
@@ -76,7 +76,7 @@ class ServedPayload:
         return {}
 
     def close(self) -> None:
-        """Remove what other programs would continue to show, before the nodes are destroyed."""
+        """Remove data that other programs would go on to show, before the nodes are destroyed."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class RosPayload:
     :param summary: the device, for ``--help``.
     :param examples: commands, for ``--help``.
     :param link_defaults: defaults of the link's parameters where it is the first payload.
-    :param mavlink_version: 1 or 2, which its devices need; None if both will do.
+    :param mavlink_version: the version that its devices need, 1 or 2; None for any.
     """
 
     node_name: str

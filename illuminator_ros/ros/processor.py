@@ -31,8 +31,8 @@ class LimitedYield:
     """
     Yields the processor to the threads that the calling thread has woken.
 
-    The kernel puts those on the same processor, where they otherwise wait until the calling
-    thread waits, too.
+    The kernel puts those on the same processor, where they otherwise wait until the calling thread
+    waits.
     """
 
     def __init__(

@@ -30,7 +30,7 @@ from ..mavlink.messages import Address
 # Lines of one kind in PERIOD, s; the last of those left out is written after it.
 BURST = 10
 PERIOD = 10.0
-# Kinds that are limited each for itself.
+# How many kinds are limited separately.
 MAX_KINDS = 256
 # Characters of such a line, enough for a traceback: a frame_id may have megabytes.
 MAX_LENGTH = 8000
@@ -48,7 +48,7 @@ class NodeLog:
     """
     Writes to the logger of a node, from any thread.
 
-    Writing never waits for the reader of stderr: that leads to an
+    Writing never waits for the reader of stderr, which leads to an
     :class:`~illuminator_ros.cli.output_queue.OutputQueue`.
     """
 
@@ -138,7 +138,7 @@ class NodeLog:
 
 class LogForwarder(logging.Handler):
     """
-    Shows what the modules without ROS log in the logs of nodes.
+    Writes the log lines of the modules without ROS to the logs of nodes.
 
     It takes the place of an earlier forwarder.
 
@@ -157,7 +157,7 @@ class LogForwarder(logging.Handler):
         self.adjust()
 
     def assign(self, address: Address, log: NodeLog | None) -> None:
-        """Have the node of a device, None for no longer, log what concerns that address."""
+        """Write the lines that concern an address to the log of its node, None to end that."""
         self._logs.pop(address, None)
         if log is not None:
             self._logs[address] = log

@@ -383,7 +383,7 @@ def successes(pair: Pair) -> list[bool]:
 @pytest.mark.parametrize(('values', 'commands', 'success', 'text'), [
     ({'brightness': 30.0, 'strobe_period': 2.0}, [(1, 30, 2, 7)], [True], ''),
     ({'brightness': 30.0, 'strobe_period': 20.0}, [(1, 30, 0, 7)], [False, True],
-     'strobe_period 20 s is outside what the light reports'),
+     'strobe_period 20 s is outside the range that the light reports'),
     ({'strobe_period': 20.0}, [], [False], 'strobe_period 20 s is outside'),
 ])
 def test_overrides_within_the_limits_are_sent_as_one_command(

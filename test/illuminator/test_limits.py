@@ -118,5 +118,5 @@ def test_a_limit_above_what_the_light_can_do_is_reported_and_the_light_does_not_
     _, pair = limited(strobe_period=0.1, max_strobe_period=0.2, strobe_duty_cycle=10.0)
 
     assert pair.snapshot.limit_exceeded.impossible == (
-        'min_strobe_period 0.34 s is above the 0.2 s that the light can do')
+        'min_strobe_period 0.34 s is above the longest period of the light, 0.2 s')
     assert [command.param3 for command in pair.commands(CONFIGURE)] == [0.0]

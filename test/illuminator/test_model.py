@@ -65,7 +65,7 @@ def test_a_valid_value_is_returned_as_it_is_sent(name: str, value: Any, expected
     ('strobe_period', 3600.001, r'out of range: 0 to 3600 s$'),
     *(('strobe_period', value, r'0 \(no strobe\) or 0\.05 to 10 s')
       for value in (0.0499, 10.0001)),
-    *(('mode', value, 'none of internal_control, external_sync') for value in (
+    *(('mode', value, 'not one of internal_control, external_sync') for value in (
         'unknown', 'INTERNAL_CONTROL', '', 1, None, True, ['external_sync'], model.Mode.UNKNOWN)),
 ])
 def test_an_invalid_value_is_refused_with_a_short_reason(

@@ -34,7 +34,7 @@ NUMBER, INTEGER, STRING, BOOLEAN = (
     ({'strobe_period': math.inf}, 'strobe_period inf is not a finite number'),
     ({'brightness': 101}, 'brightness 101 % is out of range: 0 to 100 %'),
     ({'brightness': 'bright'}, f"brightness 'bright' {NUMBER}"),
-    ({'mode': 1}, 'mode 1 is none of internal_control, external_sync'),
+    ({'mode': 1}, 'mode 1 is not one of internal_control, external_sync'),
     ({'frame_id': 7}, f'frame_id: 7 {STRING}'),
     ({'beam_range': -1.0}, 'beam_range: -1.0 m is out of range: 0 to 10000 m'),
     ({'system_id': 'one'}, f"system_id: 'one' {INTEGER}"),

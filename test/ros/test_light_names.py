@@ -121,7 +121,7 @@ def test_remapped_node_name_is_that_of_the_first_node_only(
 
     eventually(lambda: nodes(own_ros) == {'/spot', '/spot_1_244', '/belly'})
     bridge.wait_for('names: 1/243=bow is not used, since light 1/243 is served by the first node, '
-                    'spot: -r __node:=bow names that')
+                    'spot: -r __node:=bow renames it')
 
 
 def test_namespace_holds_for_all_nodes_and_remapping_for_the_named_one(
@@ -153,6 +153,6 @@ def test_each_node_takes_its_own_section_of_a_parameter_file_but_for_link_parame
     Parameters(own_ros, '/illuminator').wait(brightness=30.0, mode='internal_control')
     Parameters(own_ros, '/illuminator_1_244').wait(
         brightness=40.0, mode='external_sync', frame_id='stern')
-    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is ignored here: that of "
-                    '/illuminator holds')
+    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is ignored here: the value "
+                    'of /illuminator applies')
     assert bridge.count('ignored') == 1

@@ -65,9 +65,9 @@ def test_four_parameters_in_one_call_are_one_command_and_one_event(
     ('brightness', math.nan, 'brightness nan is not a finite number'),
     ('brightness', 'bright', "brightness 'bright' is not a number"),
     ('brightness', True, 'brightness True is not a number'),
-    ('strobe_period', 0.01, 'strobe_period 0.01 s is outside what the light reports: 0 (no '
-                            'strobe) or 0.05 to 10 s'),
-    ('mode', 'unknown', "mode 'unknown' is none of internal_control, external_sync"),
+    ('strobe_period', 0.01, 'strobe_period 0.01 s is outside the range that the light reports: '
+                            '0 (no strobe) or 0.05 to 10 s'),
+    ('mode', 'unknown', "mode 'unknown' is not one of internal_control, external_sync"),
     ('brightness', None, 'brightness cannot be deleted'),
     ('frame_id', 'other', 'frame_id is read-only: restart the node with -p frame_id:=VALUE'),
     ('banana', 1.0, 'banana'),
@@ -115,8 +115,8 @@ def test_strobe_of_a_light_whose_duty_cycle_is_zero_is_set_to_half_with_a_line(
     assert parameters.set(strobe_period=1)[0].successful
     assert parameters.get('strobe_period', 'strobe_duty_cycle') == [1.0, 50.0]
     assert parameters.types('strobe_period') == parameters.types('brightness')
-    bridge.wait_for('light 1/243: strobe_duty_cycle was 0 %, at which nothing strobes, and was '
-                    'set to 50 %')
+    bridge.wait_for('light 1/243: strobe_duty_cycle was 0 %, at which the light does not '
+                    'strobe, and was set to 50 %')
 
 
 def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(

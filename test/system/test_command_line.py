@@ -70,7 +70,7 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
      "'udpin://127.0.0.1:2', but the argument is 'udpin://127.0.0.1:1': give one of them only"),
     *(('bridge', f'--ros-args {arguments}', text) for arguments, text in (
         ('-p brightness:=.nan', 'parameter brightness nan is not a finite number'),
-        ('-p mode:=disco', "mode 'disco' is none of internal_control, external_sync"),
+        ('-p mode:=disco', "mode 'disco' is not one of internal_control, external_sync"),
         ('-p connection_url:=http://x',
          "parameter connection_url: connection URL 'http://x': unknown scheme 'http'"),
         ('-p names:=[belly]', "parameter names: 'belly' is not of the form 1/244=belly"),

@@ -45,7 +45,7 @@ REFRESH = 1.0
 LIFETIME = 5
 # s between publications of a beam that a gimbal turns.
 MOVE_INTERVAL = 0.1
-# For which a bridge that ends waits until its beam was removed.
+# The longest wait of a bridge that ends for the removal of its beam.
 REMOVAL_TIMEOUT = Duration(seconds=0.05)
 
 
@@ -53,8 +53,8 @@ def cone(length: float, angle: float, sides: int = SIDES) -> list[Point]:
     """
     Return the corners of the triangles, three for each, that a cone around +x consists of.
 
-    Its apex is the origin. Seen from outside the corners run counter-clockwise. It has no lid:
-    light does not end there.
+    Its apex is the origin. Seen from outside the corners run counter-clockwise. It has no base:
+    the light does not end there.
 
     :param length: along x, m.
     :param angle: the full opening angle, rad, less than pi.
@@ -71,7 +71,7 @@ def cone(length: float, angle: float, sides: int = SIDES) -> list[Point]:
 @dataclass(frozen=True)
 class Beam:
     """
-    How a beam is drawn, from the last plausible value of each field of the statuses.
+    The appearance of a beam, from the last plausible value of each field of the statuses.
 
     :param brightness: %.
     :param duty_cycle: % of the time in which it is lit, 100 without a strobe.
@@ -86,7 +86,7 @@ class Beam:
         """Return the beam after a status."""
         period, duty = status.strobe_period, status.strobe_duty_cycle
         if status.mode is Mode.EXTERNAL_SYNC or period == 0:
-            # Under external sync another signal makes the strobe.
+            # Under external sync another signal controls the strobe.
             duty = 100.0
         elif not (period and duty):
             duty = self.duty_cycle
@@ -127,12 +127,12 @@ class BeamPublisher:
         self._due = math.inf
         self._mounted_on = self.device_id = geometry.mounted_on
         self._direction = direction
-        # As it was published last, and when, s.
+        # The rotation that was published last, and the time of that, s.
         self._rotation: Quaternion | None = Quaternion()
         self._published_at = -math.inf
         self._marker = marker = Marker(
             ns=node.get_name(), type=Marker.TRIANGLE_LIST, frame_locked=True)
-        # Without a stamp, and locked to its frame, it is drawn where the light is now.
+        # Without a stamp, and locked to its frame, the beam is drawn where the light is now.
         marker.header.frame_id = geometry.frame_id
         marker.scale.x = marker.scale.y = marker.scale.z = 1.0
         marker.lifetime.sec = LIFETIME
@@ -148,7 +148,7 @@ class BeamPublisher:
             self._show(replace(self._beam, on=False))
 
     def poll(self) -> None:
-        """Publish a beam again that has not changed, or that a gimbal has turned."""
+        """Publish the beam again if that is due, or if a gimbal has turned it."""
         if time.monotonic() >= self._due:
             self._publish()
         else:
@@ -180,7 +180,7 @@ class BeamPublisher:
         # A beam in a wrong direction is worse than none.
         marker, alpha = self._marker, self._beam.alpha if rotation else 0.0
         self._published_at = time.monotonic()
-        # In real time, as viewers count it.
+        # In real time, as viewers measure the lifetime.
         self._due = self._published_at + REFRESH if alpha else math.inf
         marker.action = marker.ADD if alpha else marker.DELETE
         marker.color.r, marker.color.g, marker.color.b = RED if self._beam.error else WARM_WHITE

@@ -56,14 +56,14 @@ class FlagLog:
     """
 
     def __init__(self) -> None:
-        # By flag, the name in its last line and the time, s; '' where that said it is cleared.
+        # By flag, the name in its last line, '' if that reported it as cleared, and the time, s.
         self._reported: dict[int, tuple[str, float]] = {}
 
     def take(self, flags: int, now: float) -> list[diagnostics.Finding]:
         """
         Return the lines to log, of level OK for a flag that was cleared.
 
-        :param flags: those of a status; all unknown bits share one line.
+        :param flags: the error flags of a status; all unknown bits share one line.
         :param now: when it was received, s.
         """
         lines: list[diagnostics.Finding] = []

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From the events of one light to topics, parameters and log lines."""
+"""Publishes the events of one light as topics, parameters and log lines."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class EventPublisher:
         self._check_diagnostics = check_diagnostics
         self._identity: object = None
         self._max_brightness = limits.max_brightness
-        # The source of setpoints as a part of its topics.
+        # The source of setpoints, as a prefix of its topics.
         self._source = ''
         self._strobe_range = model.StrobeRange()
         self._condition: tuple[object, ...] = ()
@@ -125,14 +125,15 @@ class EventPublisher:
             case events.AutomaticSwitch(on=on, reason=reason, failure=''):
                 log.warning(f'{light} is switched {_state(on)} by {reason}', 'automatic')
             case events.AutomaticSwitch(on=on, failure=failure):
-                log.error(f'{light} is not confirmed to be {_state(on)}, which is repeated: '
+                log.error(f'{light}: {_state(on).upper()} is not confirmed and will be repeated: '
                           f'{failure}', 'automatic')
             case events.ChangedByOther(change=new, undone=False):
-                log.error(f'{light}: another sender keeps sending {new}, which stays from now on: '
-                          'only one of the two programs must control the light', 'insists')
+                log.error(f'{light}: another sender repeatedly changes it to {new}; the bridge no '
+                          'longer undoes this. Let only one program control the light',
+                          'repeated change')
             case events.ChangedByOther(change=new):
-                log.warning(f'{light} was changed by another sender, which is undone: {new}',
-                            'changed')
+                log.warning(f'{light}: another sender has changed it to {new}; the bridge undoes '
+                            'this', 'changed')
             case events.ConfigurationChanged():
                 self._configuration_changed(event)
             case events.ConfigurationRestored(success=True, message=message):

@@ -46,7 +46,7 @@ from ...ros.throttled_log import NodeLog
 
 # Refreshes that may wait for their answers: each is two messages of the light.
 MAX_REFRESHES = 16
-# Lights that are named where the target is not there.
+# How many of the heard lights a node without a light names.
 MAX_NAMED = 8
 
 
@@ -56,7 +56,7 @@ class LightNode:
 
     All methods but :meth:`close` are for turns of the link.
 
-    :param services: ``commands``, of the node beside those of its light.
+    :param services: and ``commands``, of the node in addition to those of its light.
     :ivar address: of the light, None while there is none.
     :raises ParameterError: if the value given for a parameter of the light is wrong.
     """
@@ -102,7 +102,7 @@ class LightNode:
         self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, address: Address, now: float) -> None:
-        """Serve a light from now on, and publish what is known of it."""
+        """Serve a light from now on, and publish its known state."""
         self.address, self._bound_at = address, now
         self._host.frame_log.assign(address, self._log)
         light = self._client.lights.get(address)
@@ -209,7 +209,7 @@ class LightNode:
 
         def done(result: Result, now: float) -> None:
             light = self._light()
-            # A source that repeats its request while a higher one holds the light is not at fault.
+            # A source may repeat its request while a higher one holds the light.
             if not (result.success or result.superseded
                     or light and light.is_held_by_other(source)):
                 warn(False, result.message)
@@ -227,7 +227,6 @@ class LightNode:
                 f'~/{topic}: {message}', topic)):
             light.set_brightness(brightness, now, source=source)
 
-    # The value of a parameter is of any type.
     def _check_value(self, name: str, value: object) -> None:
         light = self._light()
         self._client.settings.limits.check(

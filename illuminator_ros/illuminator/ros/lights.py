@@ -37,13 +37,14 @@ from ...ros.node import Answer, CommandTopic, RequestService, SWITCH_QOS
 from ...ros.parameters import Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
-# s after the first light in which lights that start together are heard.
+# s from the first light to the warnings on unused names: lights that start together are heard by
+# then.
 NAMES_DELAY = 10.0
 
 
 class Lights(ServedPayload):
     """
-    Gives each light on the link a node. In turns of the link, except :meth:`close`.
+    Gives each light on the link a node. All methods but :meth:`close` are for turns of the link.
 
     :raises ParameterError: if a parameter is wrong.
     """
@@ -84,7 +85,7 @@ class Lights(ServedPayload):
             self._serve(event.address)
 
     def _serve(self, address: Address) -> None:
-        """Give a light a node: the first one, or one of its own."""
+        """Give a light a node: the first node, or a node of its own."""
         now = self._host.link.clock()
         nodes, selected = self._nodes, self._selection.is_target(address)
         if selected and nodes.first_is_free:

@@ -76,21 +76,22 @@ DEVICE_PARAMETERS = (
     ParameterSpec('mode', '', 'what controls the light', choices=tuple(MODES)),
     ParameterSpec('brightness', 0.0, 'brightness', '%', 0.0, 100.0),
     ParameterSpec('strobe_period', 0.0, 'strobe period', 's', 0.0, MAX_STROBE_PERIOD,
-                  constraints='0 = no strobe, else within what the light reports'),
+                  constraints='0 = no strobe, else within the range that the light reports'),
     ParameterSpec('strobe_duty_cycle', 0.0, 'share of the strobe period in which it is lit', '%',
                   0.0, 100.0),
 )
-# Those that each node may have for itself.
+# Parameters that each node may have for itself.
 _GEOMETRY = ('frame_id', 'beam_range', 'beam_angle', 'mounted_on')
 
 
 class BeamGeometry(NamedTuple):
     """
-    Where a light is, and the cone of its beam along +x from there.
+    The frame of a light, and the cone of its beam along +x of that frame.
 
     :param beam_range: the length of the beam, m; 0 for none.
     :param beam_angle: the full opening angle of the beam, rad.
-    :param mounted_on: gimbal device id of the gimbal that turns it, 0 for what the light reports.
+    :param mounted_on: gimbal device id of the gimbal that turns it, 0 for the one that the light
+        reports.
     """
 
     frame_id: str
@@ -100,7 +101,7 @@ class BeamGeometry(NamedTuple):
 
     @classmethod
     def of(cls, values: Values) -> BeamGeometry:
-        """Return the one that parameters give."""
+        """Return the geometry that parameters give."""
         return cls(*(values[name] for name in _GEOMETRY))
 
     def declare(self, node: Node) -> BeamGeometry:
@@ -115,7 +116,7 @@ class BeamGeometry(NamedTuple):
 
 def settings(values: Values) -> Settings:
     """
-    Return how lights are treated.
+    Return the settings of the lights.
 
     :raises ParameterError: if the sources are wrong.
     """
@@ -137,14 +138,15 @@ def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
         notes['brightness'] = f'at most {limits.max_brightness:g} %, which is max_brightness'
     if limits.min_strobe_period:
         notes['strobe_period'] = (f'0 = no strobe, else at least {limits.min_strobe_period:g} s, '
-                                  'which is min_strobe_period, and within what the light reports')
+                                  'which is min_strobe_period, and within the range that the '
+                                  'light reports')
     return tuple(spec._replace(constraints=notes.get(spec.name, spec.constraints))
                  for spec in DEVICE_PARAMETERS)
 
 
 class Selection:
     """
-    Which lights are served, and by which nodes.
+    Selects the lights that are served, and their nodes.
 
     :param values: of the parameters.
     :param first: the name of the first node.
@@ -180,7 +182,7 @@ class Selection:
         """Return the warning for a name of the light that the first node serves, '' for none."""
         name = self.names.get(served)
         return (f'names: {served}={name} is not used, since light {served} is served by the first '
-                f'node, {self._first}: -r __node:={name} names that, target_system and '
+                f'node, {self._first}: -r __node:={name} renames it; target_system and '
                 'target_component choose its light') if name else ''
 
     def unused_names(self, heard: Mapping[Address, object]) -> list[str]:
