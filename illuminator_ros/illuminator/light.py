@@ -161,8 +161,8 @@ class Light:
         # Whether the light was seen to report brightness 0 since it was switched off.
         self._brightness_is_switch = False
         self._was_dimmed = False
-        # The time of the last request, or at which a status showed that another sender has switched
-        # the light on, s.
+        # The time of the last request, or of the status that showed that another sender has
+        # switched the light on, s.
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
         self._undoing = RepeatLimit(
