@@ -101,6 +101,7 @@ AUTOPILOT_INTERVAL = 0.02
 ATTITUDE_AGE = 1.0
 # s within which two different heartbeats of one address show two senders.
 IDENTITY_TIME = 3.0
+HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 
 @dataclass(frozen=True)
@@ -439,38 +440,39 @@ class GimbalManager(Payload):
         if lacking := self.model.lacks(demand.flags):
             return f'the gimbal does not have {lacking.name}'
         current = self._current(demand, now)
-        if current is None:
-            return 'the heading of the vehicle is unknown'
+        if isinstance(current, str):
+            return current
         self._roi = None
         self._setpoint = resolve(demand, current, now, turns=not self.tracker.has_mavlink)
         self._send(now)
         return ''
 
-    def _current(self, demand: Demand, now: float) -> Quaternion | None:
-        """Return the attitude that a demand changes, None if that needs an unknown heading."""
+    def _current(self, demand: Demand, now: float) -> Quaternion | str:
+        """Return the attitude that a demand changes, or what is unknown of it."""
         if demand.is_pose or (demand.has_rates_only and self.tracker.has_mavlink):
             # Such a setpoint does not depend on the attitude.
             return Quaternion()
         if (demand.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
                 and self._heading(now) is None):
-            return None
+            return HEADING_UNKNOWN
         return demand.attitude or self._pointing(demand.frame, now)
 
-    def _pointing(self, frame: YawFrame, now: float) -> Quaternion | None:
-        """Return the attitude of the setpoint, else of the device, with the yaw in a frame."""
+    def _pointing(self, frame: YawFrame, now: float) -> Quaternion | str:
+        """Return the attitude of the setpoint, or else of the device, with a yaw in a frame."""
         heading = self._heading(now)
-        if self._setpoint is not None and (attitude := self._setpoint.at(now)) is not None:
-            if self._setpoint.frame is frame:
-                return attitude
-            return None if heading is None else turned_by(
-                attitude, heading if frame is YawFrame.EARTH else -heading)
-        if self._attitude is not None and self._device_status(now) is not None:
+        # A device that has neither reported an attitude nor got a setpoint starts at 0.
+        attitude, known = Quaternion(), YawFrame.VEHICLE
+        if self._setpoint is not None and (turned := self._setpoint.at(now)) is not None:
+            attitude, known = turned, self._setpoint.frame
+        elif self._attitude is not None and self._device_status(now) is not None:
             seen = self._attitude.seen_from(frame, heading)
-            if seen is not None:
-                return Quaternion(*to_mavlink(seen, frame))
-        if frame is YawFrame.VEHICLE:
-            return Quaternion()
-        return None if heading is None else turned_by(Quaternion(), heading)
+            return HEADING_UNKNOWN if seen is None else Quaternion(*to_mavlink(seen, frame))
+        elif self._status is not None or self._sent is not None:
+            return 'the attitude of the gimbal is unknown'
+        if known is frame:
+            return attitude
+        return HEADING_UNKNOWN if heading is None else turned_by(
+            attitude, heading if frame is YawFrame.EARTH else -heading)
 
     def _accepts_earth_frame(self, now: float) -> bool:
         status = self._device_status(now)

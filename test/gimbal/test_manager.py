@@ -36,6 +36,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
     GimbalManagerStatus,
+    MAV_TYPE_GIMBAL,
 )
 from illuminator_ros.gimbal.vehicle_state import ESTIMATES_ATTITUDE
 from illuminator_ros.mavlink import messages as mav
@@ -367,6 +368,37 @@ def test_gm_2_an_axis_without_an_angle_keeps_its_direction_in_another_yaw_frame(
     for flag, yaw in ((F.YAW_IN_EARTH_FRAME, 1.2), (F.YAW_IN_VEHICLE_FRAME, 0.2)):
         rig.give(PILOT, pitch_yaw(0.3, flags=flag))
         assert euler(last(rig)) == (0.0, 0.3, yaw)
+
+
+@pytest.mark.parametrize('pitch', [1.0, NAN])
+@pytest.mark.parametrize(('reported', 'unknown'), [
+    (None, 'attitude'), (attitude_status(flags=F.YAW_IN_EARTH_FRAME), 'heading')])
+def test_an_axis_without_an_angle_is_refused_where_its_attitude_is_unknown(
+        reported: GimbalDeviceAttitudeStatus | None, unknown: str, pitch: float) -> None:
+    rig = in_control()
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=0.5))
+    rig.device_is_there = False
+    rig.run(gimbal_manager.ATTITUDE_AGE)
+    if reported:
+        rig.give(DEVICE, reported)
+
+    result = rig.result(PILOT, pitch_yaw_command(pitch, NAN))
+
+    assert result is mav.MavResult.DENIED
+    assert unknown in of(gimbal_manager.DemandRefused, rig.events)[0].reason
+    assert last(rig).angular_velocity_z == 0.5
+
+
+def test_a_device_that_has_never_reported_an_attitude_starts_at_0() -> None:
+    rig = ManagerRig(active=False)
+    rig.device_is_there = False
+    rig.run(5.0, each=lambda: rig.component.receive(
+        DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), rig.now))
+    rig.take(PILOT)
+
+    rig.give(PILOT, pitch_yaw(0.1))
+
+    assert euler(last(rig)) == (0.0, 0.1, 0.0)
 
 
 @pytest.mark.parametrize('flag', [F.NEUTRAL, F.RETRACT])
