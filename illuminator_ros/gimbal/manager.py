@@ -38,13 +38,13 @@ from .manager_setpoint import (
     GeoPoint,
     GimbalModel,
     in_vehicle_frame,
-    mix,
     nudge,
     read_demand,
     read_roi,
     resolve,
     Setpoint,
     stopped,
+    turned,
     turned_by,
 )
 from .manager_state import ManagerState, StateChanged, StateTracker
@@ -79,7 +79,6 @@ from ..payload.mount_attitude import (
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
-    UNSET_VECTOR,
     YawFrame,
 )
 from ..payload.rotation import Quaternion
@@ -207,7 +206,7 @@ class GimbalManager(Payload):
         self._status_at = self._measured_at = -math.inf
         self._setpoint: Setpoint | None = None
         self._sent: Setpoint | None = None
-        self._limits_reached = 0
+        self._clipped: tuple[Clipped, ...] = ()
         self._changed_at = -math.inf
         self._offsets = STILL
         self._roi: GeoPoint | None = None
@@ -325,9 +324,10 @@ class GimbalManager(Payload):
             self._attitude = None
         if not self.tracker.has_mavlink and self.tracker.state is ManagerState.ACTIVE:
             flags = 0 if self._setpoint is None else self._setpoint.operation
+            limits = sum(AT_LIMIT[AXES.index(one.axis)] for one in self._clipped)
             self._commands.send(replace(
                 status, flags=int(status.flags | flags), gimbal_device_id=self.tracker.device_id,
-                failure_flags=status.failure_flags | self._limits_reached))
+                failure_flags=status.failure_flags | limits))
 
     def _report_commanded(self, now: float) -> None:
         """Report the setpoint as the attitude of a device that reports no attitude."""
@@ -372,7 +372,8 @@ class GimbalManager(Payload):
             else:
                 # The gimbal stays where it points until the next player sends a setpoint.
                 self._roi = None
-                self._setpoint = self._setpoint and stopped(self._setpoint, now)
+                self._turn(now)
+                self._setpoint = self._setpoint and stopped(self._setpoint)
                 self._send(now)
             self.events.emit(change)
         if changes and self._status_due < math.inf and now >= self._changed_at + CHANGE_INTERVAL:
@@ -439,6 +440,7 @@ class GimbalManager(Payload):
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
             return f'the gimbal does not have {lacking.name}'
+        self._turn(now)
         current = self._current(demand, now)
         if isinstance(current, str):
             return current
@@ -462,8 +464,8 @@ class GimbalManager(Payload):
         heading = self._heading(now)
         # A device that has neither reported an attitude nor got a setpoint starts at 0.
         attitude, known = Quaternion(), YawFrame.VEHICLE
-        if self._setpoint is not None and (turned := self._setpoint.at(now)) is not None:
-            attitude, known = turned, self._setpoint.frame
+        if self._setpoint is not None and self._setpoint.attitude is not None:
+            attitude, known = self._setpoint.attitude, self._setpoint.frame
         elif self._attitude is not None and self._device_status(now) is not None:
             seen = self._attitude.seen_from(frame, heading)
             return HEADING_UNKNOWN if seen is None else Quaternion(*to_mavlink(seen, frame))
@@ -488,36 +490,37 @@ class GimbalManager(Payload):
             return self._attitude.heading
         return self.vehicle.heading(now)
 
+    def _ahead(self, setpoint: Setpoint, now: float) -> float | None:
+        """Return the direction from which the range of the yaw counts, None if unknown."""
+        # A pose and rates have no attitude that is converted.
+        is_relative = setpoint.frame is YawFrame.VEHICLE or setpoint.attitude is None
+        return 0.0 if is_relative else self._heading(now)
+
+    def _turn(self, now: float) -> None:
+        """Turn the setpoint by the rates that the device does not follow."""
+        self._setpoint = self._setpoint and turned(
+            self._setpoint, now, self.model.ranges, self._ahead(self._setpoint, now),
+            self._clipped)
+
     def _send(self, now: float) -> None:
-        """Mix and clip the setpoint, and give it to the device."""
+        """Give the device the setpoint, with everything mixed and clipped."""
+        self._turn(now)
         setpoint = self._setpoint
         if setpoint is None or self.tracker.state is not ManagerState.ACTIVE:
             self._send_due = math.inf
             return
-        # The yaw of straight ahead in the setpoint's frame; the yaw range is relative to it.
-        ahead: float | None = 0.0
-        converts = False
-        if setpoint.frame is YawFrame.EARTH:
-            converts = not self._accepts_earth_frame(now)
-            # A pose or a rate has no attitude that would be converted.
-            ahead = 0.0 if setpoint.attitude is None else self._heading(now)
-        turns = setpoint.turning != STILL
-        attitude = setpoint.at(now) if turns else setpoint.attitude
+        converts = setpoint.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
+        ahead = self._ahead(setpoint, now)
         self._send_due = now + (
-            FOLLOW_INTERVAL if turns or converts or self._roi is not None else HOLD_INTERVAL)
-        self._limits_reached = 0
-        if attitude is not None:
-            if self._offsets != STILL:
-                attitude = mix(attitude, self._offsets)
-            attitude, clipped = clip(
-                attitude, self.model.ranges, ahead,
-                setpoint.angles if attitude is setpoint.attitude else UNSET_VECTOR)
-            if clipped:
-                self._limits_reached = sum(AT_LIMIT[AXES.index(one.axis)] for one in clipped)
-                self.events.emit(SetpointClipped(tuple(clipped)))
+            FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
+            else HOLD_INTERVAL)
+        attitude, self._clipped = clip(
+            setpoint, self.model.ranges, ahead, self._offsets, self._clipped)
+        if self._clipped:
+            self.events.emit(SetpointClipped(self._clipped))
         sent = setpoint
         if attitude is not setpoint.attitude:
-            sent = setpoint._replace(attitude=attitude, turning=STILL)
+            sent = setpoint._replace(attitude=attitude)
         if converts:
             if ahead is None:
                 self.events.emit(ReferenceLost('heading'))

@@ -62,7 +62,11 @@ _POSE_BITS = int(POSES)
 _EARTH_BIT, _VEHICLE_BIT = int(YawFrame.EARTH.flag), int(YawFrame.VEHICLE.flag)
 _NO_FLAGS = MountFlags(0)
 _RIGHT_ANGLE = math.pi / 2
-# rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL; the specification names no value.
+# rad that a clipped angle is beyond its range at least, and by which the other end of the range
+# must be nearer before an axis leaves the end where it is.
+_TOLERANCE = 1e-5
+_HYSTERESIS = math.radians(10)
+# rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
 # The capability that a flag needs.
 _NEEDED = {MountFlags.RETRACT: Capabilities.HAS_RETRACT,
@@ -267,7 +271,7 @@ class Setpoint(NamedTuple):
     :param rates: the rates that the device follows, rad/s; NaN where the device chooses.
     :param turning: the rates at which the manager turns the attitude, rad/s.
     :param since: when the attitude applies, s.
-    :param angles: the angles from which the attitude was computed, rad; NaN if it was not.
+    :param angles: roll, pitch and yaw of the attitude as requested, rad; NaN if not known.
     """
 
     flags: int
@@ -283,13 +287,13 @@ class Setpoint(NamedTuple):
         """Whether a flag alone sets the attitude."""
         return bool(self.flags & _POSE_BITS)
 
-    def at(self, now: float) -> Quaternion | None:
-        """Return the attitude at a time."""
-        if self.attitude is None or self.turning == STILL:
-            return self.attitude
-        return _from_angles(_each(
-            lambda angle, rate: angle + rate * (now - self.since), self.attitude.euler(),
-            self.turning))
+    @property
+    def target(self) -> Vector:
+        """Return roll, pitch and yaw, rad; NaN where there is no attitude."""
+        # The angles of a quaternion take as long as all of the rest.
+        if self.attitude is None or not math.isnan(self.angles[0]):
+            return self.angles
+        return self.attitude.euler()
 
     @property
     def operation(self) -> int:
@@ -328,17 +332,15 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     return Setpoint(
         flags, frame, _from_angles(angles) if any(given) else current,
         _each(lambda rate, has_angle: rate if has_angle else math.nan, rates, given),
-        _each(lambda rate, alone: rate if alone else 0.0, rates, only_rate), now)
+        _each(lambda rate, alone: rate if alone else 0.0, rates, only_rate), now, angles)
 
 
-def stopped(setpoint: Setpoint, now: float) -> Setpoint:
-    """Return a setpoint without its motion."""
+def stopped(setpoint: Setpoint) -> Setpoint:
+    """Return the setpoint that ends the motion of another one."""
     if setpoint.is_pose:
         return setpoint
-    attitude = setpoint.at(now)
     return setpoint._replace(
-        attitude=attitude, turning=STILL, since=now,
-        rates=STILL if attitude is None else UNSET_VECTOR)
+        turning=STILL, rates=STILL if setpoint.attitude is None else UNSET_VECTOR)
 
 
 def nudge(demand: Demand, limit: float) -> Vector:
@@ -346,11 +348,6 @@ def nudge(demand: Demand, limit: float) -> Vector:
     angles = demand.target
     return _each(lambda angle: max(-limit, min(limit, angle)) if math.isfinite(angle) else 0.0,
                  angles)
-
-
-def mix(attitude: Quaternion, offsets: Vector) -> Quaternion:
-    """Return an attitude with offsets added to its angles."""
-    return _from_angles(_each(lambda angle, offset: angle + offset, attitude.euler(), offsets))
 
 
 class Clipped(NamedTuple):
@@ -361,46 +358,94 @@ class Clipped(NamedTuple):
     limit: float
 
 
-def clip(
-    attitude: Quaternion, ranges: Ranges, offset: float | None,
-    made_of: Vector = UNSET_VECTOR,
-) -> tuple[Quaternion, list[Clipped]]:
+def turned(
+    setpoint: Setpoint, now: float, ranges: Ranges, ahead: float | None,
+    before: Sequence[Clipped] = (),
+) -> Setpoint:
     """
-    Return an attitude within the ranges, and the angles that were clipped.
+    Return a setpoint as the manager has turned it until now, each axis to its stop at most.
 
-    :param offset: the yaw of straight ahead in the frame of the attitude, rad: the yaw range is
-        relative to it. None if it is unknown; the yaw is then not clipped.
-    :param made_of: the angles from which the attitude was computed, NaN if they are unknown.
+    The other parameters are those of :func:`clip`.
     """
-    if offset is not None:
-        # The computation of angles from a quaternion takes as long as the rest of this function.
-        roll, pitch, yaw = made_of
+    if setpoint.attitude is None or setpoint.turning == STILL:
+        return setpoint
+    elapsed = now - setpoint.since
+    roll, pitch, yaw = (
+        range_.clip(angle + rate * elapsed) if rate else angle for angle, range_, rate in zip(
+            *_on_axes(setpoint.target, ranges, ahead, before), setpoint.turning, strict=True))
+    angles = roll, pitch, yaw + (ahead or 0.0)
+    return setpoint._replace(attitude=_from_angles(angles), since=now, angles=angles)
+
+
+def clip(
+    setpoint: Setpoint, ranges: Ranges, ahead: float | None, offsets: Vector = STILL,
+    before: Sequence[Clipped] = (),
+) -> tuple[Quaternion | None, tuple[Clipped, ...]]:
+    """
+    Return the attitude of a setpoint within the ranges, and the angles that were clipped.
+
+    :param ahead: the direction from which the range of the yaw counts, rad in the frame of the
+        setpoint; None where it is not known, which leaves the yaw as it is.
+    :param offsets: added to the angles before, rad.
+    :param before: the angles that were clipped the last time.
+    """
+    attitude, turning = setpoint.attitude, setpoint.turning
+    if attitude is None:
+        return None, ()
+    target = roll, pitch, yaw = setpoint.target
+    if ahead is not None and offsets == STILL == turning:
+        # Most setpoints are within the ranges, and the rest takes longer.
         (roll_low, roll_high), (pitch_low, pitch_high), (yaw_low, yaw_high) = ranges
         if (roll_low <= roll <= roll_high and pitch_low <= pitch <= pitch_high
-                and yaw_low <= yaw - offset <= yaw_high):
-            return attitude, []
+                and yaw_low <= yaw - ahead <= yaw_high):
+            return attitude, ()
     clipped = []
-    angles = list(attitude.euler())
-    for index, range_ in enumerate(ranges):
-        zero = offset if index == 2 else 0.0
-        if zero is None:
-            continue
-        low, high = range_
-        if low <= angles[index] - zero <= high or range_.is_endless:
-            continue
-        asked = _nearest(angles[index] - zero, range_)
+    angles = []
+    for axis, angle, range_, offset, rate in zip(
+            AXES, *_on_axes(target, ranges, ahead, before), offsets, turning, strict=True):
+        # A rate against a stop is beyond it, a difference by float32 rounding is not.
+        asked = angle + offset + (math.copysign(2 * _TOLERANCE, rate) if rate else 0.0)
         limit = range_.clip(asked)
-        # Ignore differences due to rounding to float32.
-        if abs(limit - asked) > 1e-5:
-            clipped.append(Clipped(AXES[index], asked, limit))
-            angles[index] = limit + zero
-    return (_from_angles(angles), clipped) if clipped else (attitude, [])
+        is_beyond = abs(limit - asked) > _TOLERANCE
+        angles.append(limit if is_beyond else angle + offset)
+        if is_beyond:
+            clipped.append(Clipped(axis, asked, limit))
+    if not clipped and offsets == STILL:
+        return attitude, ()
+    roll, pitch, yaw = angles
+    return _from_angles((roll, pitch, yaw + (ahead or 0.0))), tuple(clipped)
 
 
-def _nearest(angle: float, range_: Range) -> float:
-    """Return the angle, or the same angle plus or minus a turn, that is nearest to a range."""
-    return min((angle, angle + 2 * math.pi, angle - 2 * math.pi),
-               key=lambda one: max(range_.low - one, one - range_.high, 0.0))
+def _on_axes(
+    angles: Vector, ranges: Ranges, ahead: float | None, before: Sequence[Clipped],
+) -> tuple[Vector, Ranges]:
+    """Return the angles as the axes count them, and the ranges, infinite without stops."""
+    stops = {one.axis: one.limit for one in before}
+    roll, pitch, yaw = angles
+    roll_range, pitch_range, yaw_range = (
+        Range() if range_.is_endless else range_ for range_ in ranges)
+    # Beyond a right angle another roll and yaw would have the same attitude.
+    pitch_range = Range(max(pitch_range.low, -_RIGHT_ANGLE), min(pitch_range.high, _RIGHT_ANGLE))
+    if ahead is None:
+        yaw_range = Range()
+    return ((_nearest(roll, roll_range, stops.get('roll')), pitch,
+             _nearest(yaw - (ahead or 0.0), yaw_range, stops.get('yaw'))),
+            (roll_range, pitch_range, yaw_range))
+
+
+def _nearest(angle: float, range_: Range, stop: float | None) -> float:
+    """
+    Return the angle, or the same direction a turn away, that is nearest to a range.
+
+    :param stop: the end of the range where the axis is, None if it is at neither.
+    """
+    def distance(one: float) -> float:
+        limit = range_.clip(one)
+        # Noise must not turn an axis from one end to the other.
+        return abs(one - limit) + (_HYSTERESIS if limit not in (one, stop) else 0.0)
+
+    angle = math.remainder(angle, math.tau)
+    return min((angle, angle + math.tau, angle - math.tau), key=distance)
 
 
 def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:

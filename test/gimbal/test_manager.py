@@ -470,6 +470,16 @@ def test_gm_9_limits_are_applied_after_mixing_and_reported() -> None:
     assert (clipped.axis, round(clipped.requested, 4), clipped.limit) == ('pitch', 0.6, 0.5)
 
 
+def test_gm_9_an_offset_beyond_a_stop_does_not_turn_the_gimbal_to_the_other() -> None:
+    rig = in_control(device=information(yaw_min=-3.1, yaw_max=3.1))
+    rig.points(PILOT, 0.0, 3.0)
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+
+    [message] = rig.points(GUEST, 0.0, 0.15)
+
+    assert euler(message) == (0.0, 0.0, 3.1)
+
+
 def test_gm_5_an_axis_that_the_device_lacks_is_not_turned() -> None:
     rig = in_control(device=information(FULL & ~Capabilities.HAS_YAW_AXIS))
 
@@ -524,6 +534,22 @@ def test_gm_8_a_new_setpoint_clearing_or_the_end_of_control_ends_the_region_of_i
     rig.run(2.0)
 
     assert euler(last(rig)) == before
+
+
+def test_gm_8_a_noisy_heading_keeps_the_gimbal_at_one_stop_where_the_place_is_behind() -> None:
+    rig = in_control(device=information(
+        FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, yaw_min=-1.5, yaw_max=1.5))
+    at: list[float] = []
+
+    for degrees in (5.0, -1.0, 1.0, -4.0, 4.0, -6.0):
+        rig.give(AUTOPILOT, position(47.0, 8.0, 500.0),
+                 vehicle_yaw(math.pi + math.radians(degrees)))
+        if not at:
+            rig.give(PILOT, region(47.01, 8.0, 500.0))
+        rig.run(0.1, each=rig.heartbeats(PILOT))
+        at.append(euler(last(rig))[2])
+
+    assert at == [1.5] * 5 + [-1.5]
 
 
 def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
@@ -594,6 +620,41 @@ def test_gm_22_the_manager_turns_a_device_that_takes_no_rates() -> None:
     setpoint = of(gimbal_manager.SetpointSent, rig.events)[-1].setpoint
     assert setpoint.attitude is not None
     assert setpoint.attitude.euler() == pytest.approx((0.0, 0.1, 0.5), abs=0.03)
+
+
+def yaws(rig: ManagerRig) -> list[float]:
+    """Return the yaws that a device without MAVLink got."""
+    return [one.setpoint.attitude.euler()[2]
+            for one in of(gimbal_manager.SetpointSent, rig.events) if one.setpoint.attitude]
+
+
+@pytest.mark.parametrize('interval', [0.02, 0.1, 3.0])
+@pytest.mark.parametrize('limit', [1.0, 1.5, 3.14159])
+def test_gm_22_a_rate_ends_at_the_stop_of_a_device_that_takes_no_rates(
+        limit: float, interval: float) -> None:
+    rig = in_control(device_id=1, ranges=(Range(), Range(-1.0, 1.0), Range(-limit, limit)))
+    rig.give(PILOT, pitch_yaw(0.1, limit - 0.1))
+
+    def turn(rate: float, seconds: float) -> None:
+        until = rig.now + seconds
+        while rig.now < until - 1e-6:
+            rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=rate))
+            rig.run(min(interval, until - rig.now), each=rig.heartbeats(PILOT))
+
+    turn(0.5, 6.0)
+    assert yaws(rig)[-1] == max(yaws(rig)) == pytest.approx(limit)
+    assert min(yaws(rig)) > limit - 0.2
+    clipped = of(gimbal_manager.SetpointClipped, rig.events)[-1].clipped
+    assert [(one.axis, one.limit) for one in clipped] == [('yaw', limit)]
+    status = rig.messages(GimbalDeviceAttitudeStatus)[-1]
+    assert status.failure_flags == ErrorFlags.AT_YAW_LIMIT
+
+    turn(-0.5, 1.0)
+    assert yaws(rig)[-1] == pytest.approx(limit - 0.5, abs=0.03)
+    rig.give(PILOT, configure(-3, -3))
+    stopped = yaws(rig)[-1]
+    rig.run(2.0)
+    assert yaws(rig)[-1] == stopped == pytest.approx(limit - 0.5, abs=0.03)
 
 
 def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:

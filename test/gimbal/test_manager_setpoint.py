@@ -24,19 +24,19 @@ from hypothesis import strategies as st
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.manager_setpoint import (
     clip,
+    Clipped,
     Demand,
     direction,
     GeoPoint,
     GimbalModel,
-    mix,
     nudge,
     resolve,
     Setpoint,
-    stopped,
+    turned,
     turned_by,
 )
-from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.payload.mount_attitude import MountFlags, STILL, YawFrame
+from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from support.gimbal_manager import information
 
@@ -45,6 +45,14 @@ ANGLES = st.floats(-math.pi, math.pi)
 PITCHES = st.floats(-math.pi / 2, math.pi / 2) | st.sampled_from((-math.pi / 2, math.pi / 2))
 ATTITUDES = st.tuples(ANGLES, PITCHES, ANGLES)
 SMALL = st.floats(-0.3, 0.3)
+RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends))
+                     for _ in range(3)))
+UNLIMITED = Range(), Range(), Range()
+
+
+def made_of(angles: Vector, turning: Vector = STILL) -> Setpoint:
+    return Setpoint(MountFlags(0), YawFrame.VEHICLE, Quaternion.from_euler(*angles),
+                    turning=turning)
 
 
 def scipy(attitude: Quaternion) -> Any:
@@ -80,8 +88,9 @@ def test_gm_9_offsets_add_to_the_angles(
         angles: tuple[float, float, float], roll: float, pitch: float, yaw: float) -> None:
     assume(abs(angles[1] + pitch) < math.pi / 2 and abs(angles[1]) < 1.55)
 
-    mixed = mix(Quaternion.from_euler(*angles), (roll, pitch, yaw))
+    mixed, _ = clip(made_of(angles), UNLIMITED, 0.0, (roll, pitch, yaw))
 
+    assert mixed is not None
     assert apart(mixed, Rotation.from_euler(
         'ZYX', (angles[2] + yaw, angles[1] + pitch, angles[0] + roll))) < 1e-6
 
@@ -95,19 +104,16 @@ def test_gm_9_an_offset_is_the_angle_or_the_limit_where_that_is_smaller(
             assert offset * angle >= 0
 
 
-RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends))
-                     for _ in range(3)))
-
-
 @example((0.0, 0.0, 0.5), (Range(-1.0, 1.0),) * 3, 2.0)
 @given(ATTITUDES, RANGES, st.none() | ANGLES)
 def test_a_clipped_attitude_is_within_all_ranges_and_its_violations_are_named(
         angles: tuple[float, float, float], ranges: tuple[Range, Range, Range],
         zero: float | None) -> None:
-    attitude = Quaternion.from_euler(*angles)
+    setpoint = made_of(angles)
 
-    inside, clipped = clip(attitude, ranges, zero)
+    inside, clipped = clip(setpoint, ranges, zero)
 
+    assert inside is not None
     roll, pitch, yaw = inside.euler()
     # At the singular pitch only the sum of roll and yaw is defined.
     assume(abs(pitch) < 1.55)
@@ -116,9 +122,14 @@ def test_a_clipped_attitude_is_within_all_ranges_and_its_violations_are_named(
     if zero is not None:
         assert any(ranges[2].low - 1e-4 <= yaw - zero + turn <= ranges[2].high + 1e-4
                    for turn in (-4 * math.pi, -2 * math.pi, 0, 2 * math.pi, 4 * math.pi))
-    assert (inside == attitude) == (not clipped)
-    assert clip(inside, ranges, zero)[0].angle_to(inside) < 1e-3
-    assert clip(attitude, ranges, zero, angles) == (inside, clipped)
+    assert (inside == setpoint.attitude) == (not clipped)
+    again, _ = clip(setpoint._replace(attitude=inside), ranges, zero)
+    assert again is not None
+    assert again.angle_to(inside) < 1e-3
+    known, _ = clip(setpoint._replace(angles=angles), ranges, zero)
+    assume(abs(angles[1]) < 1.55)
+    assert known is not None
+    assert known.angle_to(inside) < 1e-3
 
 
 @pytest.mark.parametrize(('yaw', 'range_', 'limit'), [
@@ -126,9 +137,45 @@ def test_a_clipped_attitude_is_within_all_ranges_and_its_violations_are_named(
     (3.0, Range(-math.pi, math.pi), 3.0), (3.0, Range(), 3.0), (0.4, Range(0.0, 0.0), 0.0)])
 def test_a_yaw_is_clipped_to_the_nearer_end_of_its_range(
         yaw: float, range_: Range, limit: float) -> None:
-    inside, _ = clip(Quaternion.from_euler(0.0, 0.1, yaw), (Range(), Range(), range_), 0.0)
+    inside, _ = clip(made_of((0.0, 0.1, yaw)), (Range(), Range(), range_), 0.0)
 
+    assert inside is not None
     assert inside.euler() == pytest.approx((0.0, 0.1, limit))
+
+
+@pytest.mark.parametrize(('end', 'degrees', 'expected'), [
+    (2.0, 4.0, 2.0), (2.0, 6.0, -2.0), (-2.0, -4.0, -2.0), (-2.0, -6.0, 2.0)])
+def test_a_clipped_yaw_stays_at_its_end_until_the_other_is_nearer_by_10_degrees(
+        end: float, degrees: float, expected: float) -> None:
+    behind = made_of((0.0, 0.0, math.pi + math.radians(degrees)))
+    before = Clipped('yaw', end, end)
+
+    _, [clipped] = clip(behind, (Range(), Range(), Range(-2.0, 2.0)), 0.0, before=[before])
+
+    assert clipped.limit == expected
+
+
+@example(Range(-3.14159, 3.14159), 1.0, 0.5, 0.0)
+@given(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends)),
+       st.floats(0, 1), st.floats(-1, -1e-3) | st.floats(1e-3, 1), ANGLES)
+def test_a_turn_ends_at_a_stop_and_a_turn_back_begins_there(
+        range_: Range, share: float, rate: float, ahead: float) -> None:
+    ranges = Range(), Range(), range_
+    begin = range_.low + share * (range_.high - range_.low)
+    setpoint = made_of((0.0, 0.1, begin + ahead), turning=(0.0, 0.0, rate))
+
+    for now in range(1, 11):
+        setpoint = turned(setpoint, float(now), ranges, ahead)
+
+    end = range_.clip(begin + 10.0 * rate)
+    assert setpoint.angles == pytest.approx((0.0, 0.1, end + ahead), abs=1e-9)
+    _, clipped = clip(setpoint, ranges, ahead)
+    further = abs(range_.clip(end + rate) - end)
+    assume(not 0 < further < 1e-4)
+    assert [one.axis for one in clipped] == ['yaw'] * (further == 0)
+    back = turned(setpoint._replace(turning=(0.0, 0.0, -rate)), 11.0, ranges, ahead)
+    assert back.angles == pytest.approx(
+        (0.0, 0.1, range_.clip(end - rate) + ahead), abs=1e-9)
 
 
 @pytest.mark.parametrize(('low', 'high', 'expected'), [
@@ -183,28 +230,14 @@ def test_gm_8_the_same_place_has_no_direction_and_that_over_a_pole_is_ahead() ->
         (0.0, 0.0), abs=1e-3)
 
 
-@given(ATTITUDES, SMALL, SMALL, SMALL, st.floats(0, 10))
-def test_a_stopped_setpoint_stays_where_it_was(
-        angles: tuple[float, float, float], roll: float, pitch: float, yaw: float,
-        elapsed: float) -> None:
-    moving = Setpoint(MountFlags(0), YawFrame.EARTH, Quaternion.from_euler(*angles),
-                      turning=(roll, pitch, yaw), since=5.0)
-
-    still = stopped(moving, 5.0 + elapsed)
-
-    at_stop, later = moving.at(5.0 + elapsed), still.at(100.0)
-    assert at_stop is not None
-    assert later == at_stop
-
-
 @given(ATTITUDES, st.sampled_from(YawFrame))
 def test_gm_4_a_turn_in_steps_ends_where_a_turn_at_once_ends(
         angles: tuple[float, float, float], frame: YawFrame) -> None:
     assume(abs(angles[1]) < 1.2)
-    moving = Setpoint(MountFlags(0), frame, Quaternion.from_euler(*angles),
-                      turning=(0.0, 0.1, -0.2), since=0.0)
+    moving = made_of(angles, turning=(0.0, 0.1, -0.2))._replace(frame=frame)
 
-    end = moving.at(2.0)
+    half = turned(moving, 1.0, UNLIMITED, 0.0)
+    end = turned(half, 2.0, UNLIMITED, None).attitude
 
     assert end is not None
     assert apart(end, Rotation.from_euler(
