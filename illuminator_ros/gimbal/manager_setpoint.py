@@ -397,7 +397,7 @@ def clip(
         # Most setpoints are within the ranges, and the rest takes longer.
         (roll_low, roll_high), (pitch_low, pitch_high), (yaw_low, yaw_high) = ranges
         if (roll_low <= roll <= roll_high and pitch_low <= pitch <= pitch_high
-                and yaw_low <= yaw - ahead <= yaw_high):
+                and abs(pitch) <= _RIGHT_ANGLE and yaw_low <= yaw - ahead <= yaw_high):
             return attitude, ()
     clipped = []
     angles = []

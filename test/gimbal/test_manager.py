@@ -480,6 +480,22 @@ def test_gm_9_an_offset_beyond_a_stop_does_not_turn_the_gimbal_to_the_other() ->
     assert euler(message) == (0.0, 0.0, 3.1)
 
 
+@pytest.mark.parametrize('command', [
+    pitch_yaw_command(-110.0, 0.0), pitch_yaw_command(-110.0, NAN),
+    pitch_yaw_command(-110.0, NAN, yaw_rate=5.0)])
+def test_gm_4_a_pitch_beyond_a_right_angle_is_clipped_whatever_the_device_reports(
+        command: mav.CommandLong) -> None:
+    rig = in_control(device=information(pitch_min=math.radians(-120)))
+
+    rig.give(PILOT, command)
+    rig.run(1.0, each=rig.heartbeats(PILOT))
+
+    assert euler(last(rig))[1] == round(-math.pi / 2, 4)
+    [clipped] = of(gimbal_manager.SetpointClipped, rig.events)[-1].clipped
+    assert (clipped.axis, round(math.degrees(clipped.requested)), clipped.limit) == (
+        'pitch', -110, -math.pi / 2)
+
+
 def test_gm_5_an_axis_that_the_device_lacks_is_not_turned() -> None:
     rig = in_control(device=information(FULL & ~Capabilities.HAS_YAW_AXIS))
 
