@@ -81,7 +81,7 @@ from ..payload.mount_attitude import (
     UNSET_QUATERNION,
     YawFrame,
 )
-from ..payload.rotation import Quaternion
+from ..payload.rotation import Quaternion, Vector
 
 # s between GIMBAL_MANAGER_STATUS; between repetitions of a constant setpoint, at most 1 s by the
 # specification; and between setpoints that follow a place, the vehicle or a rate.
@@ -372,7 +372,11 @@ class GimbalManager(Payload):
             else:
                 # The gimbal stays where it points until the next player sends a setpoint.
                 self._roi = None
-                self._turn(now)
+                offsets = STILL
+                if change.after == self.control.holder(Role.SECONDARY):
+                    # Offsets do not shift the setpoints of the player that sent them.
+                    offsets, self._offsets = self._offsets, STILL
+                self._turn(now, offsets)
                 self._setpoint = self._setpoint and stopped(self._setpoint)
                 self._send(now)
             self.events.emit(change)
@@ -496,10 +500,10 @@ class GimbalManager(Payload):
         is_relative = setpoint.frame is YawFrame.VEHICLE or setpoint.attitude is None
         return 0.0 if is_relative else self._heading(now)
 
-    def _turn(self, now: float) -> None:
-        """Turn the setpoint by the rates that the device does not follow."""
+    def _turn(self, now: float, offsets: Vector = STILL) -> None:
+        """Turn the setpoint by the rates that the device does not follow, and by offsets."""
         self._setpoint = self._setpoint and turned(
-            self._setpoint, now, self.model.ranges, self._ahead(self._setpoint, now),
+            self._setpoint, now, self.model.ranges, self._ahead(self._setpoint, now), offsets,
             self._clipped)
 
     def _send(self, now: float) -> None:

@@ -360,19 +360,21 @@ class Clipped(NamedTuple):
 
 def turned(
     setpoint: Setpoint, now: float, ranges: Ranges, ahead: float | None,
-    before: Sequence[Clipped] = (),
+    offsets: Vector = STILL, before: Sequence[Clipped] = (),
 ) -> Setpoint:
     """
     Return a setpoint as the manager has turned it until now, each axis to its stop at most.
 
     The other parameters are those of :func:`clip`.
     """
-    if setpoint.attitude is None or setpoint.turning == STILL:
+    if setpoint.attitude is None or offsets == STILL == setpoint.turning:
         return setpoint
     elapsed = now - setpoint.since
     roll, pitch, yaw = (
-        range_.clip(angle + rate * elapsed) if rate else angle for angle, range_, rate in zip(
-            *_on_axes(setpoint.target, ranges, ahead, before), setpoint.turning, strict=True))
+        range_.clip(angle + rate * elapsed + offset) if rate or offset else angle
+        for angle, range_, rate, offset in zip(
+            *_on_axes(setpoint.target, ranges, ahead, before), setpoint.turning, offsets,
+            strict=True))
     angles = roll, pitch, yaw + (ahead or 0.0)
     return setpoint._replace(attitude=_from_angles(angles), since=now, angles=angles)
 

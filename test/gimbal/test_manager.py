@@ -449,6 +449,23 @@ def test_gm_9_the_secondary_player_adds_no_more_than_the_limit(
     assert euler(rig.points(PILOT, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
 
 
+@pytest.mark.parametrize('secondary', [GUEST, (-1, -1)])
+def test_gm_9_the_offsets_of_a_player_do_not_shift_its_setpoints_in_primary_control(
+        secondary: tuple[int, int]) -> None:
+    rig = in_control()
+    rig.points(PILOT, 0.2, 0.1)
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+    rig.points(GUEST, 0.1, 0.1)
+    rig.give(PILOT, configure(-3, -3))
+
+    rig.give(GUEST, configure(*GUEST, *secondary))
+    rig.run(1.0, each=rig.heartbeats(GUEST))
+
+    assert euler(last(rig)) == (0.0, 0.3, 0.2)
+    assert euler(rig.points(GUEST, 0.1, NAN)[0]) == (0.0, 0.1, 0.2)
+    assert euler(rig.points(GUEST, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
+
+
 @pytest.mark.parametrize('message', [
     pitch_yaw(pitch_rate=0.1), pitch_yaw(flags=F.RETRACT), pitch_yaw()])
 def test_gm_9_the_secondary_player_sets_neither_rates_nor_flags(message: Any) -> None:
