@@ -281,7 +281,7 @@ class Gimbal:
         else:
             self._last_control = control
             if not self.in_control:
-                self._stop()
+                self._stop(now)
         self._emit(events.ControlChanged(
             self.key, before, control, self.in_control,
             was_lost=(before is not None and before.primary == us and control is not None
@@ -405,7 +405,7 @@ class Gimbal:
         self.was_commanded = True
         if self._setpoint is not None and self._setpoint.moves:
             self._send_rates(STILL, now)
-        self._stop()
+        self._stop(now)
         self._releasing = True
         self._configure(False, now, ended)
 
@@ -525,7 +525,7 @@ class Gimbal:
         if reason or manager is None:
             done(request.Result(False, reason), now)
             return
-        self._stop()
+        self._stop(now)
         manager.flag_requests.submit(_request(
             manager.flag_target, SetFlags(flags, flag, self.key.device_id, goal), now,
             self._explained(goal, done)), now)
@@ -578,7 +578,7 @@ class Gimbal:
         if reason := self.unavailable(now):
             done(request.Result(False, reason), now)
             return False
-        self._stop()
+        self._stop(now)
         self._commands.start(command, now, ended, limit=now + REQUEST_LIMIT)
         return True
 
@@ -658,8 +658,11 @@ class Gimbal:
         self._setpoints_sent += 1
         self._commands.send(message)
 
-    def _stop(self) -> None:
-        """End the repetition of the setpoint."""
+    def _stop(self, now: float) -> None:
+        """End a rate with a zero, if it can be sent, and send no setpoint again."""
+        if self._setpoint is not None and self._setpoint.zero_at < math.inf and self.in_control:
+            # A request that is refused, or that clears a place, does not end the rate.
+            self._send_rates(STILL, now)
         self._setpoint = None
 
     # Time

@@ -300,6 +300,19 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     assert rig.results[0].message.endswith('; 1/195 has control and must release it first')
 
 
+@pytest.mark.parametrize('result', [mav.MavResult.ACCEPTED, mav.MavResult.DENIED])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
+def test_request_during_a_rate_ends_it_with_a_zero(ask: Ask, result: mav.MavResult) -> None:
+    rig = in_control()
+    rig.managers[0].results = dict.fromkeys(GimbalCommand, result)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.1)
+
+    assert asked(rig, ask)[0] is (result is mav.MavResult.ACCEPTED)
+
+    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
+
+
 @pytest.mark.parametrize(('primary', 'reason'), [
     (OTHER, 'primary 1/195, secondary none'),
     (NONE, 'primary none, secondary none; take control first')])
