@@ -64,8 +64,10 @@ SILENCE_LIMIT = 3.0
 REQUEST_LIMIT = 5.0
 # s after which an attitude is sent again, since the message is not acknowledged.
 REPEATS = (0.2, 0.4, 0.8)
-# s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
-# PX4 does every 2 s), and after which control is unknown.
+# rad/s above which a device turns.
+TURNING = 0.01
+# s after GIMBAL_MANAGER_STATUS until it is requested, since ArduPilot does not stream it and PX4
+# does each 2 s, and until it shows control no more.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 # The most managers of one gimbal; further ones are ignored.
 MAX_MANAGERS = 4
@@ -152,6 +154,8 @@ class _Setpoint:
     attitude: tuple[Quaternion, YawFrame] | None = None
     repeats: list[float] = field(default_factory=list)
     zero_at: float = math.inf
+    # When a zero is sent again if the device still turns.
+    zero_repeats: list[float] = field(default_factory=list)
 
     @property
     def moves(self) -> bool:
@@ -361,6 +365,7 @@ class Gimbal:
         self._check(now)
         if (manager := self._active) is not None:
             manager.flag_requests.take(request.Report(status, now, has_clock=False), now)
+        self._repeat_zero(status, now)
         self._emit(events.AttitudeReceived(self.key, self._attitude, self._flags, self._errors))
 
     # Control
@@ -403,9 +408,9 @@ class Gimbal:
             done(result, now)
 
         self.was_commanded = True
-        if self._setpoint is not None and self._setpoint.moves:
+        self._end_motion(now)
+        if self._setpoint is not None and self._setpoint.moves and self._manager_heard:
             self._send_rates(STILL, now)
-        self._stop(now)
         self._releasing = True
         self._configure(False, now, ended)
 
@@ -644,9 +649,11 @@ class Gimbal:
     def _send_rates(self, rates: Vector, now: float) -> None:
         frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
         message = self._message(setpoint_flags(frame), UNSET_QUATERNION, flu_frd(rates))
-        self._setpoint = _Setpoint(
-            self._manager, message, zero_at=math.inf if rates == STILL else
-            now + self._settings.setpoint_timeout)
+        self._setpoint = _Setpoint(self._manager, message)
+        if rates == STILL:
+            self._setpoint.zero_repeats = [now + delay for delay in REPEATS]
+        else:
+            self._setpoint.zero_at = now + self._settings.setpoint_timeout
         self._send(message)
 
     def _message(
@@ -657,6 +664,27 @@ class Gimbal:
     def _send(self, message: GimbalManagerSetAttitude) -> None:
         self._setpoints_sent += 1
         self._commands.send(message)
+
+    def _end_motion(self, now: float) -> None:
+        """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
+        if self._setpoint is not None:
+            self._setpoint.repeats.clear()
+            if self._setpoint.moves:
+                self._setpoint.zero_at = now
+
+    def _repeat_zero(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Send a zero again where it is due and the device still turns: it was lost."""
+        setpoint = self._setpoint
+        if (setpoint is None or setpoint.message is None or not self.in_control
+                or not setpoint.zero_repeats or now < setpoint.zero_repeats[0]):
+            return
+        rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
+        if any(abs(rate) > TURNING for rate in rates):
+            del setpoint.zero_repeats[0]
+            self._send(setpoint.message)
+        else:
+            # It has stopped, or does not report its rates.
+            setpoint.zero_repeats.clear()
 
     def _stop(self, now: float) -> None:
         """End a rate with a zero, if it can be sent, and send no setpoint again."""

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 from illuminator_ros.gimbal.gimbal import REPEATS
@@ -137,6 +138,54 @@ def test_zero_that_a_closed_link_has_held_back_is_sent_when_control_is_shown_aga
     rig.run(2.0)
 
     assert [one.angular_velocity_y for _, one in setpoints(rig)[before:]] == [0.0]
+
+
+@pytest.mark.parametrize(('rate', 'zeros'), [(0.2, 1 + len(REPEATS)), (0.001, 1), (NAN, 1)])
+def test_zero_is_sent_again_only_while_the_device_reports_that_it_turns(
+        rate: float, zeros: int) -> None:
+    rig = in_control()
+    rig.managers[0].rates = (NAN, 0.0, rate)
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.run(10.0)
+
+    assert [one.angular_velocity_z for _, one in setpoints(rig)] == [approx(-0.2)] + [0.0] * zeros
+
+
+def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    manager.rates = (0.0, 0.0, 0.2)
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.run(0.4)
+    manager.alive = manager.device_alive = False
+    rig.run(4.0)
+    manager.alive = manager.device_alive = True
+    rig.run(2.0)
+
+    assert rig.gimbal.in_control
+    assert manager.received[-1].angular_velocity_z == 0.0
+
+
+@pytest.mark.parametrize('start', [
+    lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now),
+    lambda rig: rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, lambda *_: None)],
+    ids=['rate', 'place'])
+def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_again(
+        start: Callable[[Rig], object]) -> None:
+    rig = in_control(setpoint_timeout=10.0)
+    manager = rig.managers[0]
+    start(rig)
+    rig.run(0.1)
+    manager.alive = False
+    rig.run(4.0)
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(1.0)
+    assert 'not connected' in rig.results[0].message
+    manager.alive = True
+    rig.run(2.0)
+
+    assert rig.gimbal.in_control
+    assert manager.received[-1].angular_velocity_z == 0.0
 
 
 def test_release_stops_a_rate_first() -> None:
