@@ -371,14 +371,11 @@ class GimbalManager(Payload):
                 self._offsets = STILL
             else:
                 # The gimbal stays where it points until the next player sends a setpoint.
-                self._roi = None
                 offsets = STILL
                 if change.after == self.control.holder(Role.SECONDARY):
                     # Offsets do not shift the setpoints of the player that sent them.
                     offsets, self._offsets = self._offsets, STILL
-                self._turn(now, offsets)
-                self._setpoint = self._setpoint and stopped(self._setpoint)
-                self._send(now)
+                self.stop(now, offsets)
             self.events.emit(change)
         if changes and self._status_due < math.inf and now >= self._changed_at + CHANGE_INTERVAL:
             # An additional status, so that players need not wait for the next regular one.
@@ -386,6 +383,13 @@ class GimbalManager(Payload):
             self._commands.send(self.status(now))
 
     # Setpoints
+
+    def stop(self, now: float, offsets: Vector = STILL) -> None:
+        """End rates and the region of interest; offsets, rad, become part of the setpoint."""
+        self._roi = None
+        self._turn(now, offsets)
+        self._setpoint = self._setpoint and stopped(self._setpoint)
+        self._send(now)
 
     def take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
         """Take a setpoint of a player."""
@@ -627,8 +631,11 @@ class GimbalManager(Payload):
         self._status_due = now if active else math.inf
         self._send_due = now if active else math.inf
         if change.after in (ManagerState.INACTIVE, ManagerState.NO_DEVICE):
-            # Another manager may have moved the device, or the next device may be another one.
-            self._setpoint = self._roi = None
+            # Another manager may have moved the device, or the next device may be another one. But
+            # a device that turns at a rate continues until a manager stops it.
+            setpoint = self._setpoint
+            self._setpoint = stopped(setpoint) if setpoint and setpoint.has_rates_only else None
+            self._roi = None
             self._offsets = STILL
         if change.after is ManagerState.LISTENING:
             # Another manager may send no status, but answers a request.

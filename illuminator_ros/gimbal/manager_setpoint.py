@@ -288,9 +288,14 @@ class Setpoint(NamedTuple):
         return bool(self.flags & _POSE_BITS)
 
     @property
+    def has_rates_only(self) -> bool:
+        """Whether the device turns at the rates, without an attitude."""
+        return self.attitude is None and not self.is_pose
+
+    @property
     def target(self) -> Vector:
         """Return roll, pitch and yaw, rad; NaN where there is no attitude."""
-        # The angles of a quaternion take as long as all of the rest.
+        # The computation of angles from a quaternion takes as long as the rest.
         if self.attitude is None or not math.isnan(self.angles[0]):
             return self.angles
         return self.attitude.euler()

@@ -26,6 +26,7 @@ from unittest.mock import Mock
 from illuminator_ros.gimbal.manager import DemandRefused, GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role, RoleHolderChanged
 from illuminator_ros.gimbal.manager_state import ManagerState, StateChanged
+from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.messages import Address
@@ -54,7 +55,13 @@ from rclpy.logging import get_logger  # noqa: E402
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
-from support.gimbal_manager import DEVICE, OURS  # noqa: E402
+from support.gimbal_manager import (  # noqa: E402
+    DEVICE,
+    ManagerRig,
+    OURS,
+    PILOT,
+    pitch_yaw,
+)
 from support.gimbals import FakeManager, served_gimbals  # noqa: E402
 from support.live_link import EndpointLink  # noqa: E402
 from support.ports import free_port  # noqa: E402
@@ -234,6 +241,19 @@ def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:
         program.wait_for('1/191 manages gimbal 1/154 too: this manager is inactive')
         assert report(own_ros, '1/191 manages').level == DiagnosticStatus.ERROR
         assert not trigger(own_ros, 'take_control').success
+
+
+def test_the_end_of_the_node_ends_the_rate_of_any_player() -> None:
+    rig = ManagerRig()
+    rig.take(PILOT)
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=0.3))
+    node: Any = SimpleNamespace(_manager=rig.manager, _gimbals=Mock())
+
+    ManagerNode.shut_down(node, rig.now, Mock())
+    rig.give(PILOT)
+
+    assert [one.angular_velocity_z for one in rig.messages(GimbalDeviceSetAttitude)] == [
+        pytest.approx(0.3), 0.0]
 
 
 DEFAULTS = {one.name: one.default for one in MANAGER_PARAMETERS} | {'gimbal_device_id': 0}

@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+import math
 from pathlib import Path
 import re
 
@@ -46,6 +48,7 @@ from support.gimbal_manager import (
     ManagerRig,
     of,
     PILOT,
+    pitch_yaw,
     request,
 )
 
@@ -151,6 +154,31 @@ def test_setpoints_and_offsets_end_when_the_manager_becomes_inactive() -> None:
     assert rig.manager.tracker.state is ManagerState.ACTIVE
     assert rig.messages(GimbalDeviceSetAttitude, begun) == []
     assert [euler(one) for one in rig.points(PILOT, 0.2)] == [(0.0, 0.2, 0.0)]
+
+
+def cut_the_line(rig: ManagerRig) -> None:
+    rig.device_is_there = False
+    rig.run(4.0)
+    rig.device_is_there = True
+
+
+@pytest.mark.parametrize('interrupt', [cut_the_line, lambda rig: rig.give(OTHER, status())])
+def test_a_rate_ends_when_the_manager_is_active_again(
+        interrupt: Callable[[ManagerRig], object]) -> None:
+    rig = ManagerRig()
+    rig.take(PILOT)
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=0.3))
+    rig.run(0.1)
+    interrupt(rig)
+    interrupted = rig.now
+    rig.run(MANAGER_TIMEOUT + 5.0)
+
+    assert rig.manager.tracker.state is ManagerState.ACTIVE
+    sent = rig.messages(GimbalDeviceSetAttitude, interrupted)
+    assert sent
+    assert {(one.angular_velocity_x, one.angular_velocity_y, one.angular_velocity_z)
+            for one in sent} == {(0.0, 0.0, 0.0)}
+    assert all(math.isnan(one.q[0]) for one in sent)
 
 
 def test_gm_24_a_device_with_a_manager_of_its_own_keeps_ours_inactive() -> None:

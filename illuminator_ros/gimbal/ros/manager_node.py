@@ -218,7 +218,8 @@ class ManagerNode(ServedPayload):
         self._gimbals.poll(now)
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
-        """See :meth:`ServedPayload.shut_down`."""
+        """See :meth:`ServedPayload.shut_down`: end rates, since no manager does it later."""
+        self._manager.stop(now)
         return self._gimbals.shut_down(now, report)
 
     # Diagnostics
