@@ -427,7 +427,7 @@ class Gimbal:
         manager = self._active
         if manager is None or not self._manager_heard:
             done(request.Result(False, self.unavailable(now)), now)
-        elif self._control is not None and (
+        elif self._control is not None and not manager.requests and (
                 self.in_control if take else not self.has_any_control):
             state = 'in control already' if take else 'not in control'
             ended(request.Result(True, f'{state}: {self._control}'), now)

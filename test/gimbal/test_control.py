@@ -101,6 +101,21 @@ def test_request_for_what_the_status_shows_already_sends_nothing(
     assert commands(rig, CONFIGURE) == []
 
 
+@pytest.mark.parametrize(('primary', 'asks', 'last'), [
+    (NONE, (Gimbal.take_control, Gimbal.release_control), 'control released, confirmed'),
+    (OURS, (Gimbal.release_control, Gimbal.take_control), 'control taken, confirmed')])
+def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
+        primary: mav.Address, asks: tuple[Ask, Ask], last: str) -> None:
+    rig = Rig(FakeManager(primary=primary)).run(3.0)
+    for ask in asks:
+        ask(rig.gimbal, rig.now, rig.done)
+    rig.run(3.0)
+
+    assert [one.success for one in rig.results] == [True, True]
+    assert rig.results[1].message.startswith(last)
+    assert rig.gimbal.in_control is (asks[1] is Gimbal.take_control)
+
+
 @pytest.mark.parametrize('primary', [OURS, NONE])
 def test_gm_16_release_includes_secondary_control(primary: mav.Address) -> None:
     rig = Rig(FakeManager(primary=primary, secondary=OURS)).run(3.0)
