@@ -416,10 +416,7 @@ class Gimbal:
 
     def _configure(self, take: bool, now: float, done: request.Done) -> None:
         def ended(result: request.Result, now: float) -> None:
-            if result.success and self._control is None:
-                result = request.Result(False, f'{result.message}; a manager without '
-                                        'GIMBAL_MANAGER_STATUS does not show who has control')
-            elif result.success and take and not self.enforces_control:
+            if result.success and take and not self.enforces_control:
                 result = result._replace(
                     message=f'{result.message}; ArduPilot also obeys components without control')
             done(result, now)
@@ -778,9 +775,16 @@ class Gimbal:
 def _request(
     target: request.Target, change: request.Change[S], now: float, done: request.Done,
 ) -> request.Request[S]:
+    def ended(
+        result: request.Result, change: request.Change[S] | None, status: S | None, now: float,
+    ) -> None:
+        if result.success and status is None:
+            result = request.Result(
+                False, f'{result.message}; no success without {target.status_name}')
+        done(result, now)
+
     return request.Request(
-        target, lambda now: change, lambda result, change, status, now: done(result, now),
-        now=now, limit=now + REQUEST_LIMIT)
+        target, lambda now: change, ended, now=now, limit=now + REQUEST_LIMIT)
 
 
 def _no_status(manager: Address, status_at: float, now: float) -> str:

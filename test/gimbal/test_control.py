@@ -77,7 +77,7 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: mav.
      'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
      '1/195 has control and must release it first'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
-    ({'reports': False}, 'a manager without GIMBAL_MANAGER_STATUS does not show'),
+    ({'reports': False}, 'no success without GIMBAL_MANAGER_STATUS'),
     ({'answers': False}, 'no acknowledgement')])
 def test_gm_16_control_that_no_status_shows_is_not_a_success(
         fields: dict[str, object], text: str) -> None:
@@ -257,6 +257,16 @@ def test_gm_3_flag_is_set_by_command_and_shown_by_the_device(
     success, message = asked(rig, ask)
     assert not success
     assert 'but GIMBAL_DEVICE_ATTITUDE_STATUS shows' in message
+
+
+@pytest.mark.parametrize('ask', [ask for ask, *_ in FLAG_REQUESTS])
+def test_flag_that_no_status_shows_is_not_a_success(ask: Ask) -> None:
+    rig = Rig(FakeManager(primary=OURS, device_reports=False)).run(3.0)
+
+    success, message = asked(rig, ask)
+
+    assert not success
+    assert message.endswith('; no success without GIMBAL_DEVICE_ATTITUDE_STATUS')
 
 
 @pytest.mark.parametrize(('ask', 'needed'), [

@@ -54,7 +54,8 @@ class FakeManager:
     :ivar streams: whether it does so without a request.
     :ivar applies: whether it executes the commands that it accepts.
     :ivar answers: whether it acknowledges commands.
-    :ivar received: the received setpoints.
+    :ivar device_reports: whether the device sends GIMBAL_DEVICE_ATTITUDE_STATUS.
+    :ivar received: the setpoints that came.
     """
 
     address: mav.Address = AUTOPILOT
@@ -69,6 +70,7 @@ class FakeManager:
     answers: bool = True
     alive: bool = True
     device_alive: bool = True
+    device_reports: bool = True
     primary: mav.Address = mav.Address(0, 0)
     secondary: mav.Address = mav.Address(0, 0)
     flags: int = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK | MountFlags.YAW_IN_VEHICLE_FRAME
@@ -109,7 +111,7 @@ class FakeManager:
         if self.device_alive:
             if tenth % 10 == 5 and self.device != self.address:
                 sent.append((self.device, mav.heartbeat(gm.MAV_TYPE_GIMBAL)))
-            if tenth % 2 == 1:
+            if self.device_reports and tenth % 2 == 1:
                 sent.append((self.device, self.attitude()))
         return sent
 
