@@ -116,6 +116,19 @@ def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
     assert rig.gimbal.in_control is (asks[1] is Gimbal.take_control)
 
 
+def test_requests_are_confirmed_after_one_during_which_the_process_paused() -> None:
+    rig = Rig(FakeManager()).run(3.0)
+    rig.gimbal.take_control(rig.now, rig.done)
+    rig.run(0.02)
+    rig.now += 8.0
+    rig.receive(AUTOPILOT, rig.managers[0].status())
+    rig.run(3.0)
+    rig.results.clear()
+
+    asks = [Gimbal.release_control, Gimbal.take_control]
+    assert [asked(rig, ask, 6.0)[0] for ask in asks] == [True, True]
+
+
 @pytest.mark.parametrize('primary', [OURS, NONE])
 def test_gm_16_release_includes_secondary_control(primary: mav.Address) -> None:
     rig = Rig(FakeManager(primary=primary, secondary=OURS)).run(3.0)
