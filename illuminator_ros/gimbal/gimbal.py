@@ -385,6 +385,11 @@ class Gimbal:
         todo = '' if self._control.primary else '; take control first'
         return f'no control of gimbal {self.key}: {self._control}{todo}'
 
+    def _begin(self, now: float) -> None:
+        """Begin a request or a setpoint of a user, which may come before the poll that is due."""
+        self.was_commanded = True
+        self._check(now)
+
     @property
     def has_any_control(self) -> bool:
         """Whether this component has primary or secondary control, and the manager is heard."""
@@ -397,8 +402,8 @@ class Gimbal:
         return manager is None or manager.autopilot != MAV_AUTOPILOT_ARDUPILOTMEGA
 
     def take_control(self, now: float, done: request.Done) -> None:
-        """Take primary control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
-        self.was_commanded = True
+        """Take primary control; a success only if GIMBAL_MANAGER_STATUS shows it."""
+        self._begin(now)
         self._configure(True, now, done)
 
     def release_control(self, now: float, done: request.Done) -> None:
@@ -407,7 +412,7 @@ class Gimbal:
             self._releasing = False
             done(result, now)
 
-        self.was_commanded = True
+        self._begin(now)
         self._end_motion(now)
         if self._setpoint is not None and self._setpoint.moves and self._manager_heard:
             self._send_rates(STILL, now)
@@ -520,7 +525,7 @@ class Gimbal:
         self, flag: MountFlags, flags: MountFlags, needed: Capabilities, goal: str, now: float,
         done: request.Done,
     ) -> None:
-        self.was_commanded = True
+        self._begin(now)
         missing = self._missing(needed)
         reason = self.unavailable(now) or missing
         manager = self._active
@@ -576,7 +581,7 @@ class Gimbal:
                 result.accepted, str(result), refused=(
                     result.status is CommandStatus.ANSWERED and not result.accepted)), now)
 
-        self.was_commanded = True
+        self._begin(now)
         if reason := self.unavailable(now):
             done(request.Result(False, reason), now)
             return False
@@ -594,7 +599,7 @@ class Gimbal:
             :class:`~..payload.mount_attitude.MountAttitude`.
         :return: why it was not sent, for people; '' if it was.
         """
-        self.was_commanded = True
+        self._begin(now)
         absolute = (Capabilities.HAS_YAW_LOCK, Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
         reason = self.unavailable(now) or (
             self._missing(*absolute) if frame is YawFrame.EARTH else '')
@@ -616,7 +621,7 @@ class Gimbal:
         """
         if not any(map(math.isnan, angles)):
             return self.set_attitude(Quaternion.from_euler(*angles), frame, now)
-        self.was_commanded = True
+        self._begin(now)
         if reason := self.unavailable(now):
             return reason
         base = None
@@ -637,7 +642,7 @@ class Gimbal:
 
         :return: why they were not sent, for people; '' if they were.
         """
-        self.was_commanded = True
+        self._begin(now)
         reason = self.unavailable(now)
         if not reason:
             self._send_rates(rates, now)

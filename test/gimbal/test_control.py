@@ -180,6 +180,18 @@ def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard
     assert rig.run(0.5).gimbal.in_control
 
 
+@pytest.mark.parametrize('ask', [Gimbal.take_control, Gimbal.release_control, Gimbal.clear_roi])
+def test_gm_14_status_is_out_of_date_for_a_call_that_comes_before_the_poll(ask: Ask) -> None:
+    rig = in_control()
+    rig.now += 60.0
+
+    ask(rig.gimbal, rig.now, rig.done)
+
+    assert rig.results[0].message.startswith(
+        'gimbal 1/154 is not connected: nothing from manager 1/1 for 60.')
+    assert not rig.gimbal.in_control
+
+
 def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only() -> None:
     rig = Rig(FakeManager(primary=OURS, streams=False)).run(60.0)
 

@@ -92,6 +92,14 @@ def test_rate_is_a_message_in_rad_per_s_and_ends_with_one_zero() -> None:
     assert all(map(math.isnan, setpoints(rig)[0][1].q))
 
 
+def test_gm_14_setpoint_that_comes_before_the_poll_after_a_pause_is_not_sent() -> None:
+    rig = in_control()
+    rig.now += 60.0
+
+    assert 'not connected' in rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    assert not rig.component.outgoing
+
+
 def test_rate_of_zero_needs_no_second_zero() -> None:
     rig = in_control()
     rig.gimbal.set_rates((0.0, 0.0, 0.0), rig.now)
