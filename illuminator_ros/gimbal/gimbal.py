@@ -69,7 +69,10 @@ TURNING = 0.01
 # s after GIMBAL_MANAGER_STATUS until it is requested, since ArduPilot does not stream it and PX4
 # does each 2 s, and until it shows control no more.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
-# The most managers of one gimbal; further ones are ignored.
+# ms by which GIMBAL_MANAGER_STATUS may be older than the one before it; with a longer step back,
+# the manager has restarted.
+LATE_LIMIT = 1000
+# Managers of one gimbal; more are ignored.
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
@@ -111,6 +114,8 @@ class _Manager:
     information: GimbalManagerInformation | None = None
     control: Control | None = None
     status_at: float = -math.inf
+    # The time_boot_ms of the newest status.
+    status_time: int = 0
     status_query: Repetition = field(default_factory=Repetition)
 
     @property
@@ -341,8 +346,11 @@ class Gimbal:
     def take_status(self, source: Address, status: GimbalManagerStatus, now: float) -> None:
         """Take GIMBAL_MANAGER_STATUS of the gimbal."""
         manager = self._manager_at(source, now)
-        if manager is None:
+        # The counter wraps.
+        if manager is None or (
+                0 < (manager.status_time - status.time_boot_ms) % (1 << 32) < LATE_LIMIT):
             return
+        manager.status_time = status.time_boot_ms
         manager.status_at, manager.control = now, Control.of(status)
         manager.status_query = Repetition(now + STATUS_REQUEST_DELAY)
         self._check(now)

@@ -156,6 +156,18 @@ def test_gm_17_lost_control_is_told_and_not_taken_back() -> None:
     assert commands(rig, CONFIGURE) == []
 
 
+@pytest.mark.parametrize(('before', 'after', 'counts'), [
+    (5000, 5200, True), (5000, 5000, True), (5000, 4800, False), (60000, 100, True),
+    (2**32 - 100, 100, True), (100, 2**32 - 100, False)])
+def test_gm_14_status_counts_unless_it_is_late(before: int, after: int, counts: bool) -> None:
+    rig = Rig(FakeManager(streams=False)).run(1.0)
+
+    for time, primary in (before, OTHER), (after, OURS):
+        rig.receive(AUTOPILOT, GimbalManagerStatus(time, 0, 154, *primary, 0, 0))
+
+    assert rig.gimbal.in_control is counts
+
+
 def status_requests(rig: Rig) -> int:
     return sum(one[0] == GimbalManagerStatus.id
                for one in commands(rig, mav.MavCmd.REQUEST_MESSAGE))
