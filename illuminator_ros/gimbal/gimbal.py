@@ -66,13 +66,13 @@ REQUEST_LIMIT = 5.0
 REPEATS = (0.2, 0.4, 0.8)
 # rad/s above which a device turns.
 TURNING = 0.01
-# s after GIMBAL_MANAGER_STATUS until it is requested, since ArduPilot does not stream it and PX4
-# does each 2 s, and until it shows control no more.
+# s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
+# PX4 does every 2 s), and after which control is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 # ms by which GIMBAL_MANAGER_STATUS may be older than the one before it; with a longer step back,
 # the manager has restarted.
 LATE_LIMIT = 1000
-# Managers of one gimbal; more are ignored.
+# The most managers of one gimbal; further ones are ignored.
 MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
@@ -410,7 +410,7 @@ class Gimbal:
         return manager is None or manager.autopilot != MAV_AUTOPILOT_ARDUPILOTMEGA
 
     def take_control(self, now: float, done: request.Done) -> None:
-        """Take primary control; a success only if GIMBAL_MANAGER_STATUS shows it."""
+        """Take primary control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         self._begin(now)
         self._configure(True, now, done)
 
@@ -493,11 +493,10 @@ class Gimbal:
         return self._sources.holder or ''
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """End the rate, the place and the commands of the previous source."""
+        """End the setpoint and the commands of the previous source."""
         if change is None:
             return
-        if self._setpoint is not None and self._setpoint.moves:
-            self._setpoint.zero_at = now
+        self._end_motion(now)
         if self._active is not None and change.before is not None:
             self._active.flag_requests.cancel(self.refusal(change.before), now)
             # The manager may have other gimbals, whose commands must not end.

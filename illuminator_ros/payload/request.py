@@ -138,8 +138,9 @@ class Target:
         return 1.25 * max(self._delays) + 0.05 if self._delays else UNKNOWN_DELAY
 
     def note_status_delay(self, seconds: float) -> None:
-        """Note how long after a command the first status showed the change."""
-        # A longer one is not of the status: the acknowledgement was late, or this process paused.
+        """Note the time from a command to the first status that showed the change."""
+        # A longer time is not a delay of the status: the acknowledgement was late, or this process
+        # paused.
         self._delays = [*self._delays[1 - MAX_DELAYS:], min(seconds, CONFIRMATION_TIMEOUT)]
 
 

@@ -101,6 +101,18 @@ def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
         *sent, 0.0]
 
 
+def test_an_attitude_is_not_sent_again_after_the_hold_of_its_source() -> None:
+    rig = shared()
+    assert point(rig, 'autonomy') == ''
+    rig.run(0.1)
+    before = len(rig.messages(GimbalManagerSetAttitude))
+
+    rig.gimbal.claim('safety', rig.now)
+    rig.run(3.0)
+
+    assert len(rig.messages(GimbalManagerSetAttitude)) == before
+
+
 def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> None:
     rig = Rig(*(FakeManager(device_id=number, primary=OURS) for number in (1, 2)),
               sources=SourceSettings(NAMES, TIMEOUT)).run(4.0)

@@ -55,7 +55,7 @@ class FakeManager:
     :ivar applies: whether it executes the commands that it accepts.
     :ivar answers: whether it acknowledges commands.
     :ivar device_reports: whether the device sends GIMBAL_DEVICE_ATTITUDE_STATUS.
-    :ivar received: the setpoints that came.
+    :ivar received: the received setpoints.
     """
 
     address: mav.Address = AUTOPILOT
