@@ -69,9 +69,9 @@ class MountParent(Enum):
 
         :raises ValueError: if it names another frame; '' is the vehicle's frame.
         """
-        name = frame_id.rpartition('/')[2]
+        name = frame_id.rpartition('/')[2] if frame_id else cls.VEHICLE.value
         for parent in cls:
-            if name in (parent.value, '' if parent is cls.VEHICLE else parent.value):
+            if name == parent.value:
                 return parent
         known = ', '.join(one.value for one in cls)
         raise ValueError(f'frame_id {frame_id!r} is not one of {known}')

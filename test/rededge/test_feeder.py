@@ -357,12 +357,17 @@ def test_a_mount_in_any_frame_of_a_gimbal_is_sent_relative_to_the_vehicle_re_24(
         round(100 * angle) for angle in mount_angles(mount, MountFrame.CAMERA))
 
 
-def test_a_mount_in_an_unknown_frame_is_refused_and_frames_are_not_mixed() -> None:
-    rig = Rig(mount_frame=MountFrame.CAMERA)
-    rig.mount(frame_id='camera_link')
+@pytest.mark.parametrize('frame_id', ['camera_link', 'odom/', '/'])
+def test_a_mount_in_an_unknown_frame_is_refused(frame_id: str) -> None:
+    rig = Rig()
+    rig.mount(frame_id=frame_id)
     assert rig.state(Input.MOUNT) == (
-        InputState.REFUSED, "frame_id 'camera_link' is not one of base_link, "
-        'base_link_stabilized, map')
+        InputState.REFUSED,
+        f"frame_id '{frame_id}' is not one of base_link, base_link_stabilized, map")
+
+
+def test_mounts_in_different_frames_are_not_mixed() -> None:
+    rig = Rig()
     rig.mount(age=0.1)
     rig.run(0.1)
     # The mount is unknown between two mounts in different frames.
