@@ -370,10 +370,14 @@ class Feeder:
         def take() -> None:
             if not FIRST_UTC <= utc // 1000 <= LAST_UTC:
                 raise ValueError(f'{utc / 1e9:.1f} s after 1970-01-01 cannot be UTC')
+            _check_age(stamp, TIME_REFERENCE_LIFETIME)
+            if self._reference is not None:
+                _check_newer(stamp.time, self._reference.time)
             self._needs_reference = True
             self._reference = _Reference(stamp.time, utc - stamp.time)
 
-        self._take(Input.TIME_REFERENCE, now, take)
+        # It is used with later fixes, so its age counts from its stamp.
+        self._take(Input.TIME_REFERENCE, now, take, age=max(0.0, stamp.age))
 
     def take_velocity(self, velocity: Vector, stamp: Stamp, now: float) -> None:
         """Take the velocity of the vehicle, ENU, m/s."""

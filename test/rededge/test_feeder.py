@@ -80,8 +80,8 @@ class Rig:
         self.feeder.take_mount(orientation, frame_id, self.stamp(age), self.now)
         return self.take()
 
-    def reference(self, utc: float) -> None:
-        self.feeder.take_time_reference(self.stamp(), round(utc * 1e9), self.now)
+    def reference(self, utc: float, age: float = 0.0) -> None:
+        self.feeder.take_time_reference(self.stamp(age), round(utc * 1e9), self.now)
 
     def take(self) -> list[Message]:
         sent, self.sent[:] = list(self.sent), []
@@ -219,6 +219,30 @@ def test_a_reference_that_cannot_be_utc_is_refused_re_14() -> None:
     rig.reference(1e9)
     assert rig.state(Input.TIME_REFERENCE) == (
         InputState.REFUSED, '1000000000.0 s after 1970-01-01 cannot be UTC')
+
+
+@pytest.mark.parametrize(('age', 'reason'), [
+    (61.0, 'its stamp is 61.00 s old by the ROS clock'),
+    (-61.0, 'its stamp is 61.00 s ahead of the ROS clock'),
+    (30.0, 'its stamp is not newer than the last'), (1.0, 'its stamp is not newer than the last')])
+def test_an_old_or_overtaken_reference_is_refused_and_the_last_one_holds_re_14(
+        age: float, reason: str) -> None:
+    rig = Rig()
+    rig.reference(EPOCH + 5)
+    rig.run(1.0)
+    rig.reference(EPOCH, age)
+    assert rig.state(Input.TIME_REFERENCE) == (InputState.OK, reason)
+    (sent,) = rig.fix()
+    assert isinstance(sent, GpsRawInt)
+    assert sent.time_usec == (EPOCH + 6) * 1_000_000
+
+
+def test_a_reference_is_stale_by_its_stamp_like_the_positions_that_need_it() -> None:
+    rig = Rig()
+    rig.reference(EPOCH, age=50.0)
+    assert (rig.fix() != [], rig.state(Input.TIME_REFERENCE)[0]) == (True, InputState.OK)
+    rig.run(11.0)
+    assert (rig.fix() != [], rig.state(Input.TIME_REFERENCE)[0]) == (False, InputState.STALE)
 
 
 def test_an_old_reference_or_a_jump_of_ros_time_ends_the_position_until_a_new_reference() -> None:
