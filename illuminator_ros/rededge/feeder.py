@@ -330,20 +330,20 @@ class Feeder:
         if settings.position_source is PositionSource.RAW:
             satellites = self._satellites if self._is_fresh(Input.SATELLITES, now) else None
             self._send(conversions.gps_raw_int(
-                position, utc, velocity, satellites, settings.geoid_separation))
+                position, utc // 1000, velocity, satellites, settings.geoid_separation))
         elif velocity is None:
             raise ValueError('position_source fused needs ~/velocity, which is missing')
         else:
             boot_ms = time_boot_ms(now)
             placed = conversions.global_position_int(
                 position, velocity, settings.geoid_separation, boot_ms)
-            self._send(conversions.system_time(utc, boot_ms))
+            self._send(conversions.system_time(utc // 1000, boot_ms))
             self._send(placed)
         self._fix_time = stamp.time
         self._positions += self._link_open
 
     def _utc(self, stamp: Stamp) -> int:
-        """Return the UTC of a stamp, us."""
+        """Return the UTC of a stamp, ns."""
         offset = 0
         if self._needs_reference:
             if self._reference is None:
@@ -355,9 +355,9 @@ class Feeder:
         elif stamp.simulated:
             raise ValueError('ROS time is simulated (use_sim_time), which is not UTC: publish '
                              '~/time_reference')
-        utc = (stamp.time + offset) // 1000
-        if not FIRST_UTC <= utc <= LAST_UTC:
-            raise ValueError(f'its time, {utc / 1e6:.1f} s after 1970-01-01, cannot be UTC: set '
+        utc = stamp.time + offset
+        if not FIRST_UTC <= utc // 1000 <= LAST_UTC:
+            raise ValueError(f'its time, {utc / 1e9:.1f} s after 1970-01-01, cannot be UTC: set '
                              'the clock, or publish ~/time_reference')
         return utc
 
@@ -402,13 +402,18 @@ class Feeder:
 
         self._take(Input.SATELLITES, now, take)
 
-    def ros_time(self, time: int) -> int | None:
-        """Return the ROS time of a UTC in ns; None if it is unknown or does not fit a stamp."""
-        if (not FIRST_UTC <= time // 1000 <= LAST_UTC
-                or self._needs_reference and self._reference is None):
-            return None
-        ros = time - (self._reference.offset if self._reference else 0)
-        return ros if 0 <= ros < END_OF_STAMPS else None
+    def ros_time(self, utc: int, present: Stamp) -> int:
+        """
+        Return the ROS time of a UTC in ns.
+
+        :param present: a stamp of now, whose time is returned if that is not known.
+        """
+        try:
+            ros = utc - (self._utc(present) - present.time)
+        except ValueError:
+            return present.time
+        is_known = FIRST_UTC <= utc // 1000 <= LAST_UTC and 0 <= ros < END_OF_STAMPS
+        return ros if is_known else present.time
 
     def clock_jumped(self) -> None:
         """Forget everything that depends on ROS time, which has jumped."""

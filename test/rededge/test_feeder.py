@@ -83,6 +83,10 @@ class Rig:
     def reference(self, utc: float, age: float = 0.0) -> None:
         self.feeder.take_time_reference(self.stamp(age), round(utc * 1e9), self.now)
 
+    def image_time(self, utc: float) -> int:
+        """Return the ROS time of an image, ns."""
+        return self.feeder.ros_time(round(utc * 1e9), self.stamp())
+
     def take(self) -> list[Message]:
         sent, self.sent[:] = list(self.sent), []
         return sent
@@ -201,17 +205,34 @@ def test_time_that_is_not_utc_is_not_sent_unless_a_reference_tells_it_re_14(
     (sent,) = rig.fix()
     assert isinstance(sent, GpsRawInt)
     assert sent.time_usec == (EPOCH + 7) * 1_000_000 + 500_000
-    assert rig.feeder.ros_time(round((EPOCH + 7.5) * 1e9)) == rig.stamp().time
 
 
-def test_time_of_an_image_that_no_stamp_can_have_is_not_known_re_14() -> None:
+@pytest.mark.parametrize('set_clock', [since_boot, simulate])
+def test_an_image_has_its_own_ros_time_or_the_present_one_while_that_is_not_known_re_14(
+        set_clock: Callable[[Rig], None]) -> None:
     rig = Rig()
-    assert [rig.feeder.ros_time(seconds * 10**9) for seconds in (2**31 - 1, 2**31, 4 * 10**9)] == [
-        (2**31 - 1) * 10**9, None, None]
+    set_clock(rig)
+    present = rig.stamp().time
+    # The camera has UTC of its own GPS.
+    assert rig.image_time(EPOCH) == present
+    rig.reference(EPOCH + 5.5)
+    assert rig.image_time(EPOCH) == present - 5_500_000_000
+    rig.run(61.0)
+    assert rig.image_time(EPOCH) == rig.stamp().time
+    rig.reference(EPOCH + 66.5)
+    rig.feeder.clock_jumped()
+    assert rig.image_time(EPOCH) == rig.stamp().time
+
+
+def test_an_image_with_a_time_that_no_stamp_can_have_has_the_present_one_re_14() -> None:
+    rig = Rig()
+    present = rig.stamp().time
+    assert [rig.image_time(seconds) for seconds in (2**31 - 1, 2**31, 4 * 10**9)] == [
+        (2**31 - 1) * 10**9, present, present]
     # ROS time began with the boot, after this image.
     since_boot(rig)
     rig.reference(EPOCH)
-    assert rig.feeder.ros_time((EPOCH - 1000) * 10**9) is None
+    assert rig.image_time(EPOCH - 1000) == rig.stamp().time
 
 
 def test_a_reference_that_cannot_be_utc_is_refused_re_14() -> None:
@@ -256,7 +277,6 @@ def test_an_old_reference_or_a_jump_of_ros_time_ends_the_position_until_a_new_re
     rig.feeder.clock_jumped()
     assert rig.fix() == []
     assert rig.state(Input.FIX)[1] == 'ROS time has jumped: waiting for ~/time_reference'
-    assert rig.feeder.ros_time(EPOCH * 10**9) is None
     rig.reference(EPOCH)
     assert classes(rig.fix()) == [GpsRawInt]
 

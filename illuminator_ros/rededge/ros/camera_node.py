@@ -31,7 +31,7 @@ from .inputs import subscriptions
 from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
 from ..client import RedEdgeClient, Settings
 from ..conversions import image_attitude, image_position, MountFrame
-from ..feeder import FeederSettings, Input, InputChanged, InputState, PositionSource
+from ..feeder import FeederSettings, Input, InputChanged, InputState, PositionSource, Stamp
 from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
 from ...mavlink.command_sender import CommandSender
 from ...payload.rotation import Vector
@@ -175,10 +175,9 @@ class CameraNode(ServedPayload):
     def _publish(self, feedback: CameraFeedback) -> None:
         """Publish the metadata of an image, stamped with its own time."""
         settings = self._client.settings.feeder
-        time = self._client.feeder.ros_time(feedback.time_usec * 1000)
-        if time is None:
-            time = self._clock.now().nanoseconds
-        seconds, nanoseconds = divmod(time, 1_000_000_000)
+        present = Stamp(self._clock.now().nanoseconds, 0.0, self._clock.ros_time_is_active)
+        seconds, nanoseconds = divmod(
+            self._client.feeder.ros_time(feedback.time_usec * 1000, present), 1_000_000_000)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
         position = image_position(feedback, settings.geoid_separation)
         fix = NavSatFix(header=Header(stamp=stamp, frame_id=self._host.values['frame_id']),
