@@ -33,9 +33,10 @@ PING_TRIES = 2
 UNANSWERED_PINGS = 3
 # s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
 CAPTURE_TIMEOUT = 5.0
-# s in which a late answer to a capture may still come.
-LATE_ANSWER = 60.0
-# Image indices that are remembered: the image of a new request has a new index.
+# s in which the answer to a capture that had none may still come; captures fail meanwhile, since a
+# lost request looks the same.
+LATE_ANSWER = 15.0
+# Image indices that are remembered: a new request has an index that was not seen.
 MAX_INDICES = 32
 # So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
 CONFLICT_HEARTBEATS = 10
@@ -115,8 +116,8 @@ class _Capture:
     sent_at: float
     done: Done
     index: int | None = None
-    # Whether an image was reported that an earlier request may have caused.
-    ambiguous: bool = False
+    # Until when the earlier request that may have caused a seen image counts, s.
+    late_until: float | None = None
 
     @property
     def due(self) -> float:
@@ -308,10 +309,10 @@ class Camera:
         while self._late and now >= self._late[0]:
             self._late.popleft()
         if self._late:
-            # The image may be the late answer to an earlier request.
-            self._late.popleft()
+            # It may be the late answer to an earlier request.
+            late_until = self._late.popleft()
             if self._capture is not None:
-                self._capture = replace(self._capture, ambiguous=True)
+                self._capture = replace(self._capture, late_until=late_until)
         elif self._capture is not None and self._capture.index is None:
             self._capture = replace(self._capture, index=index)
 
@@ -328,10 +329,14 @@ class Camera:
             self._end_capture(False, f'image {capture.index} triggered, not confirmed: no '
                                      f'CAMERA_FEEDBACK within {limit}')
             return
-        self._late.append(now + LATE_ANSWER)
-        self._end_capture(False, f'no answer to DIGICAM_CONTROL within {limit}' + (
-            '; an image was reported that an earlier request may have caused'
-            if capture.ambiguous else ''))
+        text = f'no answer to DIGICAM_CONTROL within {limit}'
+        if capture.late_until is None:
+            self._late.append(now + LATE_ANSWER)
+        else:
+            # A new period here would never end while images are taken.
+            self._late.appendleft(capture.late_until)
+            text += '; an image was reported that an earlier request may have caused'
+        self._end_capture(False, text)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""

@@ -269,6 +269,20 @@ def test_a_late_answer_does_not_confirm_the_next_capture() -> None:
     assert len(rig.results) == 3
 
 
+def test_a_request_without_an_answer_makes_later_captures_fail_for_15_s_only() -> None:
+    rig = Rig()
+    rig.capture()
+    rig.run(5.0, beats=True)
+    for index in range(1, 6):
+        rig.capture()
+        rig.hear(status(index), feedback(index))
+        rig.run(5.0, beats=True)
+    ambiguous = f'{NO_ANSWER}; an image was reported that an earlier request may have caused'
+    successes = [success for success, _ in rig.results]
+    assert rig.results[:2] == [(False, NO_ANSWER), (False, ambiguous)]
+    assert successes == [False] * 4 + [True] * 2
+
+
 def test_a_capture_is_refused_without_a_camera_or_while_another_runs() -> None:
     rig = Rig(connected=False)
     rig.capture()
