@@ -135,7 +135,8 @@ def publish(
         if time.monotonic() > until:
             raise RuntimeError('the topics have no subscribers')
         time.sleep(0.01)
-    time.sleep(0.5)
+    # A node sends no attitude for 2 s after its start.
+    time.sleep(2.0)
     began: dict[int, float] = {}
     start, before = time.perf_counter(), [cpu(pid) for pid in pids]
     every = round(rate / FIX_RATE)

@@ -295,6 +295,7 @@ class Feeder:
         self._mount_parent = MountParent.VEHICLE
         # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a publisher.
         self._fixed_mount: Vector | None = (0.0, 0.0, 0.0)
+        self._fixed_since = -math.inf
         self._link_open = False
         self._mount_due = math.inf
         self._pair_due = -math.inf
@@ -474,11 +475,15 @@ class Feeder:
         self._fixed_mount = None
         self._mount_due = math.inf
 
-    def set_fixed_mount(self, angles: Vector, now: float) -> None:
-        """Set roll, pitch and yaw of a fixed mount, degrees; no effect with ``~/mount``."""
+    def set_fixed_mount(self, angles: Vector, since: float) -> None:
+        """
+        Set roll, pitch and yaw of a fixed mount, degrees; no effect with ``~/mount``.
+
+        :param since: when it may be sent first, s.
+        """
         if self._fixed_mount is not None:
-            self._fixed_mount = angles
-            self._mount_due = now if self._link_open else math.inf
+            self._fixed_mount, self._fixed_since = angles, since
+            self._mount_due = since if self._link_open else math.inf
 
     def _send_pair(self, now: float) -> None:
         """Send the newest known attitude and mount of one instant, back to back."""
@@ -493,6 +498,8 @@ class Feeder:
             if not (self._is_fresh(Input.MOUNT, now) and self._mounts.samples):
                 return
             time = min(time, self._mounts.samples[-1].time)
+        elif now < self._fixed_since:
+            return
         mount, sample = self._mounts.at(time), history.at(time)
         if sample is None or time <= self._pair_time:
             return
@@ -544,7 +551,7 @@ class Feeder:
         self._link_open = True
         # The link repeats the call while it hears no peer.
         if self._fixed_mount is not None and self._mount_due == math.inf:
-            self._mount_due = now
+            self._mount_due = max(now, self._fixed_since)
 
     def link_closed(self) -> None:
         """Stop repeating the fixed mount until the link is open again."""

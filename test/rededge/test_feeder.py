@@ -349,6 +349,19 @@ def test_a_fixed_mount_is_sent_each_second_without_attitude_and_after_a_change_r
     assert rig.run(3.0) == []
 
 
+def test_a_fixed_mount_is_not_sent_before_its_time_nor_an_attitude_re_26_re_27() -> None:
+    rig = Rig()
+    rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now + 2.0)
+    rig.feeder.link_opened(rig.now)
+    assert rig.imu() + rig.run(1.9) + rig.imu() == []
+    assert rig.run(0.1) == [MountStatus(*CAMERA, -200, 100, 350)]
+    assert classes(rig.imu()) == [Attitude, MountStatus]
+    # A gimbal is not waited for.
+    rig.feeder.set_fixed_mount((0.0, 0.0, 0.0), rig.now + 2.0)
+    rig.run(0.1)
+    assert classes(rig.imu() + rig.mount()) == [Attitude, MountStatus]
+
+
 def test_what_is_dropped_since_the_link_is_closed_is_not_counted() -> None:
     rig = Rig()
     for opened in (False, True):

@@ -231,6 +231,17 @@ def test_fixed_mount_is_set_at_run_time_and_gives_way_to_the_topic_re_23_re_27(
         assert is_fed_no_angles() or is_fed_no_angles()
 
 
+def test_no_fixed_mount_is_sent_where_the_topic_has_had_a_publisher_since_the_start_re_27(
+        own_ros: Ros) -> None:
+    own_ros.node.create_publisher(geometry.QuaternionStamped, '/rededge/mount', 10)
+    with (running_camera() as camera,
+          running_node(own_ros, camera, slow_python, heartbeat_timeout=60.0) as node):
+        node.wait_for('~/mount has a publisher: the mount is not fixed')
+        # One in 2 s.
+        pass_time_until(lambda: len(camera.messages('PING')) > 3, step=0.5)
+        assert not camera.messages('MOUNT_STATUS')
+
+
 def test_simulated_time_is_no_utc_until_a_reference_tells_it_re_14(own_ros: Ros) -> None:
     with (running_camera() as camera,
           running_node(own_ros, camera, use_sim_time='true', geoid_separation=0)):

@@ -50,6 +50,9 @@ from ...ros.payload import Host, RosPayload, ServedPayload
 
 # The frame of ~/image/attitude: its axes point to east, north and up (REP-105).
 EARTH_FRAME = 'map'
+# s in which a publisher of ~/mount is discovered; shorter than the 5 s for which the camera keeps
+# what it got before a restart of the node.
+DISCOVERY_TIME = 2.0
 
 PARAMETERS = (
     ParameterSpec('position_source', 'raw', 'messages that carry the position: GPS_RAW_INT, or '
@@ -110,7 +113,7 @@ class CameraNode(ServedPayload):
         angles = {spec.name: spec.check(given.get(spec.name, spec.default))
                   for spec in MOUNT_PARAMETERS}
         self._parameters.show(angles)
-        client.feeder.set_fixed_mount(_angles(angles), host.link.clock())
+        client.feeder.set_fixed_mount(_angles(angles), host.link.clock() + DISCOVERY_TIME)
         ParameterServices(
             host.node, host.link, host.log, self._parameters, configure=self._set_mount)
         host.diagnostics.add(DiagnosticsSource(
