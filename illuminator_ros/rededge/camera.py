@@ -36,7 +36,7 @@ CAPTURE_TIMEOUT = 5.0
 # s in which the answer to a capture that had none may still come; captures fail meanwhile, since a
 # lost request looks the same.
 LATE_ANSWER = 15.0
-# Image indices that are remembered: a new request has an index that was not seen.
+# Image indices that are remembered: the image of a new request has a new index.
 MAX_INDICES = 32
 # So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
 CONFLICT_HEARTBEATS = 10
@@ -116,7 +116,7 @@ class _Capture:
     sent_at: float
     done: Done
     index: int | None = None
-    # Until when the earlier request that may have caused a seen image counts, s.
+    # The time until which the earlier request that may have caused a reported image counts, s.
     late_until: float | None = None
 
     @property
@@ -309,7 +309,7 @@ class Camera:
         while self._late and now >= self._late[0]:
             self._late.popleft()
         if self._late:
-            # It may be the late answer to an earlier request.
+            # The image may be the late answer to an earlier request.
             late_until = self._late.popleft()
             if self._capture is not None:
                 self._capture = replace(self._capture, late_until=late_until)
