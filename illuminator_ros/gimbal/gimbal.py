@@ -405,7 +405,7 @@ class Gimbal:
 
     @property
     def enforces_control(self) -> bool:
-        """False if the manager is known to obey components without control."""
+        """Whether the manager refuses components without control, as far as it is known."""
         manager = self._active
         return manager is None or manager.autopilot != MAV_AUTOPILOT_ARDUPILOTMEGA
 
