@@ -166,25 +166,25 @@ def enable_all(
 
     def outcome(light: Light, result: Result, now: float) -> None:
         outcomes[light] = result
-        if len(outcomes) == len(connected):
-            done(_summary(on, [
-                (name(one), outcomes.get(one) or Result(False, one.unreachable(now)))
-                for one in lights], [outcomes[one] for one in connected]), now)
+        if len(outcomes) == len(lights):
+            done(_summary(on, {name(one): outcomes[one] for one in lights},
+                          [outcomes[one] for one in connected]), now)
 
-    for light in connected:
+    # A lost light fails at once, but an OFF replaces a remembered ON.
+    for light in lights:
         light.enable(on, now, functools.partial(outcome, light), detail=detail,
                      is_stream=is_stream)
-    if not connected:
-        lost = '; '.join(f'{name(light)}: {light.unreachable(now)}' for light in lights)
-        done(Result(False, lost or 'no light has been heard yet'), now)
+    if not lights:
+        done(Result(False, 'no light has been heard yet'), now)
 
 
 def _summary(
-    on: bool, outcomes: list[tuple[str, Result]], connected: list[Result],
+    on: bool, outcomes: Mapping[str, Result], connected: list[Result],
 ) -> Result:
     failures = [result for result in connected if not result.success]
-    done = f'{len(connected) - len(failures)} of {len(connected)} {"on" if on else "off"}'
-    return Result(
-        not failures,
-        '; '.join([done, *(f'{name}: {result.message}' for name, result in outcomes)]),
-        superseded=all(result.superseded for result in failures))
+    texts = [f'{name}: {result.message}' for name, result in outcomes.items()]
+    if connected:
+        succeeded = len(connected) - len(failures)
+        texts.insert(0, f'{succeeded} of {len(connected)} {"on" if on else "off"}')
+    return Result(bool(connected) and not failures, '; '.join(texts),
+                  superseded=bool(failures) and all(one.superseded for one in failures))

@@ -131,6 +131,7 @@ class ConfigurationManager:
         self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
         self._queue: RequestQueue[Status] = RequestQueue(target)
         self._status: Status | None = None
+        self._brightness_is_switch = False
         self._shared_address = False
         self._setpoint: float | None = None
         self._pending: Pending | None = None
@@ -233,6 +234,11 @@ class ConfigurationManager:
         """End all requests, and drop the pending values."""
         self._pending = None
         self.end_requests('cancelled', now)
+
+    def replace(self, now: float) -> None:
+        """End all requests, and drop the pending values: an OFF replaces them."""
+        self._pending = self._setpoint = None
+        self._queue.replace(now)
 
     def end_requests(self, message: str, now: float) -> None:
         """End all requests, but keep the pending values."""
@@ -367,6 +373,7 @@ class ConfigurationManager:
 
     def take(
         self, report: Report[Status], now: float, *, can_follow: bool, switched_at: float,
+        brightness_is_switch: bool,
     ) -> None:
         """
         Confirm the request under way, or follow the change of another sender.
@@ -375,6 +382,7 @@ class ConfigurationManager:
         :param switched_at: when the light was last switched by us, s.
         """
         status = self._status = report.status
+        self._brightness_is_switch = brightness_is_switch
         self._shared_address = report.shared_address
         was_changing = self.is_changing
         self._queue.take(report, now)
@@ -460,10 +468,8 @@ class ConfigurationManager:
     ) -> bool:
         """Undo another sender's change up to the limit of repeats; return whether it is undone."""
         names = unexpected_differences(confirmed, reported, status.error_flags, step=True)
-        if status.enabled is False and not status.brightness:
-            # Where brightness is the switch, it would be an ON.
-            names = [name for name in names if name != 'brightness']
-        if not names:
+        # Where brightness is the switch, each command to a light that is off is an ON.
+        if not names or self._brightness_is_switch and status.enabled is False:
             return False
         due = self._undoing.take(now)
         if due is not None:
@@ -530,7 +536,7 @@ class ConfigurationManager:
             return
 
         def finished(result: Result, now: float) -> None:
-            if not result.success:
+            if not (result.success or result.superseded):
                 self._setpoint_failed(result.message)
 
         self._submit({'brightness': value}, now, finished, is_stream=True)

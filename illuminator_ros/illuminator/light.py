@@ -37,7 +37,6 @@ from ..payload.request import (
     at_any_time,
     Change,
     Done,
-    OVERTAKEN,
     Report,
     Request,
     RequestQueue,
@@ -160,7 +159,8 @@ class Light:
         self._off_brightness: float | None = None
         # Whether the light was seen to report brightness 0 since it was switched off.
         self._brightness_is_switch = False
-        self._was_dimmed = False
+        # Whether heat has switched it off.
+        self._is_hot = False
         # The time of the last request, or of the status that showed that another sender has
         # switched the light on, s.
         self._requested_at = -math.inf
@@ -252,16 +252,16 @@ class Light:
         if self._enabled is False:
             self._off_brightness = report.status.brightness
             confirmed = self._configuration.confirmed
-            self._brightness_is_switch |= bool(
-                before and self._off_brightness == 0.0 and confirmed and confirmed.brightness
+            self._brightness_is_switch = self._off_brightness == 0.0 and (
+                self._brightness_is_switch
+                or bool(before and confirmed and confirmed.brightness)
                 and not self._configuration.is_changing)
-        was_dimmed = self._was_dimmed
-        self._was_dimmed = bool(report.status.error_flags & DIMMING_FLAGS)
+        was_hot = self._is_hot
+        self._is_hot = bool(report.status.error_flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
         # Several lights at one address seem to be one light that switches repeatedly, and a light
         # that has cooled down switches itself on.
         is_by_other = before is False and not (
-            report.shared_address or was_dimmed or self._was_dimmed or self._switching
-            or now <= self._late_until)
+            report.shared_address or was_hot or self._switching)
         if self._enabled and (self._requested_at == -math.inf or is_by_other):
             self._requested_at = now
         if not self._switching:
@@ -272,7 +272,7 @@ class Light:
         self._switching.take(report, now)
         self._configuration.take(
             report, now, can_follow=self._tracker.conflict.can_follow,
-            switched_at=self._last_switch[1])
+            switched_at=self._last_switch[1], brightness_is_switch=self._brightness_is_switch)
         if self._refreshes:
             for refresh in self._refreshes:
                 refresh.outcomes['ILLUMINATOR_STATUS'] = ''
@@ -344,7 +344,7 @@ class Light:
                     command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE
                     or command.command == MavCmd.ILLUMINATOR_ON_OFF
                     and command.params == SWITCHES[True].params))
-            self._switching.cancel(message, now, only_waiting=True)
+            self._switching.cancel(message, now, lambda request: request.is_waiting)
             self._configuration.lost(message, now)
 
     def link_opened(self, now: float) -> None:
@@ -472,7 +472,8 @@ class Light:
         self._emit(events.LightHeld(self.address, change))
         if change.after is None:
             self._switching.cancel(
-                f'{change.before} no longer holds it', now, only_waiting=True)
+                f'{change.before} no longer holds it', now,
+                lambda request: request.is_waiting and not request.overtakes)
             if self.settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
@@ -485,9 +486,6 @@ class Light:
             self._automatic = None
         self._switching.cancel(message, now)
         self._end_commands(MavCmd.ILLUMINATOR_ON_OFF, now)
-        self._end_configuring(message, now)
-
-    def _end_configuring(self, message: str, now: float) -> None:
         self._configuration.end_requests(message, now)
         self._end_commands(MavCmd.DO_ILLUMINATOR_CONFIGURE, now)
 
@@ -523,7 +521,8 @@ class Light:
         """Submit a request; ``detail`` is None where its caller reports the change itself."""
         if not on and self._brightness_is_switch:
             # A brightness that is sent later would be an ON.
-            self._end_configuring(OVERTAKEN, now)
+            self._configuration.replace(now)
+            self._end_commands(MavCmd.DO_ILLUMINATOR_CONFIGURE, now)
         change = SWITCHES[on]
         was_on: bool | None = None
 

@@ -79,6 +79,7 @@ class UptimeClock:
         self._has_clock = False
         self._last: tuple[int, float] | None = None
         self._suspect: tuple[int, float] | None = None
+        self._suspecting_since = math.inf
 
     def take(self, uptime_ms: int, now: float, *, was_lost: bool = False) -> Uptime:
         """
@@ -93,6 +94,7 @@ class UptimeClock:
         if meaning is not Uptime.LATE:
             self._last = uptime_ms, now
             self._suspect = None
+            self._suspecting_since = math.inf
             self.is_suspecting = False
         return meaning
 
@@ -130,6 +132,11 @@ class UptimeClock:
                 is_proof = (waited >= RESTART_PROOF_TIME if may_have_restarted
                             else lag > MAX_DELAY and waited >= CLOCK_JUMP_PROOF_TIME)
                 return Uptime.RESTARTED if is_proof else Uptime.LATE
+        self._suspecting_since = min(self._suspecting_since, now)
+        if (has_progressed and not may_have_restarted
+                and now >= self._suspecting_since + CLOCK_JUMP_PROOF_TIME):
+            # The line has delivered what it held back; the light's clock is wrong.
+            return Uptime.RUNNING
         self._suspect = uptime_ms, now
         return Uptime.LATE
 

@@ -314,9 +314,9 @@ class Request(Generic[S]):
         return self.phase is Phase.CONFIRMING
 
     @property
-    def is_contradicted(self) -> bool:
-        """Whether the device has acknowledged, and then shown something else."""
-        return self.is_confirming and bool(self._contradiction)
+    def is_waiting(self) -> bool:
+        """Whether it has not been sent."""
+        return self.phase is Phase.WAITING
 
     @property
     def is_accepted(self) -> bool:
@@ -423,7 +423,7 @@ class Request(Generic[S]):
             self._shown_by.clear()
             self._shown_since = math.inf
             if not self.is_accepted and now >= self._acknowledged_at + ASK_INTERVAL:
-                self.end_unconfirmed(now)
+                self._unconfirmed(now)
         else:
             # Each of several devices that report in turn must show it.
             self._shown_by.add(report.sender)
@@ -436,7 +436,7 @@ class Request(Generic[S]):
         if not self.is_confirming:
             return
         if now >= self._confirm_until:
-            self.end_unconfirmed(now)
+            self._unconfirmed(now)
         elif now >= self._ask_at:
             self._ask_at = now + ASK_INTERVAL
             self._target.request_status(now)
@@ -472,8 +472,7 @@ class Request(Generic[S]):
             self._end(f'{"refused: " if answered else ""}{answer.describe()}', now,
                       refused=answered, permanent=answered and answer.result in PERMANENT_RESULTS)
 
-    def end_unconfirmed(self, now: float) -> None:
-        """End without a confirmation, which may be a success where the device sends no status."""
+    def _unconfirmed(self, now: float) -> None:
         name, kind = self._target.status_name, self._target.kind
         if not self.is_accepted:
             self._refused(now)
@@ -545,10 +544,9 @@ class RequestQueue(Generic[S]):
         One that overtakes replaces those that do not, and one of a stream replaces those of a
         stream that wait.
         """
-        replaced = [one for one in self._requests if request.overtakes and not one.overtakes
-                    or request.is_stream and one.is_stream and one.phase is Phase.WAITING]
-        if replaced:
-            self._requests = [one for one in self._requests if one not in replaced]
+        replaced = self._remove(
+            lambda one: request.overtakes and not one.overtakes
+            or request.is_stream and one.is_stream and one.is_waiting)
         if len(self._requests) < MAX_WAITING:
             self._requests.append(request)
             self._start_next(now)
@@ -558,12 +556,23 @@ class RequestQueue(Generic[S]):
         for one in replaced:
             one.replace(now)
 
-    def cancel(self, message: str, now: float, *, only_waiting: bool = False) -> None:
-        """End all requests, or only those that wait."""
-        kept = [self.current] if only_waiting and self.current else []
-        ended, self._requests = self._requests[len(kept):], kept
-        for request in ended:
+    def cancel(
+        self, message: str, now: float,
+        which: Callable[[Request[S]], bool] = lambda request: True,
+    ) -> None:
+        """End some requests, by default all, with a message."""
+        for request in self._remove(which):
             request.fail(message, now)
+
+    def replace(self, now: float) -> None:
+        """End all requests: a request of another queue replaces them."""
+        for request in self._remove(lambda request: True):
+            request.replace(now)
+
+    def _remove(self, which: Callable[[Request[S]], bool]) -> list[Request[S]]:
+        removed = [one for one in self._requests if which(one)]
+        self._requests = [one for one in self._requests if one not in removed]
+        return removed
 
     def take(self, report: Report[S], now: float) -> None:
         """Take a status that is newer than all before."""
@@ -571,7 +580,7 @@ class RequestQueue(Generic[S]):
         if self._requests:
             first = self._requests[0]
             first.take(report, now)
-            if first.phase is Phase.FINISHED or len(self._requests) > 1:
+            if first.phase is Phase.FINISHED:
                 self._start_next(now)
 
     def poll(self, now: float) -> None:
@@ -590,9 +599,6 @@ class RequestQueue(Generic[S]):
                 del self._requests[0]
             elif first.phase is Phase.WAITING and now >= first.earliest_start():
                 first.start(self._status, now)
-            elif first.is_contradicted and len(self._requests) > 1 and (
-                    self._requests[1].overtakes):
-                first.end_unconfirmed(now)
             else:
                 break
 

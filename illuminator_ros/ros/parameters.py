@@ -289,7 +289,9 @@ def unknown_parameters(
             continue
         close = difflib.get_close_matches(name, known, 1, 0.75)
         is_ours = name.partition('.')[0] not in {*others, 'qos_overrides'}
-        if is_ours and not restrictions.isdisjoint(close):
+        # Another node may have a parameter with a similar name.
+        if not restrictions.isdisjoint(
+                close if is_ours else difflib.get_close_matches(name, known, 1, 0.9)):
             raise ParameterError(f'{name} is unknown; did you mean {close[0]!r}?')
         if is_ours or close:
             warnings.append(_unknown(name, close))

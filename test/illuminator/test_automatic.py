@@ -115,12 +115,32 @@ def test_a_light_that_overheats_and_cools_down_goes_off_after_silence() -> None:
     assert light.fields['enable'] == 0
 
 
+@pytest.mark.parametrize('before', ['a failed request', 'throttling'])
+def test_a_light_that_another_sender_switches_on_stays_on_until_silence(before: str) -> None:
+    light = FakeLight()
+    pair = silenced(light)
+    assert pair.enable(False).success
+    if before == 'throttling':
+        light.fields['error_status'] = 1
+    else:
+        light.results[ON_OFF] = MavResult.DENIED
+        assert not pair.enable(True).success
+        light.results.clear()
+    pair.run(SILENCE + 2.0)
+    light.fields['enable'] = 1
+    pair.run(SILENCE - 1.0)
+
+    assert light.fields['enable'] == 1
+
+
 @pytest.mark.parametrize(('before', 'change', 'undone'), [
     ({}, {'brightness': 30.0, 'strobe_period': 1.0}, True),
     ({}, {'mode': 2}, True),
     ({'enable': 1}, {'enable': 0}, True),
     ({}, {'enable': 1}, True),
     ({}, {'brightness': 30.0, 'error_status': 1}, False),
+    # It is off, and brightness is not the switch.
+    ({}, {'brightness': 0.0}, True),
 ], ids=str)
 def test_a_change_by_another_sender_is_undone_unless_the_light_is_hot(
         before: dict[str, int], change: dict[str, float], undone: bool) -> None:
@@ -246,7 +266,7 @@ def test_an_off_is_not_undone_by_a_brightness_where_that_is_the_switch(by_reques
         pair.run(2.5)
         pair.far.wire.switch(is_open=True)
     else:
-        light.fields |= {'enable': 0, 'brightness': 0.0}
+        light.fields |= {'enable': 0, 'brightness': 0.0, 'strobe_period': 1.0}
     pair.run(10.0)
 
     assert light.fields['enable'] == 0
@@ -272,3 +292,53 @@ def test_a_brightness_from_before_an_off_is_not_sent_after_it_where_that_is_the_
     assert pair.enable(False).success
     pair.run(10.0)
     assert light.fields['enable'] == 0
+
+
+def learned(light: FakeLight, settings: Settings | None = None) -> Pair:
+    """Return a client that has learned that brightness is the switch of a light, which is on."""
+    light.brightness_is_switch = True
+    pair = Pair(light, settings=settings).settle()
+    for on in (True, False, True):
+        assert pair.enable(on).success
+        pair.run(5.0)
+    return pair
+
+
+def test_a_configuration_that_is_restored_is_not_sent_after_an_off_where_brightness_is_the_switch(
+) -> None:
+    light = FakeLight(brightness=50.0)
+    pair = learned(light)
+    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    light.restart(pair.now, enable=1)
+    pair.run_until(lambda: pair.light.restarts)
+
+    assert pair.enable(False).success
+    pair.run(10.0)
+    assert light.fields['enable'] == 0
+
+
+def test_a_setpoint_that_an_off_replaces_is_not_reported_where_brightness_is_the_switch() -> None:
+    light = FakeLight(brightness=50.0)
+    pair = learned(light)
+    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    pair.light.set_brightness(30.0, pair.now)
+    pair.turn()
+
+    assert pair.enable(False).success
+    assert pair.recorder.failed_setpoints == []
+
+
+def test_a_set_beside_an_off_succeeds_once_a_light_has_shown_a_brightness_while_off() -> None:
+    light = FakeLight(brightness=50.0)
+    pair = Pair(light).settle()
+    assert pair.enable(True).success
+    pair.run(40.0)
+    # Another sender changes both.
+    light.fields |= {'enable': 0, 'brightness': 0.0}
+    pair.run(5.0)
+    assert pair.configure(brightness=40.0).success
+    pair.run(5.0)
+    answer = pair.ask_configure(strobe_period=1.0)
+
+    assert pair.enable(False).success
+    assert pair.wait_for(answer).success

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import random
 
+from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.events import DesiredStateFailed, LightHeld
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
@@ -165,9 +166,57 @@ def test_an_on_that_waits_is_not_sent_after_its_source_has_released_the_light() 
     assert shared.sent(ON_OFF) == []
 
 
-def test_a_light_that_restarts_on_after_its_source_fell_silent_goes_off_where_release_is_off() -> (
-        None):
+def test_an_off_that_waits_is_sent_though_its_source_releases_the_light() -> None:
+    shared = Shared(light=FakeLight(brightness=50.0, enable=1))
+    shared.pair.settle()
+    shared.light.results[ON_OFF] = None
+    first, second = shared.enable('operator', False), shared.enable('operator', False)
+    shared.release('operator')
+    shared.pair.wait_for(first)
+    shared.light.results.clear()
+
+    assert shared.pair.wait_for(second).success
+    assert shared.light.fields['enable'] == 0
+
+
+def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> None:
+    shared = Shared(timeout=60.0)
+    shared.enable('default', True)
+    shared.pair.run(1.0)
+    shared.pair.close()
+    enable_all([shared.pair.light], False, shared.pair.now, Answer(0.0), name=str)
+    shared.pair.open()
+    shared.pair.run(1.0)
+    shared.enable('safety', False)
+    shared.pair.run(1.0)
+    released_at = shared.pair.now
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert shared.sent(ON_OFF, released_at) == [0.0]
+
+
+def test_an_on_of_the_next_source_is_not_sent_after_silence() -> None:
+    shared = Shared(timeout=60.0)
+    shared.enable('operator', True)
+    shared.pair.run(1.0)
+    shared.enable('safety', True)
+    shared.pair.run(SILENCE + 1.0)
+    assert shared.light.fields['enable'] == 0
+    released_at = shared.pair.now
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert shared.sent(ON_OFF, released_at) == []
+
+
+@pytest.mark.parametrize('beats', [True, False])
+def test_a_light_that_restarts_on_after_its_source_fell_silent_goes_off_where_release_is_off(
+    beats: bool,
+) -> None:
     shared = Shared(off_on_release=True)
+    # Its status comes first then.
+    shared.light.beats = beats
     shared.enable('operator', True)
     shared.pair.close()
     shared.pair.run(TIMEOUT + 1.0)

@@ -271,17 +271,17 @@ def test_an_on_of_a_stream_that_waits_fails_when_the_light_is_lost(
     assert not any(m.param1 for m in faked.commands(ON_OFF))
 
 
-def test_an_off_does_not_wait_for_one_that_a_status_contradicts(
-    fake: FakeLight, faked: Pair,
+@pytest.mark.parametrize('apart', [0.05, 0.5])
+def test_offs_in_a_row_succeed_though_the_light_takes_its_time(
+    fake: FakeLight, faked: Pair, apart: float,
 ) -> None:
-    change(fake, applies=False, fields={'enable': 1})
-    first, second = faked.ask_enable(False), faked.ask_enable(False)
-    faked.run_until(lambda: any(
-        isinstance(m, mav.CommandAck) and m.command == ON_OFF for _, _, m in faked.near.received))
-    fake.applies = True
-    assert faked.wait_for(second).success
-    assert second.seconds < 0.2
-    assert 'shows on' in first.result.message
+    change(fake, apply_after=0.6, fields={'enable': 1})
+    answers = []
+    for _ in range(4):
+        answers.append(faked.ask_enable(False, is_stream=True))
+        faked.run(apart)
+    faked.run(5.0)
+    assert all(one.result.success or one.result.superseded for one in answers)
 
 
 def test_switches_and_configurations_do_not_wait_for_each_other(
@@ -580,6 +580,15 @@ def test_an_off_of_all_lights_reaches_each_at_once_though_one_has_not_answered_t
     three.run(0.1)
     assert not first.results
     assert {one.target_component for one in three.commands(ON_OFF, since=pressed_at)} >= {244, 245}
+
+
+def test_a_request_to_all_that_is_replaced_says_so(three: Pair) -> None:
+    deafen(three)
+    ask_all(three, is_stream=True)
+    replaced = ask_all(three, is_stream=True)
+    ask_all(three, on=False, is_stream=True)
+    three.run(5.0)
+    assert replaced.result.superseded
 
 
 def test_without_a_light_a_request_to_all_fails_at_once() -> None:

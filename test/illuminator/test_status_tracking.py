@@ -118,6 +118,9 @@ def test_several_uptimes_show_what_one_cannot(
     ([(91_000, 110.0), (92_000, 110.001), (3_000, 110.1)], RESTARTED),
     # The clock of the light stood still while it was lost.
     ([(91_000, 110.0), (91_150, 110.15)], RUNNING),
+    # It counts seconds instead of milliseconds.
+    ([(90_010 + number, 110.0 + number) for number in range(5)], LATE),
+    ([(90_010 + number, 110.0 + number) for number in range(6)], RUNNING),
 ])
 def test_a_status_that_a_stalled_line_held_back_does_not_show_that_a_lost_light_runs_on(
     uptimes: list[tuple[int, float]], meaning: Uptime,

@@ -14,13 +14,15 @@
 
 """Invalid parameters are refused with the reason, and unknown ones are warned about."""
 
+import contextlib
 import math
 from pathlib import Path
 import re
 from typing import Any, cast
 
-from illuminator_ros.ros.parameters import ignored_sections
+from illuminator_ros.ros.parameters import ignored_sections, ParameterError, unknown_parameters
 import pytest
+from rclpy.node import Node
 from support.embedded import refusal
 from support.ports import free_port
 from support.ros import Ros, running_bridge
@@ -85,6 +87,22 @@ def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
     assert warnings == [
         f'{file}: the section {section.strip("/")} matches no node and is ignored; the name here '
         'is /illuminator'] * is_ignored
+
+
+@pytest.mark.parametrize(('name', 'ends'), [
+    ('max_brightnes', True), ('max_brightness_level', False)])
+def test_misspelt_restriction_in_a_section_for_other_nodes_ends_the_start_if_it_is_clear(
+    ros: Ros, tmp_path: Path, name: str, ends: bool,
+) -> None:
+    file = tmp_path / 'shared.yaml'
+    file.write_text(f'/**: {{ros__parameters: {{use_sim_time: false, {name}: 40.0}}}}')
+    arguments = ['--ros-args', '--params-file', str(file)]
+    node = Node('illuminator', context=ros.context, cli_args=arguments)
+    node.declare_parameter('max_brightness', 100.0)
+
+    with pytest.raises(ParameterError) if ends else contextlib.nullcontext():
+        unknown_parameters([node], arguments, {'max_brightness'})
+    node.destroy_node()
 
 
 def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
