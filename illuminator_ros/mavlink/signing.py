@@ -174,7 +174,7 @@ class Signing:
         Return the time stamp that new streams are compared with.
 
         It is not the last one used, which may be ahead of the right time: after a crash, or after
-        our clock or that of a peer was wrong for a moment.
+        our clock or the clock of a peer was wrong for a moment.
         """
         clock = ticks(unix_time)
         return clock if self.timestamp - clock <= CLOCK_TOLERANCE_TICKS else self.timestamp

@@ -62,6 +62,15 @@ class Shared:
         self.pair.light.release(source, self.pair.now)
         self.pair.turn()
 
+    def take_over(self) -> float:
+        """Let the highest source switch off and release; return the time of the release."""
+        self.enable('safety', False)
+        self.pair.run(1.0)
+        released_at = self.pair.now
+        self.release('safety')
+        self.pair.run(1.0)
+        return released_at
+
     @property
     def holder(self) -> str | None:
         return self.pair.snapshot.holder
@@ -127,11 +136,7 @@ def test_of_the_requests_to_a_lost_light_only_an_off_has_an_effect_later(
     shared.dim('autonomy', 20.0)
     shared.light.silent = False
     shared.pair.run(2.0)
-    shared.enable('safety', False)
-    shared.pair.run(1.0)
-    released_at = shared.pair.now
-    shared.release('safety')
-    shared.pair.run(1.0)
+    released_at = shared.take_over()
 
     assert shared.sent(ON_OFF, released_at) == sent
     assert shared.sent(CONFIGURE) == []
@@ -187,11 +192,7 @@ def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> Non
     enable_all([shared.pair.light], False, shared.pair.now, Answer(0.0), name=str)
     shared.pair.open()
     shared.pair.run(1.0)
-    shared.enable('safety', False)
-    shared.pair.run(1.0)
-    released_at = shared.pair.now
-    shared.release('safety')
-    shared.pair.run(1.0)
+    released_at = shared.take_over()
 
     assert shared.sent(ON_OFF, released_at) == [0.0]
 
