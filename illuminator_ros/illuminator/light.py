@@ -296,7 +296,7 @@ class Light:
         # A light is switched on again only where a request has switched it on.
         if not self.settings.reassert or is_own:
             return
-        if before and (was_lost or not on or not self._may_stay_on(now)):
+        if before and (was_lost or not on):
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
@@ -305,11 +305,6 @@ class Light:
             self._switch_automatically(_AutomaticSwitch(
                 before, f'external_changes: another sender switched it {change}', due,
                 self._undoing))
-
-    def _may_stay_on(self, now: float) -> bool:
-        """Return whether neither silence nor the lack of a holder switches the light off."""
-        is_free = self._sources.are_ranked and self._sources.holder is None
-        return not (self._is_silent(now) or self.settings.off_on_release and is_free)
 
     def _is_silent(self, now: float) -> bool:
         limit = self.settings.off_after_silence
@@ -359,7 +354,7 @@ class Light:
     def _restarted(self, now: float) -> None:
         was_on, is_on = self._enabled, self.status.enabled if self.status else None
         self.restarts += 1
-        if self._automatic and (self._automatic.on or is_on is False):
+        if self._automatic and self._automatic.on:
             self._automatic = None
         self._emit(events.LightRestarted(self.address, was_on, is_on))
         self._set_up(now)
@@ -681,8 +676,10 @@ class Light:
     @property
     def _silence_due(self) -> float:
         """Return the time at which the light is switched off after silence, s."""
-        # A light that sends no status may be on if it was switched on.
-        may_be_on = self._last_switch[0] if self._enabled is None else self._enabled
+        # A light that sends no status may be on if it was switched on, and so may one of several
+        # lights at the address.
+        may_be_on = self._enabled or self._last_switch[0] and (
+            self._enabled is None or self._is_shared)
         if (not self.settings.off_after_silence or not may_be_on or not self.connected
                 or self._automatic and not self._automatic.on):
             return math.inf
@@ -716,7 +713,7 @@ class Light:
             else:
                 switch.due = due
 
-        if switch.on and not self._may_stay_on(now):
+        if switch.on and self._is_silent(now):
             self._automatic = None
             return
         switch.due = math.inf

@@ -23,9 +23,10 @@ from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
-from support.back_to_back import Pair
+from support.back_to_back import Pair, START
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
+from support.shared_address import SharedAddress
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 SILENCE = 5.0
@@ -77,6 +78,18 @@ def test_a_light_goes_off_after_silence_however_it_was_switched_on(way: str) -> 
 
     assert light.fields['enable'] == 0
     assert [one.on for one in pair.recorder.others if isinstance(one, AutomaticSwitch)] == [False]
+
+
+def test_two_lights_that_share_an_address_go_off_after_silence() -> None:
+    lights = FakeLight(), FakeLight()
+    lights[1].applies = False
+    pair = Pair(SharedAddress(*lights, offset=0.3),
+                settings=Settings(off_after_silence=SILENCE)).settle()
+    pair.ask_enable(True)
+    # It takes some seconds until the statuses show that there are two.
+    pair.run(40.0)
+
+    assert lights[0].fields['enable'] == 0
 
 
 def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
@@ -228,9 +241,11 @@ def test_an_off_by_another_sender_is_not_undone_after_silence(is_lost: bool) -> 
         pair.open()
     else:
         switched_off_twice(pair, light)
+    silent_at = START + 4.0 + SILENCE
     pair.run(SILENCE)
 
     assert light.fields['enable'] == 0
+    assert not any(command.param1 for command in pair.commands(ON_OFF, since=silent_at))
 
 
 def test_an_off_of_a_light_that_no_source_holds_is_not_undone_where_release_is_off() -> None:

@@ -171,6 +171,28 @@ def test_an_on_that_waits_is_not_sent_after_its_source_has_released_the_light() 
     assert shared.sent(ON_OFF) == []
 
 
+def test_an_on_under_way_is_answered_though_its_source_releases_the_light() -> None:
+    shared = Shared()
+    shared.pair.settle()
+    answer = shared.enable('operator', True)
+    shared.release('operator')
+
+    assert shared.pair.wait_for(answer).success
+
+
+def test_the_brightness_and_the_off_that_the_next_source_requested_are_sent() -> None:
+    shared = Shared()
+    shared.pair.settle()
+    shared.enable('safety', True)
+    shared.enable('operator', False)
+    shared.dim('operator', 20.0)
+    shared.pair.run(1.0)
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert (shared.light.fields['enable'], shared.light.fields['brightness']) == (0, 20.0)
+
+
 def test_an_off_that_waits_is_sent_though_its_source_releases_the_light() -> None:
     shared = Shared(light=FakeLight(brightness=50.0, enable=1))
     shared.pair.settle()

@@ -114,10 +114,13 @@ def test_several_uptimes_show_what_one_cannot(
 @pytest.mark.parametrize(('uptimes', 'meaning'), [
     # The line delivers delayed statuses in a burst, and then the present one.
     ([(91_000, 110.0), (92_000, 110.001), (93_000, 110.002)], LATE),
+    ([(91_000, 110.0), (91_001, 110.001)], LATE),
     ([(91_000, 110.0), (92_000, 110.001), (100_100, 110.1)], RUNNING),
     ([(91_000, 110.0), (92_000, 110.001), (3_000, 110.1)], RESTARTED),
     # The clock of the light stood still while it was lost.
     ([(91_000, 110.0), (91_150, 110.15)], RUNNING),
+    # It is slow by 1 %.
+    ([(189_000, 200.0)], RUNNING),
     # It counts seconds instead of milliseconds.
     ([(90_010 + number, 110.0 + number) for number in range(5)], LATE),
     ([(90_010 + number, 110.0 + number) for number in range(6)], RUNNING),
@@ -130,6 +133,7 @@ def test_a_status_that_a_stalled_line_held_back_does_not_show_that_a_lost_light_
 
     assert [clock.take(uptime_ms, now, was_lost=True)
             for uptime_ms, now in uptimes][-1] is meaning
+    assert clock.is_suspecting is (meaning is LATE)
 
 
 @pytest.mark.parametrize('drift', [0.96, 1.0, 1.04])
