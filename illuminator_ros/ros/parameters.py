@@ -21,6 +21,7 @@ import difflib
 import math
 from pathlib import Path
 import re
+import threading
 import time
 from typing import Any, NamedTuple
 
@@ -378,7 +379,8 @@ class DeviceParameters:
     def __init__(self, node: Node, specs: Iterable[ParameterSpec]) -> None:
         self.specs = {spec.name: spec for spec in specs}
         self._node = node
-        self._showing = False
+        # The thread that shows values; another one may set a parameter meanwhile.
+        self._showing: int | None = None
         for spec in self.specs.values():
             node.declare_parameter(
                 spec.name, spec.type, spec.descriptor(read_only=False), ignore_override=True)
@@ -391,12 +393,12 @@ class DeviceParameters:
 
     def show(self, values: Values) -> str:
         """Set parameters to the reported values; return why that failed, '' if it did not."""
-        self._showing = True
+        self._showing = threading.get_ident()
         try:
             result = self._node.set_parameters_atomically([
                 Parameter(name, value=value) for name, value in values.items()])
         finally:
-            self._showing = False
+            self._showing = None
         return '' if result.successful else str(result.reason)
 
     def set_high(self, name: str, high: float) -> None:
@@ -405,18 +407,18 @@ class DeviceParameters:
         # rclpy cannot change the descriptor of a parameter without a value; the call after its
         # first value can.
         if isinstance(value, float) and math.isfinite(high):
-            self._showing = True
+            self._showing = threading.get_ident()
             try:
                 self._node.set_descriptor(name, self.specs[name].descriptor(
                     read_only=False, high=max(high, value)))
             finally:
-                self._showing = False
+                self._showing = None
 
     def _may_set(self, parameters: list[Parameter]) -> msg.SetParametersResult:
         """Refuse a value that the device has not accepted."""
         names = [parameter.name for parameter in parameters if parameter.name in self.specs
                  and parameter.type_ != Parameter.Type.NOT_SET]
-        if names and not self._showing:
+        if names and self._showing != threading.get_ident():
             return msg.SetParametersResult(successful=False, reason=(
                 f'{", ".join(names)}: only the parameter services reach the device'))
         return msg.SetParametersResult(successful=True)
