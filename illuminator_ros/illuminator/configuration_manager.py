@@ -35,7 +35,7 @@ from .model import (
     StrobeRange,
     unexpected_differences,
 )
-from ..payload.rate_limit import RepeatLimit
+from ..payload.repeat_limit import RepeatLimit
 from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
 
 # s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits

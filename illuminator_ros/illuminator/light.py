@@ -32,7 +32,7 @@ from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.identity import Identity, IdentityQuery
-from ..payload.rate_limit import RepeatLimit
+from ..payload.repeat_limit import RepeatLimit
 from ..payload.request import (
     at_any_time,
     Change,
@@ -294,9 +294,7 @@ class Light:
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(self.address, status.enabled, origin))
         # A light is switched on again only where a request has switched it on.
-        if not self.settings.reassert or is_own:
-            return
-        if before and (was_lost or not on):
+        if not self.settings.reassert or is_own or before and (was_lost or not on):
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:

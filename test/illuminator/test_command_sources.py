@@ -180,19 +180,6 @@ def test_an_on_under_way_is_answered_though_its_source_releases_the_light() -> N
     assert shared.pair.wait_for(answer).success
 
 
-def test_the_brightness_and_the_off_that_the_next_source_requested_are_sent() -> None:
-    shared = Shared()
-    shared.pair.settle()
-    shared.enable('safety', True)
-    shared.enable('operator', False)
-    shared.dim('operator', 20.0)
-    shared.pair.run(1.0)
-    shared.release('safety')
-    shared.pair.run(1.0)
-
-    assert (shared.light.fields['enable'], shared.light.fields['brightness']) == (0, 20.0)
-
-
 def test_an_off_that_waits_is_sent_though_its_source_releases_the_light() -> None:
     shared = Shared(light=FakeLight(brightness=50.0, enable=1))
     shared.pair.settle()
@@ -250,17 +237,21 @@ def test_a_light_that_restarts_on_after_its_source_fell_silent_goes_off_where_re
     assert shared.light.fields['enable'] == 0
 
 
-def test_the_brightness_that_the_next_source_requested_is_sent_before_its_on() -> None:
+@pytest.mark.parametrize(('on', 'shone'), [(True, [20.0]), (False, [50.0])])
+def test_the_brightness_that_the_next_source_requested_is_sent_before_its_on_and_with_its_off(
+    on: bool, shone: list[float],
+) -> None:
     shared = Shared()
     shared.pair.settle()
-    shared.enable('safety', False)
-    shared.enable('operator', True)
+    shared.enable('safety', not on)
+    shared.enable('operator', on)
     shared.dim('operator', 20.0)
     shared.pair.run(1.0)
     shared.release('safety')
     shared.pair.run(1.0)
 
-    assert shared.light.shone == [20.0]
+    assert shared.light.shone == shone
+    assert (shared.light.fields['enable'], shared.light.fields['brightness']) == (on, 20.0)
 
 
 def test_the_brightness_before_an_off_is_not_sent_with_it_where_that_is_the_switch() -> None:
