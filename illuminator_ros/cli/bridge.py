@@ -94,7 +94,8 @@ def usage(executable: Executable) -> str:
         for spec in (*LINK_PARAMETERS, *kind.parameters))
     variable = ''.join(row(spec, '') + '\n' for spec in kind.device_parameters)
     variable = variable and f'parameters that may be set at any time:\n{variable}\n'
-    examples = '\n'.join(f'  {line}' for line in kind.examples)
+    examples = ''.join(f'  {line}\n' for line in kind.examples)
+    examples = examples and f'{examples}\n'
     return f"""\
 usage: {name} [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
 
@@ -105,9 +106,7 @@ examples:
   ros2 run illuminator_ros {name} serial:///dev/ttyACM0:57600
   ros2 run illuminator_ros {name} --ros-args -p connection_url:=udpin://0.0.0.0:14550
 
-{examples}
-
---ros-args --log-level debug shows each message on the link in the log, and
+{examples}--ros-args --log-level debug shows each message on the link in the log, and
 --log-level {kind.node_name}:=debug those of one node and its device.
 
 parameters that are fixed at the start, with their defaults:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 import sys
 import time
 from typing import NoReturn, TYPE_CHECKING, TypeVar
@@ -66,6 +67,15 @@ class Parser(argparse.ArgumentParser):
             super()._print_message(message, file)
             return
         print_output(lambda reason: self.exit(1, f'{self.prog}: {reason}\n'), message, end='')
+
+
+def invocation(name: str) -> str:
+    """Return the command that starts a program in the way in which this process was started."""
+    started = Path(sys.argv[0])
+    if started.name == f'illuminator-{name}':
+        return started.name
+    return f'python3 -m illuminator_ros.{name}' if started.suffix == '.py' else (
+        f'ros2 run illuminator_ros {name}')
 
 
 def option(read: Callable[[str], T]) -> Callable[[str], T]:

@@ -436,7 +436,7 @@ SIMULATED = simulated.SimulatedType(
     make=lambda settings, address, several: SimulatedGimbal(properties(settings, address)),
     address=lambda settings: GimbalProperties.address, settings=SETTINGS,
     examples=(
-        'simulator --payload gimbal',
-        'simulator --payload illuminator,gimbal      a light and a gimbal on one vehicle',
-        'simulator --payload gimbal --pitch-range=-90,30 --lacks has_yaw_lock'),
+        '--payload gimbal',
+        '--payload illuminator,gimbal      # a light and a gimbal on one vehicle',
+        '--payload gimbal --pitch-range=-90,30 --lacks has_yaw_lock'),
     mavlink_version=2)

@@ -432,5 +432,5 @@ SIMULATED = simulated.SimulatedType(
     address=lambda settings: _profile(settings).address, settings=SETTINGS, mavlink_version=2,
     profiles={name: profile.description for name, profile in PROFILES.items()},
     examples=(
-        'simulator --payload gimbal_manager --heading 40',
-        'simulator --payload gimbal_manager --profile ardupilot --fault frozen-axis=yaw'))
+        '--payload gimbal_manager --heading 40',
+        '--payload gimbal_manager --profile ardupilot --fault frozen-axis=yaw'))

@@ -371,10 +371,10 @@ SIMULATED = SimulatedType(
     address=lambda settings: _profile(settings).address,
     settings=SETTINGS, mavlink_version=2,
     examples=(
-        'simulator', 'simulator udpin://127.0.0.1:14550 --count 3',
-        'simulator --light 1/243=bow --light 1/250=stern --fault stern:drop=0.2',
-        'simulator --ambient 60 --time-scale 60      gets hot in seconds',
-        'simulator --file lights.yaml                the same settings, for each light'),
+        '', 'udpin://127.0.0.1:14550 --count 3',
+        '--light 1/243=bow --light 1/250=stern --fault stern:drop=0.2',
+        '--ambient 60 --time-scale 60      # gets hot in seconds',
+        '--file lights.yaml                # the same settings, for each light'),
     profiles={name: profile.description for name, profile in PROFILES.items()},
     notes='thermal, with defaults (degC, K and s; throttle_to is a share of the brightness):\n  '
     + ', '.join(f'{name}={value:g}' for name, value in THERMAL.items()))

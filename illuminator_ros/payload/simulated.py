@@ -192,7 +192,7 @@ class SimulatedType(Generic[D]):
         ValueError if the settings contradict each other.
     :param address: the address by default, from settings.
     :param profiles: descriptions of the values of the setting ``profile``.
-    :param examples: command lines for ``--help``.
+    :param examples: arguments of the simulator, for ``--help``.
     :param notes: further paragraphs of it.
     :param records: records that it makes, None for none.
     :param mavlink_version: the only version of MAVLink that it has, None for any.

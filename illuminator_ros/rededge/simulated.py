@@ -525,9 +525,9 @@ SIMULATED = simulated.SimulatedType(
     address=lambda settings: Address(DEFAULT_SYSTEM_ID, rededge.MAV_COMP_ID_CAMERA),
     settings=SETTINGS,
     examples=(
-        'simulator --payload rededge --interval 1 --images flight.csv',
-        'simulator --payload rededge pty:///tmp/ttyREDEDGE',
-        'simulator --payload rededge --fault no-feedback'),
+        '--payload rededge --interval 1 --images flight.csv',
+        '--payload rededge pty:///tmp/ttyREDEDGE',
+        '--payload rededge --fault no-feedback'),
     mavlink_version=1, url='udpout://127.0.0.1:14592',
     records=simulated.RecordType(
         'images', 'write the metadata of each image to FILE as CSV', tuple(COLUMNS)))

@@ -18,6 +18,8 @@ import contextlib
 from contextlib import AbstractContextManager
 import sys
 
+from illuminator_ros.cli.bridge import Executable, usage
+from payloads.winch import WINCH
 import pytest
 
 pytest.importorskip('rclpy')
@@ -91,3 +93,10 @@ def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help() ->
     assert [line for line in lines if line.startswith(('payloads', 'component_id'))] == [
         "payloads ['winch'] kinds of devices that the bridge serves",
         'component_id 195 our MAVLink component id (1 to 255)']
+
+
+def test_the_help_of_a_payload_without_examples_has_no_gap() -> None:
+    text = usage(Executable('winch', {'winch': WINCH}))
+
+    assert 'ros2 run illuminator_ros winch\n' in text
+    assert '\n\n\n' not in text

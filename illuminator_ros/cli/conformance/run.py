@@ -38,6 +38,7 @@ from ..options import (
     add_mavlink_version,
     add_signing,
     address,
+    invocation,
     mavlink_version,
     option,
     Parser,
@@ -66,13 +67,15 @@ PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOS
 FIND_TIMEOUT = 10.0
 DEFAULT_PAYLOAD = 'illuminator'
 
+EXAMPLES = (
+    'serial:///dev/ttyACM0:57600',
+    'udpin://0.0.0.0:14550 --target 1/243 --junit report.xml',
+    'udpin://127.0.0.1:14590 --yes   # the simulator, started without arguments',
+    'udp://:14541@127.0.0.1:14540    # the emulator of the MAVLink guide',
+    'udpin://0.0.0.0:14550 --payload gimbal_manager --target 1/1')
 EPILOG = """\
 examples:
-  conformance serial:///dev/ttyACM0:57600
-  conformance udpin://0.0.0.0:14550 --target 1/243 --junit report.xml
-  conformance udpin://127.0.0.1:14590 --yes   the simulator, started without arguments
-  conformance udp://:14541@127.0.0.1:14540    the emulator of the MAVLink guide
-  conformance udpin://0.0.0.0:14550 --payload gimbal_manager --target 1/1
+{examples}
 
 The checks change the state of the device; afterwards it is restored.
 exit status: 0 if all checked requirements are met, 1 if not or if no device was found,
@@ -88,11 +91,14 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, AnyChecks]:
     """
     payload = Parser('conformance', is_complete=False)
     payload.add_argument(
-        '--payload', default=DEFAULT_PAYLOAD, help='the kind of device (default: %(default)s)',
+        '--payload', default=DEFAULT_PAYLOAD,
+        help='the kind of device; with --help, its options (default: %(default)s)',
         choices=[one.name for one in PAYLOADS.values() if one.checks])
     checks: AnyChecks = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
+    command = invocation('conformance')
     parser = Parser(
-        'conformance', f'Checks whether a {checks.device} follows its MAVLink protocols.', EPILOG,
+        'conformance', f'Checks whether a {checks.device} follows its MAVLink protocols.',
+        EPILOG.format(examples='\n'.join(f'  {command} {line}' for line in EXAMPLES)),
         parents=[payload])
     add = parser.add_argument
     add('url', nargs='?', help='connection URL: UDP, TCP or serial')

@@ -21,7 +21,7 @@ from collections.abc import Iterable, Mapping
 
 from .components import SettingError, Types
 from .console import describe_commands
-from ..options import add_mavlink_version, add_signing, option, Parser
+from ..options import add_mavlink_version, add_signing, invocation, option, Parser
 from ..payloads import PAYLOADS
 from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer
@@ -48,12 +48,11 @@ def _epilog(types: Types) -> str:
         *(one.notes for one in types if one.notes),
         *(f'faults of a {one.noun}, for --fault, the file and the console; several are separated '
           f'by commas:\n{one.device.faults.describe()}' for one in types)]
-    examples = '\n'.join(f'  {line}' for one in types for line in one.examples)
-    details = '\n\n'.join(paragraphs)
+    command = invocation('simulator')
+    examples = '\n'.join(f'  {command} {line}'.rstrip()
+                         for one in types for line in one.examples)
+    details = '\n\n'.join([*([f'examples:\n{examples}'] if examples else []), *paragraphs])
     return f"""\
-examples:
-{examples}
-
 {details}
 
 console: lines on standard input, for all components or, after its id or name, for one
@@ -80,8 +79,8 @@ def parser(
                         help='the link to a bridge, router or autopilot: UDP, TCP or serial '
                              f'(default: {types[0].url})')
     result.add_argument('--payload', metavar='NAME,...',
-                        help=f'what is simulated: {", ".join(payloads)} '
-                             f'(default: {DEFAULT_PAYLOAD})')
+                        help=f'what is simulated: {", ".join(payloads)}; with --help, their '
+                             f'options and faults (default: {DEFAULT_PAYLOAD})')
     result.add_argument('--file', metavar='FILE',
                         help=f'read url, settings and {", ".join(plurals)} from YAML')
     result.add_argument('--count', type=option(integer(1, 200)), metavar='N',

@@ -1,0 +1,67 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The examples in the help of simulator and conformance."""
+
+import re
+import shlex
+import sys
+
+from illuminator_ros.cli.conformance.run import parse
+from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.cli.simulator.options import parser, payload_types
+import pytest
+
+STARTED = [
+    ('/opt/ws/install/lib/illuminator_ros/{}', 'ros2 run illuminator_ros {}'),
+    ('/home/me/venv/bin/illuminator-{}', 'illuminator-{}'),
+    ('/home/me/src/illuminator_ros/{}.py', 'python3 -m illuminator_ros.{}')]
+
+
+def examples(text: str) -> list[str]:
+    return [line.strip() for line in re.findall(r'^examples:\n((?:  .+\n)+)', text, re.M)[0]
+            .splitlines()]
+
+
+@pytest.mark.parametrize(('started', 'command'), STARTED)
+@pytest.mark.parametrize('payload', PAYLOADS)
+def test_an_example_of_the_simulator_runs_as_the_simulator_was_started(
+    started: str, command: str, payload: str, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sys, 'argv', [started.format('simulator')])
+    text = parser(payload_types(['--payload', payload], PAYLOADS)).format_help()
+    begin = command.format('simulator')
+
+    assert examples(text)
+    for line in examples(text):
+        assert line.startswith(begin)
+        arguments = shlex.split(line.removeprefix(begin), comments=True)
+        parser(payload_types(arguments, PAYLOADS)).parse_args(arguments)
+
+
+@pytest.mark.parametrize(('started', 'command'), STARTED)
+def test_an_example_of_conformance_runs_as_conformance_was_started(
+    started: str, command: str, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, 'argv', [started.format('conformance')])
+    with pytest.raises(SystemExit):
+        parse(['--help'])
+    lines = examples(capsys.readouterr().out)
+    begin = command.format('conformance')
+
+    assert lines
+    for line in lines:
+        assert line.startswith(begin)
+        parse(shlex.split(line.removeprefix(begin), comments=True))
