@@ -14,8 +14,10 @@
 
 """The conformance checks of a winch, beside a light on the same link."""
 
+import signal
 from typing import Any
 
+from illuminator_ros.cli import conformance
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
@@ -55,3 +57,15 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
     assert len(suite.results) == len(REQUIREMENTS)
     assert suite.restored == 'the winch is as it was'
     assert winch.line_length == 0.0
+
+
+def test_conformance_takes_a_payload_that_the_package_does_not_have(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        assert conformance.main(['--payload', 'winch', '--list'], {'winch': WINCH}) == 0
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+    assert 'release ' in capsys.readouterr().out

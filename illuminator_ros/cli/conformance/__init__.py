@@ -16,16 +16,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import signal
 
 from ..entry_point import escape_output, explained
+from ..payloads import PAYLOADS
+from ...payload.payload_type import PayloadType
 
 
-def main(args: list[str] | None = None) -> int:
+def main(
+    args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> int:
     """
     Check a device, and return the exit status.
 
     :param args: the command line without the program's name, by default from ``sys.argv``.
+    :param payloads: the kinds of payloads that ``--payload`` may name.
     """
     # End without a traceback until the run handles signals.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -33,6 +39,6 @@ def main(args: list[str] | None = None) -> int:
 
     def start() -> int:
         from .run import run
-        return run(args)
+        return run(args, payloads)
 
     return explained('conformance', start)

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import contextlib
 import errno
 import functools
@@ -56,6 +56,7 @@ from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
 from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
 from ...payload.checks.session import Main
+from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer, number
 
 # s to listen before the first command.
@@ -82,19 +83,22 @@ exit status: 0 if all checked requirements are met, 1 if not or if no device was
 2 if an argument is wrong or this computer cannot open the link."""
 
 
-def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, AnyChecks]:
+def parse(
+    args: Sequence[str] | None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> tuple[argparse.Namespace, AnyChecks]:
     """
     Return the options, and the checks of the payload that they name.
 
     :param args: the command line without the program's name, by default from ``sys.argv``.
+    :param payloads: the kinds of payloads that ``--payload`` may name.
     :raises SystemExit: if an argument is wrong, with status 2.
     """
     payload = Parser('conformance', is_complete=False)
     payload.add_argument(
         '--payload', default=DEFAULT_PAYLOAD,
         help='the kind of device; with --help, its options (default: %(default)s)',
-        choices=[one.name for one in PAYLOADS.values() if one.checks])
-    checks: AnyChecks = PAYLOADS[payload.parse_known_args(args)[0].payload].load('checks')
+        choices=[one.name for one in payloads.values() if one.checks])
+    checks: AnyChecks = payloads[payload.parse_known_args(args)[0].payload].load('checks')
     command = invocation('conformance')
     parser = Parser(
         'conformance', f'Checks whether a {checks.device} follows its MAVLink protocols.',
@@ -133,13 +137,16 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, AnyChecks]:
     return options, checks
 
 
-def run(args: Sequence[str] | None = None) -> int:
+def run(
+    args: Sequence[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS,
+) -> int:
     """
     Check a device, and return the exit status.
 
     :param args: the command line without the program's name, by default from ``sys.argv``.
+    :param payloads: the kinds of payloads that ``--payload`` may name.
     """
-    options, checks = parse(args)
+    options, checks = parse(args, payloads)
     logging.basicConfig(format='%(message)s')
     if options.list:
         return 0 if _print(*catalogue(checks.requirements, checks.device)) else 1
