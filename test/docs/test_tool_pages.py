@@ -17,10 +17,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 import re
+import shlex
 from typing import Any
 
+from illuminator_ros.cli.conformance.run import parse
+from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.components import scenario
-from illuminator_ros.cli.simulator.console import COMMANDS, OTHERS
+from illuminator_ros.cli.simulator.console import COMMANDS as CONSOLE_COMMANDS
+from illuminator_ros.cli.simulator.console import OTHERS
+from illuminator_ros.cli.simulator.options import parser, payload_types
 from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
@@ -33,6 +38,7 @@ from illuminator_ros.payload.simulated import SimulatedType
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from illuminator_ros.rededge.simulated import COLUMNS
 from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
+from payloads.winch import WINCH
 import pytest
 from support.tables import table
 
@@ -55,6 +61,34 @@ def test_the_requirements_are_listed_in_order_with_their_sections_and_counted(
          f'[{one.specification.title}]({one.specification.url}), {one.section}',
          notes[one.changes, one.needs_consent]] for one in requirements]
     assert f'{len(requirements)} requirements' in CONFORMANCE
+
+
+COMMANDS = [
+    (page.name, *one.groups())
+    for page in (*DOC.glob('*.md'), DOC.parent / 'README.md')
+    for block in page.read_text().split('```')[1::2]
+    for one in re.finditer(
+        r'^[^#\n]*?\b(?:illuminator-|ros2 run illuminator_ros )(simulator|conformance)\b(.*)',
+        block, re.M)]
+# The design page adds a winch.
+KINDS = {**PAYLOADS, 'winch': WINCH}
+
+
+@pytest.mark.parametrize(('page', 'program', 'text'), COMMANDS)
+def test_a_command_in_a_block_of_code_has_arguments_that_the_program_takes(
+    page: str, program: str, text: str,
+) -> None:
+    arguments = shlex.split(text.partition('$(')[0], comments=True)
+
+    if program == 'simulator':
+        parser(payload_types(arguments, KINDS), KINDS).parse_args(arguments)
+    else:
+        parse(arguments, KINDS)
+
+
+def test_commands_of_both_programs_are_found() -> None:
+    assert len(COMMANDS) > 20
+    assert {program for _, program, _ in COMMANDS} == {'simulator', 'conformance'}
 
 
 def faults(of: FaultTable) -> list[list[str]]:
@@ -88,7 +122,7 @@ def of_both(device: list[list[str]], manager: list[list[str]]) -> list[list[str]
     ('column', [[f'`{name}`', meaning] for name, meaning in COLUMNS.items()]),
     ('command of a camera', [[f'`{one.usage}`', one.help] for one in CAMERA.device.commands]),
     ('command', [*([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),
-                 *([f'`{one.usage}`', one.help] for one in COMMANDS),
+                 *([f'`{one.usage}`', one.help] for one in CONSOLE_COMMANDS),
                  *([f'`{name}`', text] for name, text in OTHERS)]),
 ])
 def test_a_table_of_the_simulator_has_every_row(heading: str, rows: list[list[str]]) -> None:
