@@ -106,8 +106,8 @@ examples:
   ros2 run illuminator_ros {name} serial:///dev/ttyACM0:57600
   ros2 run illuminator_ros {name} --ros-args -p connection_url:=udpin://0.0.0.0:14550
 
-{examples}--ros-args --log-level debug shows each message on the link in the log, and
---log-level {kind.node_name}:=debug those of one node and its device.
+{examples}--ros-args --log-level {kind.node_name}:=debug shows the messages of this device in the
+log, and --log-level debug those of all nodes, among many lines of ROS itself.
 
 parameters that are fixed at the start, with their defaults:
 {fixed}

@@ -57,6 +57,7 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
                  '/dev/ttyUSB0,57600', 'udpin:', 'ros2 service call', 'ros2 param set',
                  '--log-level debug', '--log-level illuminator:=debug'):
         assert form in bridge
+    assert bridge.index('illuminator:=debug') < bridge.index('--log-level debug')
     for action in parser()._actions:
         assert (action.option_strings or [action.dest])[-1] in simulator
 
