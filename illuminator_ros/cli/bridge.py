@@ -109,13 +109,13 @@ examples:
 {examples}--ros-args --log-level {kind.node_name}:=debug shows the messages of this device in the
 log, and --log-level debug those of all nodes, among many lines of ROS itself.
 
-parameters that are fixed at the start, with their defaults:
-{fixed}
-
-{variable}connection URLs, with their meanings in MAVROS, MAVSDK and pymavlink:
+connection URLs, with their meanings in MAVROS, MAVSDK and pymavlink:
   udp://[BIND][:PORT]@[HOST][:PORT]   udpin://BIND:PORT   udpout://HOST:PORT
   tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
   serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
+
+{variable}parameters that are fixed at the start, with their defaults:
+{fixed}
 
 exit status: 0 after SIGINT, SIGTERM or SIGHUP; 1 if a package is missing; 2 if an argument or
 parameter is wrong.
