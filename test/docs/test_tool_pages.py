@@ -58,8 +58,10 @@ def test_the_requirements_are_listed_in_order_with_their_sections_and_counted(
     notes = {(False, False): '', (True, False): 'changes', (True, True): consent}
     assert table(CONFORMANCE, heading) == [
         [f'`{one.name}`', one.title,
-         f'[{one.specification.title}]({one.specification.url}), {one.section}',
+         f'[{one.specification.title}], {one.section}',
          notes[one.changes, one.needs_consent]] for one in requirements]
+    for specification in {one.specification for one in requirements}:
+        assert f'\n[{specification.title}]: {specification.url}\n' in CONFORMANCE
     assert f'{len(requirements)} requirements' in CONFORMANCE
 
 
