@@ -433,7 +433,7 @@ def properties(settings: Values, address: Address) -> GimbalProperties:
 
 SIMULATED = simulated.SimulatedType(
     'gimbal', 'gimbals', SimulatedGimbal,
-    make=lambda settings, address, several: SimulatedGimbal(properties(settings, address)),
+    make=lambda settings, address: SimulatedGimbal(properties(settings, address)),
     address=lambda settings: GimbalProperties.address, settings=SETTINGS,
     examples=(
         '--payload gimbal',

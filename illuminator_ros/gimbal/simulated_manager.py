@@ -427,8 +427,7 @@ def manager_properties(settings: Values, address: Address) -> ManagerProperties:
 
 SIMULATED = simulated.SimulatedType(
     'manager', 'managers', SimulatedManager,
-    make=lambda settings, address, several: SimulatedManager(
-        manager_properties(settings, address)),
+    make=lambda settings, address: SimulatedManager(manager_properties(settings, address)),
     address=lambda settings: _profile(settings).address, settings=SETTINGS, mavlink_version=2,
     profiles={name: profile.description for name, profile in PROFILES.items()},
     examples=(

@@ -307,7 +307,7 @@ SETTINGS: dict[str, Setting] = {
     'software_version': Setting('TEXT', 'software_version', text),
     'hardware_version': Setting('TEXT', 'hardware_version', text),
     'serial_number': Setting('TEXT', 'serial_number; several lights append their component id',
-                             text),
+                             text, distinct=True),
     'status_interval': Setting('S', 'time between statuses; 0 sends them only on request '
                                '(default: 1)', number(0, 3600)),
     'min_strobe_period': Setting('S', 'shortest strobe period (default: 0.05)',
@@ -330,13 +330,10 @@ def _profile(settings: Values) -> IlluminatorProperties:
     return PROFILES[settings.get('profile', 'default')].properties
 
 
-def properties(
-    settings: Values, address: mav.Address, several: bool = False,
-) -> IlluminatorProperties:
+def properties(settings: Values, address: mav.Address) -> IlluminatorProperties:
     """
     Return the properties of the light that settings describe.
 
-    :param several: whether its serial number must differ from those of other lights.
     :raises ValueError: if they contradict each other.
     """
     def given(names: Iterable[str]) -> Values:
@@ -355,9 +352,6 @@ def properties(
     if profile.identity == IlluminatorProperties.identity:
         identity = replace(identity, serial_number=f'SIM-{address.system}-{address.component}')
     identity = replace(identity, **given(field.name for field in fields(Identity)))
-    if several and 'serial_number' in settings:
-        identity = replace(
-            identity, serial_number=f'{identity.serial_number}-{address.component}')
     return replace(
         profile, address=address, identity=identity, strobe_range=strobe_range,
         behaviour=behaviour,
@@ -367,7 +361,7 @@ def properties(
 
 SIMULATED = SimulatedType(
     'light', 'lights', SimulatedIlluminator,
-    make=lambda *settings: SimulatedIlluminator(properties(*settings)),
+    make=lambda settings, address: SimulatedIlluminator(properties(settings, address)),
     address=lambda settings: _profile(settings).address,
     settings=SETTINGS, mavlink_version=2,
     examples=(

@@ -188,8 +188,8 @@ class SimulatedType(Generic[D]):
     :param noun: names one device, as in the option ``--light`` and in messages.
     :param plural: the key of the YAML file.
     :param device: the class, for its faults and its console.
-    :param make: makes a device from settings, its address, and whether there are several;
-        ValueError if the settings contradict each other.
+    :param make: makes a device from settings and its address; ValueError if the settings
+        contradict each other.
     :param address: the address by default, from settings.
     :param profiles: descriptions of the values of the setting ``profile``.
     :param examples: arguments of the simulator, for ``--help``.
@@ -202,7 +202,7 @@ class SimulatedType(Generic[D]):
     noun: str
     plural: str
     device: type[D]
-    make: Callable[[Values, Address, bool], D]
+    make: Callable[[Values, Address], D]
     address: Callable[[Values], Address]
     settings: Mapping[str, Setting] = field(default_factory=dict)
     profiles: Mapping[str, str] = field(default_factory=dict)

@@ -31,12 +31,14 @@ class Setting:
 
     :param read: makes a value from text; raises ValueError, whose message gives the reason.
     :param adds: whether a second value is added to the first, which it otherwise replaces.
+    :param distinct: whether several components append their component ids to a common text.
     """
 
     metavar: str
     help: str  # noqa: A003
     read: Callable[[str], object]
     adds: bool = False
+    distinct: bool = False
 
 
 def number(low: float, high: float) -> Callable[[str], float]:

@@ -512,9 +512,7 @@ SETTINGS: Mapping[str, Setting] = {
 }
 
 
-def _make(
-    settings: Values, address: Address, several: bool = False,
-) -> SimulatedRedEdge:
+def _make(settings: Values, address: Address) -> SimulatedRedEdge:
     return SimulatedRedEdge(address, **{
         'own_gps': read_place(DEFAULT_PLACE),
         **{name: settings[name] for name in SETTINGS if name in settings}})

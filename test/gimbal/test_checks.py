@@ -120,7 +120,7 @@ def run(
     if kind == 'gimbal_manager':
         settings = {'heading': 40.0, **settings}
     address = simulated.address(settings)
-    device = simulated.make(settings, address, False)
+    device = simulated.make(settings, address)
     for fault in faults:
         device.behave(device.faults.add(device.behaviour, fault), START - 100.0)
     devices = SimulatedComponents([Description(address, device)], START - 100.0)

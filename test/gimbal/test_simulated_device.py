@@ -47,7 +47,7 @@ class Bench:
     """A simulated device with a manager; angles in degrees, time as given."""
 
     def __init__(self, *, announced: bool = True, **settings: object) -> None:
-        device: SimulatedGimbal = SIMULATED.make(settings, DEVICE, False)
+        device: SimulatedGimbal = SIMULATED.make(settings, DEVICE)
         self.now = 1000.0
         self.endpoint = SimulatedComponents([Description(DEVICE, device)], self.now)
         self.device = device
@@ -298,6 +298,6 @@ def test_a_yaw_without_a_stop_is_offered() -> None:
 
 
 def test_without_settings_it_is_the_gimbal_of_the_properties() -> None:
-    device = SIMULATED.make({}, DEVICE, False)
+    device = SIMULATED.make({}, DEVICE)
     assert device.properties == GimbalProperties()
     assert device.normal == GimbalBehaviour()

@@ -51,7 +51,7 @@ class Bench:
     def __init__(self, profile: str = 'reference', **settings: object) -> None:
         settings = {'profile': profile, **settings}
         self.address = SIMULATED.address(settings)
-        device: SimulatedManager = SIMULATED.make(settings, self.address, False)
+        device: SimulatedManager = SIMULATED.make(settings, self.address)
         self.now = 1000.0
         self.endpoint = SimulatedComponents([Description(self.address, device)], self.now)
         self.device = device

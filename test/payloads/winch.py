@@ -227,5 +227,5 @@ class SimulatedWinch(simulated.SimulatedDevice):
 
 
 SIMULATED = simulated.SimulatedType(
-    'winch', 'winches', SimulatedWinch, make=lambda settings, address, several: SimulatedWinch(),
+    'winch', 'winches', SimulatedWinch, make=lambda settings, address: SimulatedWinch(),
     address=lambda settings: mav.Address(1, 169))

@@ -306,8 +306,8 @@ def test_settings_make_a_camera() -> None:
     settings = {name: setting.read(text) for name, setting, text in (
         (name, SIMULATED.all_settings[name], text) for name, text in (
             ('interval', '2'), ('validity', '30'), ('own_gps', 'none')))}
-    device = SIMULATED.make(settings, Address(255, 100), False)
+    device = SIMULATED.make(settings, Address(255, 100))
 
     assert (device.own_gps, device.behaviour.validity) == (None, 30.0)
     assert device.next_deadline() == 2.0
-    assert SIMULATED.make({}, Address(255, 100), False).own_gps is not None
+    assert SIMULATED.make({}, Address(255, 100)).own_gps is not None

@@ -183,9 +183,10 @@ def components(
             settings = _merged(
                 kind.all_settings, file.common.get(kind.noun, {}), one.settings,
                 given[kind.noun], {'fault': faults[one.address]})
-            several = len(listed[kind.noun]) > 1 and 'serial_number' not in one.settings
+            if len(listed[kind.noun]) > 1:
+                settings = _distinct(kind, settings, one)
             with _place(f'{kind.noun} {one.address}'):
-                device = kind.make(settings, one.address, several)
+                device = kind.make(settings, one.address)
             for fault in settings.get('fault', ()):
                 device.behave(device.faults.add(device.behaviour, fault), 0.0)
             result.append(Description(one.address, device, one.name, settings.get('seed', 0)))
@@ -241,6 +242,13 @@ def _faults(
             for kind, where in found:
                 result[where] += read[kind.noun].get('fault', ())
     return result
+
+
+def _distinct(kind: Type, settings: Values, one: Listed) -> Values:
+    """Return settings in which the texts that a component shares with others are distinct."""
+    return {name: f'{value}-{one.address.component}'
+            if kind.all_settings[name].distinct and name not in one.settings else value
+            for name, value in settings.items()}
 
 
 def _merged(settings: Mapping[str, Setting], *layers: Values) -> Values:
