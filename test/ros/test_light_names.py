@@ -116,10 +116,11 @@ def test_only_target_leaves_other_lights_alone_and_unused_names_are_logged(
 def test_remapped_node_name_is_that_of_the_first_node_only(
     own_ros: Ros, start: Start, remap: tuple[str, str],
 ) -> None:
-    bridge, _ = start(*remap, names='["7/243=belly", "1/243=bow"]',
+    bridge, _ = start(*remap, names='["7/243=illuminator", "1/243=bow"]',
                       sources=(FIRST, SECOND, OTHER))
 
-    eventually(lambda: nodes(own_ros) == {'/spot', '/spot_1_244', '/belly'})
+    # The default name of the first node is free.
+    eventually(lambda: nodes(own_ros) == {'/spot', '/spot_1_244', '/illuminator'})
     bridge.wait_for('names: 1/243=bow is not used, since light 1/243 is served by the first node, '
                     'spot: -r __node:=bow renames it')
 

@@ -52,7 +52,8 @@ class Lights(ServedPayload):
     def __init__(self, client: IlluminatorClient, host: Host) -> None:
         self._client = client
         self._host = host
-        self._selection = parameters.Selection(host.values, host.node.get_name())
+        self._selection = parameters.Selection(host.values)
+        self._names = parameters.NodeNames(host.values, host.node.get_name())
         geometry = parameters.BeamGeometry.of(host.values)
         self._nodes = DeviceNodes[Address, LightNode](
             host, 'light', LightNode(
@@ -89,11 +90,11 @@ class Lights(ServedPayload):
         now = self._host.link.clock()
         nodes, selected = self._nodes, self._selection.is_target(address)
         if selected and nodes.first_is_free:
-            if warning := self._selection.unused_name(address):
+            if warning := self._names.unused_name(address):
                 self._host.log.warning(warning)
             self._names_due = now + NAMES_DELAY
             nodes.bind(nodes.first, address, now)
-        elif (nodes.serve(address, self._selection.node_name(address)) and selected
+        elif (nodes.serve(address, self._names.node_name(address)) and selected
                 and not self._second_reported):
             self._second_reported = True
             self._host.log.warning(
@@ -132,14 +133,14 @@ class Lights(ServedPayload):
         self._nodes.poll(now)
         if now >= self._names_due:
             self._names_due = math.inf
-            for warning in self._selection.unused_names(self._client.lights):
+            for warning in self._names.unused_names(self._client.lights):
                 self._host.log.warning(warning)
         for node in self._nodes:
             node.poll()
 
     def may_name(self, name: str) -> bool:
         """See :meth:`ServedPayload.may_name`."""
-        return self._selection.may_name(name)
+        return self._names.may_name(name)
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""
@@ -169,9 +170,8 @@ class Lights(ServedPayload):
 
 
 def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:
-    selection = parameters.Selection(values, 'illuminator')
     return IlluminatorClient(
-        commands, parameters.settings(values), wanted=selection.is_served,
+        commands, parameters.settings(values), wanted=parameters.Selection(values).is_served,
         needs_mounts=bool(values['beam_range'] or values['mounted_on']))
 
 

@@ -145,19 +145,11 @@ def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
 
 
 class Selection:
-    """
-    Selects the lights that are served, and their nodes.
+    """Selects the lights that are served."""
 
-    :param values: of the parameters.
-    :param first: the name of the first node.
-    :raises ParameterError: if ``names`` is wrong.
-    """
-
-    def __init__(self, values: Values, first: str) -> None:
+    def __init__(self, values: Values) -> None:
         self._target = Address(values['target_system'], values['target_component'])
         self._only_target = bool(values['only_target'])
-        self._first = first
-        self.names = _parse_names(values['names'], first)
 
     def is_target(self, address: Address) -> bool:
         """Return whether the first node may serve a light."""
@@ -168,19 +160,34 @@ class Selection:
         """Return whether any node may serve a light."""
         return not self._only_target or self.is_target(address)
 
+
+class NodeNames:
+    """
+    The names of the nodes of lights.
+
+    :param values: of the parameters.
+    :param first: the name of the first node.
+    :raises ParameterError: if ``names`` is wrong.
+    """
+
+    def __init__(self, values: Values, first: str) -> None:
+        self._first = first
+        self._names = _parse_names(values['names'], first)
+        self._selection = Selection(values)
+
     def node_name(self, address: Address) -> str:
         """Return the name of the node of a further light."""
-        return (self.names.get(address)
+        return (self._names.get(address)
                 or f'{self._first}_{address.system}_{address.component}')
 
     def may_name(self, name: str) -> bool:
         """Return whether the node of a further light may have a name."""
-        return (name in self.names.values()
+        return (name in self._names.values()
                 or re.fullmatch(rf'{self._first}_[0-9]+_[0-9]+', name) is not None)
 
     def unused_name(self, served: Address) -> str:
         """Return the warning for a name of the light that the first node serves, '' for none."""
-        name = self.names.get(served)
+        name = self._names.get(served)
         return (f'names: {served}={name} is not used, since light {served} is served by the first '
                 f'node, {self._first}: -r __node:={name} renames it; target_system and '
                 'target_component choose its light') if name else ''
@@ -188,11 +195,11 @@ class Selection:
     def unused_names(self, heard: Mapping[Address, object]) -> list[str]:
         """Return a warning for each name of a light that is not served or was not heard."""
         return [f'names: {address}={name} is not used, since only_target leaves light {address} '
-                'alone' if not self.is_served(address) else
+                'alone' if not self._selection.is_served(address) else
                 f'names: {address}={name} is not used yet, since no light {address} has been '
                 'heard'
-                for address, name in self.names.items()
-                if not self.is_served(address) or address not in heard]
+                for address, name in self._names.items()
+                if not self._selection.is_served(address) or address not in heard]
 
 
 def _parse_names(entries: list[str], first: str) -> dict[Address, str]:
