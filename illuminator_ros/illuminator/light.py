@@ -553,20 +553,20 @@ class Light:
             return self._restart_check_until
         return -math.inf
 
-    def configure(
-        self, changes: Changes, now: float, done: Done, *, source: str = DEFAULT,
-    ) -> None:
+    def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
         Change some fields with one command; ``done`` is called once with the result.
+
+        The request is one of the source :data:`~..payload.command_sources.DEFAULT`.
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
         def finished(result: Result, now: float) -> None:
             if result.success:
-                self._sources.remember(source, brightness=changes.get('brightness'))
+                self._sources.remember(DEFAULT, brightness=changes.get('brightness'))
             done(result, now)
 
-        if self._can_reach(now, done, self._claim(source, now)):
+        if self._can_reach(now, done, self._claim(DEFAULT, now)):
             self._configuration.configure(changes, now, finished)
 
     def set_brightness(
