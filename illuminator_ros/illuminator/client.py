@@ -155,6 +155,7 @@ def enable_all(
     """
     Switch all connected lights on or off, in parallel.
 
+    :param lights: at least one.
     :param done: called once, when the last light has answered. The result is a success if at least
         one light is connected and all connected lights succeeded; the message has the outcome of
         each light.
@@ -174,8 +175,6 @@ def enable_all(
     for light in lights:
         light.enable(on, now, functools.partial(outcome, light), detail=detail,
                      is_stream=is_stream)
-    if not lights:
-        done(Result(False, 'no light has been heard yet'), now)
 
 
 def _summary(

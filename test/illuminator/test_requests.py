@@ -586,9 +586,3 @@ def test_an_off_of_all_lights_reaches_each_at_once_though_one_has_not_answered_t
 def test_a_request_to_all_that_is_replaced_says_so(three: Pair) -> None:
     _, replaced, _ = [ask_all(three, is_stream=True) for _ in range(3)]
     assert replaced.result.superseded
-
-
-def test_without_a_light_a_request_to_all_fails_at_once() -> None:
-    answer = Answer(0.0)
-    enable_all([], True, 0.0, answer, name=str)
-    assert answer.result == Result(False, 'no light has been heard yet')
