@@ -49,7 +49,7 @@ MOVE_INTERVAL = 0.1
 REMOVAL_TIMEOUT = Duration(seconds=0.05)
 
 
-def cone(length: float, angle: float, sides: int = SIDES) -> list[Point]:
+def cone(length: float, angle: float) -> list[Point]:
     """
     Return the corners of the triangles, three for each, that a cone around +x consists of.
 
@@ -61,10 +61,10 @@ def cone(length: float, angle: float, sides: int = SIDES) -> list[Point]:
     """
     radius = length * math.tan(angle / 2)
     rim = [(length, radius * math.cos(turn), radius * math.sin(turn))
-           for turn in (2 * math.pi * side / sides for side in range(sides))]
+           for turn in (2 * math.pi * side / SIDES for side in range(SIDES))]
     corners: list[Point] = []
-    for side in range(sides):
-        corners += (0.0, 0.0, 0.0), rim[(side + 1) % sides], rim[side]
+    for side in range(SIDES):
+        corners += (0.0, 0.0, 0.0), rim[(side + 1) % SIDES], rim[side]
     return corners
 
 
