@@ -208,8 +208,8 @@ def _text(value: object, spec: str) -> str:
     return format(value, spec)
 
 
-def _known(value: int, scale: float) -> float | None:
-    return None if value == UNKNOWN else value / scale
+def _hundredths(value: int) -> float | None:
+    return None if value == UNKNOWN else value / 100
 
 
 def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> Values:
@@ -222,8 +222,8 @@ def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> Values:
                 'course_deg': math.degrees(math.atan2(east, north)) % 360}
     satellites = message.satellites_visible
     return {**(place if message.fix_type >= FIX_3D else {}), 'fix_type': message.fix_type,
-            'eph_m': _known(message.eph, 100), 'epv_m': _known(message.epv, 100),
-            'speed_m_s': _known(message.vel, 100), 'course_deg': _known(message.cog, 100),
+            'eph_m': _hundredths(message.eph), 'epv_m': _hundredths(message.epv),
+            'speed_m_s': _hundredths(message.vel), 'course_deg': _hundredths(message.cog),
             'satellites': None if satellites == UNKNOWN_SATELLITES else satellites}
 
 
