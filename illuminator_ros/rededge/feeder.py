@@ -362,7 +362,7 @@ class Feeder:
                              'the clock, or publish ~/time_reference')
         return utc
 
-    def take_time_reference(self, stamp: Stamp, utc: int, now: float) -> None:
+    def take_time_reference(self, utc: int, stamp: Stamp, now: float) -> None:
         """
         Take the UTC (ns since the UNIX epoch) of a stamp.
 

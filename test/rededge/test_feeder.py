@@ -81,7 +81,7 @@ class Rig:
         return self.take()
 
     def reference(self, utc: float, age: float = 0.0) -> None:
-        self.feeder.take_time_reference(self.stamp(age), round(utc * 1e9), self.now)
+        self.feeder.take_time_reference(round(utc * 1e9), self.stamp(age), self.now)
 
     def image_time(self, utc: float) -> int:
         """Return the ROS time of an image, ns."""

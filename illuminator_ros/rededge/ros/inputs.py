@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+import functools
 import math
 import time
 from typing import Any
@@ -105,25 +106,20 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
 
         return CommandTopic(name.value, type_, lambda taken, now: take(*taken, now), read)
 
-    def take_attitude(name: Input) -> Callable[..., None]:
-        return lambda *taken: feeder.take_attitude(name, *taken)
-
-    def take_reference(utc: int, stamp: Stamp, now: float) -> None:
-        feeder.take_time_reference(stamp, utc, now)
-
     return (
         topic(Input.FIX, NavSatFix, lambda one: (position(one),), feeder.take_fix),
         topic(Input.VELOCITY, TwistStamped, lambda one: (read_vector(one.twist.linear),),
               feeder.take_velocity),
         CommandTopic(Input.SATELLITES.value, UInt32, feeder.take_satellites),
-        topic(Input.IMU, Imu, orientation_and_rates, take_attitude(Input.IMU)),
+        topic(Input.IMU, Imu, orientation_and_rates,
+              functools.partial(feeder.take_attitude, Input.IMU)),
         topic(Input.ATTITUDE, QuaternionStamped,
               lambda one: (read_quaternion(one.quaternion), UNKNOWN),
-              take_attitude(Input.ATTITUDE)),
+              functools.partial(feeder.take_attitude, Input.ATTITUDE)),
         topic(Input.MOUNT, QuaternionStamped,
               lambda one: (read_quaternion(one.quaternion), one.header.frame_id),
               feeder.take_mount),
         topic(Input.TIME_REFERENCE, TimeReference,
               lambda one: (one.time_ref.sec * 1_000_000_000 + one.time_ref.nanosec,),
-              take_reference),
+              feeder.take_time_reference),
     )
