@@ -79,8 +79,8 @@ class GimbalClient(Payload):
         self.limit_reached = False
         self._gimbals: dict[GimbalKey, Gimbal] = {}
         self.gimbals: Mapping[GimbalKey, Gimbal] = self._gimbals
+        self.settings = settings
         self._commands = commands
-        self._settings = settings
         self._components: dict[Address, _Component] = {}
         self._queries: DeadlineQueue[Address] = DeadlineQueue()
         self._next_query = -math.inf
@@ -127,11 +127,11 @@ class GimbalClient(Payload):
                GimbalKey(Address(manager.system, device_id)))
         gimbal = self._gimbals.get(key)
         if gimbal is None:
-            if len(self._gimbals) >= MAX_GIMBALS + (device_id == self._settings.device_id):
+            if len(self._gimbals) >= MAX_GIMBALS + (device_id == self.settings.device_id):
                 self.limit_reached = True
                 return None
             gimbal = self._gimbals[key] = Gimbal(
-                key, self._commands, self._settings, self.events.emit)
+                key, self._commands, self.settings, self.events.emit)
             self.events.emit(GimbalFound(key))
         return gimbal
 

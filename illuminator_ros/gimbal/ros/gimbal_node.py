@@ -31,7 +31,7 @@ from .diagnostics import controller, reports, why_no_gimbal
 from .. import events
 from ..client import GimbalClient
 from ..commands import Control
-from ..gimbal import Gimbal, GimbalSettings
+from ..gimbal import Gimbal
 from ..messages import ErrorFlags, flag_names
 from ...payload import request
 from ...payload.command_sources import DEFAULT, describe
@@ -76,13 +76,12 @@ class GimbalNode:
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
-        settings: GimbalSettings, why_none: Callable[[], str],
+        why_none: Callable[[], str],
     ) -> None:
         self.key: events.GimbalKey | None = None
         self._host = host
         self._log = log
         self._client = client
-        self._settings = settings
         self._why_none = why_none
         self._frames = conversions.Frames.of(host.values)
         self._clock = node.get_clock()
@@ -90,7 +89,7 @@ class GimbalNode:
         self._yaw_lock: bool | None = None
         self._errors = ErrorFlags(0)
         self._separation: float = host.values['geoid_separation']
-        sources = settings.sources
+        sources = client.settings.sources
         source_topic = [ros_node.Publication('source', String)] if sources else []
         self._interface = ros_node.NodeInterface(
             node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
@@ -288,7 +287,7 @@ class GimbalNode:
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
             heard=tuple(self._client.gimbals), known=self._why_none(),
             limit_reached=self._client.limit_reached,
-            interval=self._settings.attitude_interval, started=self._started)
+            interval=self._client.settings.attitude_interval, started=self._started)
 
 
 def _refusal(gimbal: Gimbal, name: str, now: float) -> str:

@@ -71,10 +71,9 @@ class Gimbals(ServedPayload):
     ) -> None:
         self._client = client
         self._host = host
-        gimbals = settings(host.values)
         self._nodes = DeviceNodes[GimbalKey, GimbalNode](
-            host, 'gimbal', GimbalNode(host.node, host, host.log, client, gimbals, why_none),
-            lambda node, log: GimbalNode(node, host, log, client, gimbals, why_none),
+            host, 'gimbal', GimbalNode(host.node, host, host.log, client, why_none),
+            lambda node, log: GimbalNode(node, host, log, client, why_none),
             GimbalNode.bind)
         client.events.subscribe(self._take)
 
