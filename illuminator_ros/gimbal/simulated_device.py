@@ -312,7 +312,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
             return self.mount.information(self.behaviour, now)
         return None
 
-    def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
+    def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
         self._expire(now)
         own, behaviour = self.properties.address, self.behaviour
@@ -324,9 +324,10 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         elif isinstance(message, gimbal.AutopilotStateForGimbalDevice):
             if source.system == own.system:
                 self._take_heading(message, now)
-        elif ((source == self.manager or not behaviour.enforces_control)
-              and (isinstance(message, gimbal.GimbalDeviceSetAttitude)
-                   or behaviour.takes_manager_set)):
+        elif (source == self.manager or not behaviour.enforces_control) and (
+                isinstance(message, gimbal.GimbalDeviceSetAttitude)
+                or isinstance(message, gimbal.GimbalManagerSetAttitude)
+                and behaviour.takes_manager_set):
             self._obey(message, now)
         return ()
 

@@ -27,11 +27,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
-from .manager_setpoint import Demand, direction, GeoPoint, read_demand, read_roi
+from .manager_setpoint import (
+    AnySetpoint,
+    Demand,
+    direction,
+    GeoPoint,
+    read_demand,
+    read_roi,
+)
 from .messages import Capabilities, DEVICE_ID_PARAM, GimbalCommand, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
@@ -228,12 +235,12 @@ class SimulatedManager(simulated.SimulatedDevice):
 
     # Setpoints
 
-    def receive(self, source: Address, message: Any, now: float) -> Iterable[Message]:
+    def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
         if isinstance(message, Attitude | GlobalPositionInt):
             if source.system == self.properties.gimbal.address.system:
                 self._take_vehicle(message, now)
-        elif self._is_for_device(message.gimbal_device_id):
+        elif isinstance(message, AnySetpoint) and self._is_for_device(message.gimbal_device_id):
             demand = self._read(message)
             if demand is not None and self._may_control(source):
                 self._obey(source, demand, now)
@@ -260,7 +267,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
         return flags & ~frames if self.behaviour.frame_is_lock else flags
 
-    def _read(self, message: Any) -> Demand | None:
+    def _read(self, message: AnySetpoint) -> Demand | None:
         """Return the demand of a message, None if it is ignored."""
         behaviour = self.behaviour
         if (isinstance(message, gimbal.GimbalManagerSetPitchyaw) and not behaviour.takes_pitchyaw
