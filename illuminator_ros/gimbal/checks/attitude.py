@@ -25,6 +25,7 @@ from typing import TypeAlias, TypeVar
 
 from .tester import (
     GimbalTester,
+    Information,
     Limits,
     NAN,
     Pose,
@@ -127,7 +128,7 @@ def turns(
 
 # INFORMATION
 
-def information(cls: type[Message]) -> tuple[Requirement[GimbalTester], ...]:
+def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]:
     """Return the requirements on an INFORMATION message."""
     @requirement('information-static', f'sends the same {cls.name} at all times', PROPOSAL,
                  'Messaging (GM-10)')
@@ -193,7 +194,7 @@ def _content(status: AttitudeStatus) -> str:
 
 def _frame(status: AttitudeStatus) -> str:
     found = status.flags & FRAMES
-    return '' if found in (32, 64) else f'flags 0x{status.flags:x} name ' + (
+    return '' if found not in (0, FRAMES) else f'flags 0x{status.flags:x} name ' + (
         'both frames' if found else 'no frame')
 
 

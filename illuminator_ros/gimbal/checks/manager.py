@@ -25,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 import math
-from typing import Any
 
 from . import attitude
 from .attitude import earth_yaw, ignores, moves, reaches, turns
@@ -117,13 +116,10 @@ class ManagerTester(GimbalTester):
         """Return the players in control; raise Skipped if the manager does not report them."""
         return control_of(await self.newest(MANAGER_STATUS, 'who has control'))
 
-    async def configure(
-        self, *values: float, sender: Address | None = None, device_id: float | None = None,
-    ) -> Transaction:
+    async def configure(self, *values: float, sender: Address | None = None) -> Transaction:
         """Send MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE with four values."""
         return await self.session.command(
-            CONFIGURE, *values, 0.0, 0.0, self.device_id if device_id is None else device_id,
-            sender=sender)
+            CONFIGURE, *values, 0.0, 0.0, self.device_id, sender=sender)
 
     async def shown(self, condition: Callable[[Control], bool]) -> Control:
         """Return the control once it meets a condition, or after :data:`SHOWN_TIMEOUT`."""
@@ -173,9 +169,11 @@ class ManagerTester(GimbalTester):
             *self.session.device, flags, self.device_id if device_id is None else device_id,
             quaternion_of(pose), *radians(rates)), sender)
 
-    async def send(self, cls: type[Any], pitch: float = NAN, yaw: float = NAN,
-                   pitch_rate: float = NAN, yaw_rate: float = NAN,
-                   sender: Address | None = None) -> None:
+    async def send(
+        self, cls: type[gimbal.GimbalManagerSetPitchyaw | gimbal.GimbalManagerSetManualControl],
+        pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN, yaw_rate: float = NAN,
+        sender: Address | None = None,
+    ) -> None:
         """Send SET_PITCHYAW (rad) or SET_MANUAL_CONTROL."""
         self.session.send(
             cls(*self.session.device, int(LEVEL | VEHICLE_FRAME), self.device_id, pitch, yaw,

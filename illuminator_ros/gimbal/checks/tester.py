@@ -20,7 +20,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from .. import messages as gimbal
 from ..axes import LEVEL, Range, read_ranges
@@ -51,6 +51,7 @@ STEP = 15.0
 RATE = 6.0
 NAN = math.nan
 Control = tuple[Address, Address]
+Information = gimbal.GimbalDeviceInformation | gimbal.GimbalManagerInformation
 M = TypeVar('M', bound=Message)
 
 
@@ -103,8 +104,8 @@ class Limits(NamedTuple):
     capabilities: int
 
     @classmethod
-    def from_message(cls, message: Any) -> Limits:
-        """Read GIMBAL_DEVICE_INFORMATION or GIMBAL_MANAGER_INFORMATION."""
+    def from_message(cls, message: Information) -> Limits:
+        """Read an INFORMATION message."""
         roll, pitch, yaw = (Range(*map(math.degrees, one)) for one in read_ranges(message))
         return cls(roll, pitch, yaw, getattr(message, 'cap_flags2', 0) or message.cap_flags)
 
@@ -150,7 +151,7 @@ class GimbalTester(ABC):
     :cvar status: the class whose interval is restored.
     """
 
-    information: type[Any]
+    information: type[Information]
     status: type[Message]
 
     def __init__(self, session: Session, conditions: Conditions) -> None:
