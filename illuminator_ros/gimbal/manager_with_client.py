@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import islice
 import math
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .client import GimbalClient
 from .gimbal import GimbalSettings
@@ -65,7 +65,7 @@ class ManagerWithClient(Payload):
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
         self._heartbeat_due = min(self._heartbeat_due, now)
-        self._manage(self.manager.link_opened, now)
+        self._manage(lambda: self.manager.link_opened(now), now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
@@ -83,7 +83,7 @@ class ManagerWithClient(Payload):
         if isinstance(message, mav.CommandAck):
             self._own.acknowledge(source, message, now)
         else:
-            self._manage(self.manager.receive, source, message, now)
+            self._receive(source, message, now)
             if source == self.manager.tracker.device and type(message) in _FOR_CLIENT:
                 self.client.receive(source, message, now)
         self._serve_client(now)
@@ -96,13 +96,13 @@ class ManagerWithClient(Payload):
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> mav.MavResult | None:
         """See :meth:`Payload.execute`."""
-        result = self._manage(self.manager.execute, source, command, now)
+        result = self._execute(source, command, now)
         self._serve_client(now)
         return result
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """See :meth:`GimbalManager.take_attitude`."""
-        self._manage(self.manager.take_attitude, status, now)
+        self._manage(lambda: self.manager.take_attitude(status, now), now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -111,7 +111,7 @@ class ManagerWithClient(Payload):
             alive = mav.heartbeat(mav.MavType.ONBOARD_CONTROLLER)
             self.client.receive(self._commands.address, alive, now)
             self.manager.receive(self._commands.address, alive, now)
-        self._manage(self.manager.poll, now)
+        self._manage(lambda: self.manager.poll(now), now)
         self._own.poll(now)
         self.client.poll(now)
         # ROS may have used the client since the last call.
@@ -124,18 +124,14 @@ class ManagerWithClient(Payload):
         return min(self._heartbeat_due, self.manager.next_deadline(), self.client.next_deadline(),
                    self._own.next_deadline())
 
-    def _manage(self, call: Callable[..., T], *arguments: Any) -> T:
-        """
-        Call the manager, and pass the messages that it broadcasts to the client.
-
-        :param arguments: of the call; the last one is the time.
-        """
+    def _manage(self, call: Callable[[], T], now: float) -> T:
+        """Make a call of the manager, and pass the messages that it broadcasts to the client."""
         outgoing = self._commands.outgoing
         before = len(outgoing)
-        result = call(*arguments)
+        result = call()
         for _, message in list(islice(outgoing, before, None)):
             if type(message) in _FOR_CLIENT:
-                self.client.receive(self._commands.address, message, arguments[-1])
+                self.client.receive(self._commands.address, message, now)
         return result
 
     def _serve_client(self, now: float) -> None:
@@ -151,9 +147,12 @@ class ManagerWithClient(Payload):
                 if ack is not None:
                     self._own.acknowledge(source, ack, now)
             else:
-                self._manage(self.manager.receive, source, message, now)
+                self._receive(source, message, now)
+
+    def _receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
+        self._manage(lambda: self.manager.receive(source, message, now), now)
 
     def _execute(
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> mav.MavResult | None:
-        return self._manage(self.manager.execute, source, command, now)
+        return self._manage(lambda: self.manager.execute(source, command, now), now)
