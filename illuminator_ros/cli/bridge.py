@@ -33,15 +33,13 @@ from .entry_point import (
     run_program,
     wrong_arguments,
 )
-from .payloads import PAYLOADS
+from .payloads import DEFAULT_PAYLOAD, PAYLOADS
 from .postponed_imports import postponed_imports
 from .termination import Termination
 from ..payload.payload_type import PayloadType
 
 if TYPE_CHECKING:
     from ..ros.payload import RosPayload  # Slow to import.
-
-ILLUMINATOR = 'illuminator'
 
 
 class Executable(NamedTuple):
@@ -52,13 +50,13 @@ class Executable(NamedTuple):
     :param payloads: the kinds of payloads that this parameter may name.
     """
 
-    payload: str = ILLUMINATOR
+    payload: str = DEFAULT_PAYLOAD
     payloads: Mapping[str, PayloadType] = PAYLOADS
 
     @property
     def name(self) -> str:
         """Return the name of the executable."""
-        return 'bridge' if self.payload == ILLUMINATOR else self.payload
+        return 'bridge' if self.payload == DEFAULT_PAYLOAD else self.payload
 
     def load(self) -> RosPayload:
         """Return the ROS half of its payload."""
@@ -124,7 +122,7 @@ parameter is wrong.
 
 def main(
     args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS, *,
-    payload: str = ILLUMINATOR,
+    payload: str = DEFAULT_PAYLOAD,
 ) -> int:
     """
     Run an executable until a signal; see :func:`usage`.

@@ -20,6 +20,8 @@ from collections.abc import Mapping
 
 from ..payload.payload_type import PayloadType
 
+# The payload of the executables without ``--payload``, and of ``bridge``.
+DEFAULT_PAYLOAD = 'illuminator'
 PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',

@@ -44,7 +44,7 @@ from ..options import (
     Parser,
     signing,
 )
-from ..payloads import PAYLOADS
+from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ..termination import SIGNALS
 from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent, LinkSnapshot
@@ -66,7 +66,6 @@ NOT_OPEN = 'link not open: '
 PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOSTUNREACH,
                errno.ENETUNREACH, errno.EPIPE)
 FIND_TIMEOUT = 10.0
-DEFAULT_PAYLOAD = 'illuminator'
 
 EXAMPLES = (
     'serial:///dev/ttyACM0:57600',

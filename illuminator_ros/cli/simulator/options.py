@@ -22,11 +22,9 @@ from collections.abc import Iterable, Mapping
 from .components import SettingError, Types
 from .console import describe_commands
 from ..options import add_mavlink_version, add_signing, invocation, option, Parser
-from ..payloads import PAYLOADS
+from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer
-
-DEFAULT_PAYLOAD = 'illuminator'
 
 
 def payload_types(args: Iterable[str] | None, payloads: Mapping[str, PayloadType]) -> Types:
