@@ -20,13 +20,13 @@ import pytest
 BOW = '/bow'
 
 
-def fleet_with(**values: object) -> model.Fleet:
-    """Return a fleet with one light that has published these values at time 100."""
-    fleet = model.Fleet()
-    fleet.seen([BOW], 100.0)
+def lights_with(**values: object) -> model.DiscoveredLights:
+    """Return one light, which has published these values at time 100."""
+    lights = model.DiscoveredLights()
+    lights.seen([BOW], 100.0)
     for topic, value in values.items():
-        fleet.take(BOW, topic, value, 100.0)
-    return fleet
+        lights.take(BOW, topic, value, 100.0)
+    return lights
 
 
 @pytest.mark.parametrize(('values', 'state'), [
@@ -37,64 +37,64 @@ def fleet_with(**values: object) -> model.Fleet:
     ({'connected': False, 'enabled': True}, model.State.LOST),
 ])
 def test_state_follows_from_the_topics(values: dict[str, bool], state: model.State) -> None:
-    assert fleet_with(**values).snapshot()[0].state(100.0) is state
+    assert lights_with(**values).snapshot()[0].state(100.0) is state
 
 
 def test_light_without_topics_and_diagnostics_is_silent() -> None:
-    fleet = fleet_with(connected=True, enabled=True)
-    [light] = fleet.snapshot()
+    lights = lights_with(connected=True, enabled=True)
+    [light] = lights.snapshot()
     assert light.state(100.0 + model.SILENCE) is model.State.ON
     assert light.state(100.1 + model.SILENCE) is model.State.SILENT
 
-    fleet.diagnosed(BOW, 'link', model.Diagnosis(0, 'open', {}), 110.0)
+    lights.diagnosed(BOW, 'link', model.Diagnosis(0, 'open', {}), 110.0)
 
-    assert fleet.snapshot()[0].state(111.0) is model.State.ON
+    assert lights.snapshot()[0].state(111.0) is model.State.ON
 
 
 def test_light_that_left_the_graph_is_gone_and_returns_without_its_setpoint() -> None:
-    fleet = fleet_with(connected=True, enabled=True)
-    fleet.agreed(BOW, 30.0)
-    fleet.seen([], 101.0)
-    assert fleet.snapshot()[0].state(101.0) is model.State.GONE
+    lights = lights_with(connected=True, enabled=True)
+    lights.agreed(BOW, 30.0)
+    lights.seen([], 101.0)
+    assert lights.snapshot()[0].state(101.0) is model.State.GONE
 
-    assert fleet.seen([BOW], 102.0) == []
+    assert lights.seen([BOW], 102.0) == []
 
-    assert fleet.snapshot()[0].state(102.0) is model.State.ON
-    assert fleet.snapshot()[0].setpoint is None
+    assert lights.snapshot()[0].state(102.0) is model.State.ON
+    assert lights.snapshot()[0].setpoint is None
 
 
 def test_lights_are_sorted_bounded_and_cleared_if_gone() -> None:
-    fleet = model.Fleet()
+    lights = model.DiscoveredLights()
 
-    assert fleet.seen(['/b', '/a'], 0.0) == ['/a', '/b']
-    assert fleet.seen(['/a', '/b', '/aa'], 1.0) == ['/aa']
-    assert [light.name for light in fleet.snapshot()] == ['/a', '/aa', '/b']
-    fleet.seen(['/b'], 2.0)
-    assert fleet.clear_gone() == ['/a', '/aa']
-    assert [light.name for light in fleet.snapshot()] == ['/b']
-    fleet.seen(['/b', *(f'/light_{number}' for number in range(model.MAX_LIGHTS + 5))], 3.0)
-    assert len(fleet.snapshot()) == model.MAX_LIGHTS
+    assert lights.seen(['/b', '/a'], 0.0) == ['/a', '/b']
+    assert lights.seen(['/a', '/b', '/aa'], 1.0) == ['/aa']
+    assert [light.name for light in lights.snapshot()] == ['/a', '/aa', '/b']
+    lights.seen(['/b'], 2.0)
+    assert lights.clear_gone() == ['/a', '/aa']
+    assert [light.name for light in lights.snapshot()] == ['/b']
+    lights.seen(['/b', *(f'/light_{number}' for number in range(model.MAX_LIGHTS + 5))], 3.0)
+    assert len(lights.snapshot()) == model.MAX_LIGHTS
 
 
 def test_values_of_unknown_lights_are_ignored() -> None:
-    fleet = fleet_with()
+    lights = lights_with()
 
-    fleet.take('/other', 'enabled', True, 100.0)
-    fleet.diagnosed('', 'lamp', model.Diagnosis(2, 'broken', {}), 100.0)
-    fleet.agreed('/other', 1.0)
+    lights.take('/other', 'enabled', True, 100.0)
+    lights.diagnosed('', 'lamp', model.Diagnosis(2, 'broken', {}), 100.0)
+    lights.agreed('/other', 1.0)
 
-    assert [(light.name, light.lamp) for light in fleet.snapshot()] == [(BOW, None)]
+    assert [(light.name, light.lamp) for light in lights.snapshot()] == [(BOW, None)]
 
 
 def test_error_flags_have_texts() -> None:
-    assert fleet_with(error_flags=0x15).snapshot()[0].flags == [
+    assert lights_with(error_flags=0x15).snapshot()[0].flags == [
         'thermal throttling', 'thermistor failure', 'unknown flags 0x10']
 
 
 def test_control_characters_of_others_never_reach_the_terminal() -> None:
-    fleet = fleet_with(mode='\x1b[2J')
-    fleet.diagnosed(BOW, 'lamp', model.Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
-    [light] = fleet.snapshot()
+    lights = lights_with(mode='\x1b[2J')
+    lights.diagnosed(BOW, 'lamp', model.Diagnosis(1, 'a\x1b]0;x\x07', {'vendor': '\r\n'}), 100.0)
+    [light] = lights.snapshot()
 
     assert light.lamp is not None
     texts = [light.value('mode'), light.lamp.message, *light.lamp.values.values()]

@@ -19,7 +19,7 @@ import re
 from typing import Literal
 
 from illuminator_ros.cli.monitor.key_bindings import BINDINGS
-from illuminator_ros.cli.monitor.model import Diagnosis, Fleet, Outcome
+from illuminator_ros.cli.monitor.model import Diagnosis, DiscoveredLights, Outcome
 from illuminator_ros.cli.monitor.view import bar, columns_for, plain, screen, sparkline, ViewState
 import pytest
 from rich.console import Console
@@ -29,35 +29,35 @@ NOW = 1000.0
 SIZES = [(200, 50), (132, 24), (80, 24), (60, 12), (40, 8), (20, 6), (12, 3), (5, 2), (1, 1)]
 
 
-def fleet_of(*names: str) -> Fleet:
+def lights_of(*names: str) -> DiscoveredLights:
     """Return lights that are on and have published all values."""
-    fleet = Fleet()
-    fleet.seen(names, NOW)
+    lights = DiscoveredLights()
+    lights.seen(names, NOW)
     for name in names:
         for topic, value in {
             'connected': True, 'enabled': True, 'brightness': 40.0, 'mode': 'internal_control',
             'strobe_period': 0.5, 'strobe_duty_cycle': 20.0, 'error_flags': 1, 'uptime': 300.0,
         }.items():
-            fleet.take(name, topic, value, NOW)
+            lights.take(name, topic, value, NOW)
         for second in range(10):
-            fleet.take(name, 'temperature', 30.0 + second, NOW - 20 + 2 * second)
-        fleet.take(name, 'temperature', 41.5, NOW)
-        fleet.agreed(name, 90.0)
-        fleet.diagnosed(name, 'link', Diagnosis(1, '12 % of the frames lost', {
+            lights.take(name, 'temperature', 30.0 + second, NOW - 20 + 2 * second)
+        lights.take(name, 'temperature', 41.5, NOW)
+        lights.agreed(name, 90.0)
+        lights.diagnosed(name, 'link', Diagnosis(1, '12 % of the frames lost', {
             'loss_percent': '12.3', 'round_trip_p50_ms': '3.2', 'round_trip_p95_ms': '40'}), NOW)
-        fleet.diagnosed(name, 'lamp', Diagnosis(1, 'dimmed because it is hot', {
+        lights.diagnosed(name, 'lamp', Diagnosis(1, 'dimmed because it is hot', {
             'vendor': 'maker', 'model': 'torch', 'holder': 'safety', 'serial_number': 'T-1'}), NOW)
-    return fleet
+    return lights
 
 
-def shown(fleet: Fleet, width: int = 132, height: int = 24, *,
+def shown(lights: DiscoveredLights, width: int = 132, height: int = 24, *,
           color: Literal['standard'] | None = None, now: float = NOW,
           selected: str | None = '/bow', **how: bool) -> str:
     """Return the output for a terminal."""
     file = io.StringIO()
     console = Console(file=file, width=width, height=height, force_terminal=bool(color),
                       color_system=color, highlight=False, legacy_windows=False)
-    drawn = screen(ViewState(fleet.snapshot(), selected, now, **how), width, height)
+    drawn = screen(ViewState(lights.snapshot(), selected, now, **how), width, height)
     # As rich.live.Live draws it.
     console.print(Screen(drawn), end='')
     return file.getvalue()
@@ -68,7 +68,7 @@ def shown(fleet: Fleet, width: int = 132, height: int = 24, *,
     'thermal throttling', 'dimmed because it is hot', 'maker torch', 'no. T-1',
     'agreed: 90 %', 'up 5 min', 'held by safety', '1 light: 1 ON', '30.0 to 41.5'])
 def test_screen_shows_each_known_value(text: str) -> None:
-    assert text in shown(fleet_of('/bow'))
+    assert text in shown(lights_of('/bow'))
 
 
 @pytest.mark.parametrize(('width', 'height'), SIZES)
@@ -79,7 +79,7 @@ def test_screen_fits_every_terminal(
 ) -> None:
     names = [f'/vehicle_{number:02}/illuminator' for number in range(count)]
 
-    lines = shown(fleet_of(*names), width, height, selected=names[-1] if names else None,
+    lines = shown(lights_of(*names), width, height, selected=names[-1] if names else None,
                   show_help=show_help).splitlines()
 
     assert len(lines) <= height
@@ -91,7 +91,7 @@ def test_screen_fits_every_terminal(
 def test_selected_light_is_on_the_screen(width: int, height: int, at: int) -> None:
     names = [f'/l{number:02}' for number in range(40)]
 
-    assert f'{names[at]} ' in shown(fleet_of(*names), width, height, selected=names[at])
+    assert f'{names[at]} ' in shown(lights_of(*names), width, height, selected=names[at])
 
 
 def test_narrower_screen_has_a_part_of_the_columns() -> None:
@@ -105,17 +105,17 @@ def test_narrower_screen_has_a_part_of_the_columns() -> None:
 
 
 def test_help_lists_each_key() -> None:
-    text = shown(fleet_of('/bow'), show_help=True)
+    text = shown(lights_of('/bow'), show_help=True)
 
     assert all(key in text for keys, _, _ in BINDINGS for key in keys)
 
 
 def test_unknown_values_are_dashes_and_no_lights_a_sentence() -> None:
-    assert 'no lights in this ROS graph yet' in shown(Fleet())
-    fleet = Fleet()
-    fleet.seen(['/bow'], NOW)
+    assert 'no lights in this ROS graph yet' in shown(DiscoveredLights())
+    lights = DiscoveredLights()
+    lights.seen(['/bow'], NOW)
 
-    [row] = [line for line in shown(fleet).splitlines() if ' ? ' in line][1:2]
+    [row] = [line for line in shown(lights).splitlines() if ' ? ' in line][1:2]
 
     assert row.split() == ['/bow', '?', '-', '-', '-', '-', '-', '-']
 
@@ -123,10 +123,10 @@ def test_unknown_values_are_dashes_and_no_lights_a_sentence() -> None:
 @pytest.mark.parametrize(('seconds', 'there', 'word'), [
     (0, True, 'ON'), (30, True, 'silent'), (0, False, 'gone')])
 def test_state_is_a_word_and_not_only_a_colour(seconds: int, there: bool, word: str) -> None:
-    fleet = fleet_of('/bow', '/stern')
-    fleet.seen(['/bow', '/stern'] if there else ['/stern'], NOW)
+    lights = lights_of('/bow', '/stern')
+    lights.seen(['/bow', '/stern'] if there else ['/stern'], NOW)
 
-    text = shown(fleet, now=NOW + seconds)
+    text = shown(lights, now=NOW + seconds)
 
     assert re.search(rf'^/bow +{word} ', text, re.M)
     assert there or '2 lights: 1 ON, 1 gone' in text
@@ -134,37 +134,37 @@ def test_state_is_a_word_and_not_only_a_colour(seconds: int, there: bool, word: 
 
 @pytest.mark.parametrize(('width', 'height'), [(132, 24), (80, 24), (60, 20)])
 def test_refusal_is_shown_with_its_reason(width: int, height: int) -> None:
-    fleet = fleet_of('/bow')
-    fleet.acted('/bow', 'brightness 90 %', Outcome.FAILED,
-                'refused: MAV_RESULT_DENIED (1 try, 3 ms)', NOW - 3)
+    lights = lights_of('/bow')
+    lights.acted('/bow', 'brightness 90 %', Outcome.FAILED,
+                 'refused: MAV_RESULT_DENIED (1 try, 3 ms)', NOW - 3)
 
-    text = ' '.join(shown(fleet, width, height).split())
+    text = ' '.join(shown(lights, width, height).split())
 
     assert 'brightness 90 %: FAILED: refused: MAV_RESULT_DENIED (1 try, 3 ms) (3 s ago)' in text
 
 
 def test_colours_mark_a_failure_and_markup_in_a_message_is_text() -> None:
-    fleet = fleet_of('/bow')
-    fleet.acted('/bow', '[bold]x[/bold]', Outcome.FAILED, '[red]no[/red]', NOW)
+    lights = lights_of('/bow')
+    lights.acted('/bow', '[bold]x[/bold]', Outcome.FAILED, '[red]no[/red]', NOW)
 
-    assert '[bold]x[/bold]: FAILED: [red]no[/red]' in shown(fleet)
-    assert '\x1b[1;31mFAILED' in shown(fleet, color='standard')
+    assert '[bold]x[/bold]: FAILED: [red]no[/red]' in shown(lights)
+    assert '\x1b[1;31mFAILED' in shown(lights, color='standard')
 
 
 @pytest.mark.parametrize('ascii_only', [False, True])
 def test_ascii_terminal_gets_ascii_only(ascii_only: bool) -> None:
-    assert shown(fleet_of('/bow', '/stern'), ascii_only=ascii_only).isascii() is ascii_only
+    assert shown(lights_of('/bow', '/stern'), ascii_only=ascii_only).isascii() is ascii_only
 
 
-def table(fleet: Fleet) -> list[list[str]]:
+def table(lights: DiscoveredLights) -> list[list[str]]:
     """Return the cells of the table for a pipe."""
     console = Console(file=io.StringIO(), width=400, record=True, color_system=None)
-    console.print(plain(ViewState(fleet.snapshot(), None, NOW)))
+    console.print(plain(ViewState(lights.snapshot(), None, NOW)))
     return [re.split(' {2,}', line.rstrip()) for line in console.export_text().splitlines()]
 
 
 def test_table_has_a_heading_and_a_row_for_each_light() -> None:
-    heading, *rows = table(fleet_of('/stern', '/bow'))
+    heading, *rows = table(lights_of('/stern', '/bow'))
 
     assert heading == ['LIGHT', 'STATE', 'BRIGHT', 'STROBE', 'MODE', 'TEMP', 'LOSS', 'RTT',
                        'ERRORS', 'DIAGNOSTICS']

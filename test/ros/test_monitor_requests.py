@@ -17,7 +17,7 @@
 from typing import Any, cast
 
 from illuminator_ros.cli.monitor.key_bindings import dim, Request, Service, strobe, switch
-from illuminator_ros.cli.monitor.model import Fleet, Outcome
+from illuminator_ros.cli.monitor.model import DiscoveredLights, Outcome
 from illuminator_ros.cli.monitor.ros_graph import ANSWER_LIMIT, Requests
 import pytest
 from rcl_interfaces.msg import SetParametersResult
@@ -53,11 +53,11 @@ class Bench:
     def __init__(self) -> None:
         self.now = 0.0
         self.clients: dict[str, Client] = {}
-        self.fleet = Fleet()
-        self.fleet.seen(['/bow'], 0.0)
-        self.fleet.take('/bow', 'enabled', False, 0.0)
-        self.fleet.agreed('/bow', 50.0)
-        self.requests = Requests(cast(Node, self), '/bow', self.fleet, lambda: self.now)
+        self.lights = DiscoveredLights()
+        self.lights.seen(['/bow'], 0.0)
+        self.lights.take('/bow', 'enabled', False, 0.0)
+        self.lights.agreed('/bow', 50.0)
+        self.requests = Requests(cast(Node, self), '/bow', self.lights, lambda: self.now)
         self.enable = self.clients['/bow/enable']
         self.setter = self.clients['/bow/set_parameters_atomically']
         self.getter = self.clients['/bow/get_parameters']
@@ -75,7 +75,7 @@ class Bench:
 
     @property
     def light(self) -> Any:
-        with self.fleet.light('/bow') as light:
+        with self.lights.light('/bow') as light:
             return light
 
     @property
@@ -117,7 +117,7 @@ def test_parameter_event_is_not_undone_by_an_older_answer(bench: Bench) -> None:
     bench.requests.poll()
     [(_, answer)] = bench.getter.calls
 
-    bench.fleet.agreed('/bow', 60.0)
+    bench.lights.agreed('/bow', 60.0)
     answer.set_result(GetParameters.Response(
         values=[Parameter('brightness', value=50.0).get_parameter_value()]))
 
@@ -153,7 +153,7 @@ def test_refused_set_drops_those_behind_it_and_keeps_its_reason(bench: Bench) ->
 def test_newest_switch_is_sent_after_the_one_before_whatever_its_outcome(
     bench: Bench, asks: int, success: bool,
 ) -> None:
-    bench.fleet.take('/bow', 'enabled', True, 0.0)
+    bench.lights.take('/bow', 'enabled', True, 0.0)
     bench.ask(*[switch] * asks)
     assert bench.switches == [False]
 
@@ -186,7 +186,7 @@ def test_switch_does_not_wait_for_a_set(bench: Bench) -> None:
 
 
 def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Bench) -> None:
-    bench.fleet.take('/bow', 'enabled', True, 0.0)
+    bench.lights.take('/bow', 'enabled', True, 0.0)
     bench.ask(switch, switch)
 
     bench.poll(ANSWER_LIMIT - 0.1)

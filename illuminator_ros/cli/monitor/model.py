@@ -157,7 +157,7 @@ class Light:
         return flag_names(self.values.get('error_flags') or 0)
 
 
-class Fleet:
+class DiscoveredLights:
     """All lights that were discovered, by name; callable from any thread."""
 
     def __init__(self) -> None:

@@ -34,7 +34,7 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from std_srvs.srv import SetBool, Trigger
 
 from .key_bindings import Ask, Request, Service
-from .model import Diagnosis, Fleet, Outcome, Values
+from .model import Diagnosis, DiscoveredLights, Outcome, Values
 
 if TYPE_CHECKING:
     from rclpy.task import Future
@@ -110,11 +110,11 @@ class Requests:
     """
 
     def __init__(
-        self, node: Node, name: str, fleet: Fleet, clock: Callable[[], float],
+        self, node: Node, name: str, lights: DiscoveredLights, clock: Callable[[], float],
     ) -> None:
         self._node = node
         self._name = name
-        self._fleet = fleet
+        self._lights = lights
         self._clock = clock
         self._clients = {service: node.create_client(type_, f'{name}/{service.value}')
                          for service, (type_, _) in SERVICES.items()}
@@ -149,7 +149,7 @@ class Requests:
             if self._clock() >= one.deadline:
                 self._clients[service].remove_pending_request(one.future)
                 self._end(one, False, f'no answer from {self._name} for {ANSWER_LIMIT:g} s')
-        with self._fleet.light(self._name) as light:
+        with self._lights.light(self._name) as light:
             known = light.gone_at is not None or light.setpoint is not None
         if not known and Service.GET not in self._pending:
             self._send(GET_BRIGHTNESS)
@@ -186,7 +186,7 @@ class Requests:
             self._end(one, True, '')
         elif one.request.service is Service.SET:
             if response.result.successful and 'brightness' in one.request.value:
-                self._fleet.agreed(self._name, one.request.value['brightness'])
+                self._lights.agreed(self._name, one.request.value['brightness'])
             self._end(one, response.result.successful, response.result.reason)
         else:
             self._end(one, response.success, response.message)
@@ -203,14 +203,14 @@ class Requests:
 
     def _take_brightness(self, response: GetParameters.Response) -> None:
         values = [parameter_value_to_python(value) for value in response.values]
-        with self._fleet.light(self._name) as light:
+        with self._lights.light(self._name) as light:
             # A parameter event that came meanwhile is newer.
             if light.setpoint is None and values and isinstance(values[0], float):
                 light.setpoint = values[0]
 
     def _note(self, request: Request, outcome: Outcome, answer: str) -> None:
         if request.text:
-            self._fleet.acted(self._name, request.text, outcome, answer, self._clock())
+            self._lights.acted(self._name, request.text, outcome, answer, self._clock())
 
     def _show_wanted(self) -> None:
         wanted: Values = {}
@@ -220,20 +220,20 @@ class Requests:
                 wanted |= request.value
             elif request.service is Service.ENABLE:
                 wanted['enabled'] = request.value
-        with self._fleet.light(self._name) as light:
+        with self._lights.light(self._name) as light:
             light.wanted = wanted
 
 
 class Graph:
     """
-    Keeps a fleet up to date, in the thread of its node's executor.
+    Keeps lights up to date, in the thread of its node's executor.
 
     :param clock: returns the time, s.
     """
 
-    def __init__(self, node: Node, fleet: Fleet, clock: Callable[[], float]) -> None:
+    def __init__(self, node: Node, lights: DiscoveredLights, clock: Callable[[], float]) -> None:
         self._node = node
-        self._fleet = fleet
+        self._lights = lights
         self._clock = clock
         self._subscriptions: dict[str, list[Subscription]] = {}
         self._requests: dict[str, Requests] = {}
@@ -257,13 +257,13 @@ class Graph:
         """Find new and gone lights, and give up requests without an answer."""
         topics = self._node.get_topic_names_and_types()
         names = lights_among(topics, self._node.count_publishers)
-        for name in self._fleet.seen(names, self._clock()):
+        for name in self._lights.seen(names, self._clock()):
             self._subscriptions[name] = [
                 self._node.create_subscription(
                     type_, f'{name}/{topic}', functools.partial(self._take, name, topic),
                     STREAM_QOS if topic == 'temperature' else STATE_QOS)
                 for topic, type_ in TOPICS.items()]
-            self._requests[name] = Requests(self._node, name, self._fleet, self._clock)
+            self._requests[name] = Requests(self._node, name, self._lights, self._clock)
         for requests in self._requests.values():
             requests.poll()
 
@@ -276,23 +276,23 @@ class Graph:
             self._jobs.popleft()()
 
     def _submit(self, name: str, ask: Ask) -> None:
-        with self._fleet.light(name) as light:
+        with self._lights.light(name) as light:
             request = ask(light)
         if request is None:
-            self._fleet.acted(name, 'not asked', Outcome.FAILED,
-                              'its brightness is not known yet', self._clock())
+            self._lights.acted(name, 'not asked', Outcome.FAILED,
+                               'its brightness is not known yet', self._clock())
         elif name in self._requests:
             self._requests[name].submit(request)
 
     def _clear_gone(self) -> None:
-        for name in self._fleet.clear_gone():
+        for name in self._lights.clear_gone():
             self._requests.pop(name).destroy()
             for subscription in self._subscriptions.pop(name):
                 self._node.destroy_subscription(subscription)
 
     def _take(self, name: str, topic: str, message: object) -> None:
         value = getattr(message, 'temperature' if topic == 'temperature' else 'data')
-        self._fleet.take(name, topic, value, self._clock())
+        self._lights.take(name, topic, value, self._clock())
 
     def _diagnosed(self, array: DiagnosticArray) -> None:
         for status in array.status:
@@ -300,11 +300,11 @@ class Graph:
             # The name of the status has the node's name without its namespace.
             name, kind = values.get('node', ''), status.name.rpartition(': ')[2]
             diagnosis = Diagnosis(status.level[0], status.message, values)
-            self._fleet.diagnosed(name, kind, diagnosis, self._clock())
+            self._lights.diagnosed(name, kind, diagnosis, self._clock())
 
     def _changed(self, event: ParameterEvent) -> None:
         for parameter in [*event.new_parameters, *event.changed_parameters]:
             if parameter.name == 'brightness':
                 value = parameter_value_to_python(parameter.value)
                 if isinstance(value, float):
-                    self._fleet.agreed(event.node, value)
+                    self._lights.agreed(event.node, value)

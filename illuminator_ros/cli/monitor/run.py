@@ -34,7 +34,7 @@ from rich.live import Live
 
 from . import terminal
 from .key_bindings import KeyBindings, KeyDecoder
-from .model import Fleet, Light
+from .model import DiscoveredLights, Light
 from .ros_graph import Graph
 from .view import plain, screen, ViewState
 from ..entry_point import log_directory_refusal, one_line, print_output, wrong_arguments
@@ -79,9 +79,9 @@ class Monitor:
 
     def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
         self.clock = clock
-        fleet = Fleet()
-        self.lights = fleet.snapshot
-        self.graph = Graph(node, fleet, clock)
+        lights = DiscoveredLights()
+        self.lights = lights.snapshot
+        self.graph = Graph(node, lights, clock)
         self._executor = NodeExecutor(node.context, NodeLog(node.get_logger()))
         self._executor.add_node(node)
         self._thread = threading.Thread(target=self._executor.run, name='ros', daemon=True)
