@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
-from .view import look
+from .view import ComponentSnapshot
 from ...payload.simulated import Change, ConsoleCommand, SimulatedComponent, SimulatedDevice
 
 Component = SimulatedComponent[SimulatedDevice]
@@ -57,7 +57,7 @@ COMMANDS: Sequence[ConsoleCommand[Component, str | None]] = (
     ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
     ConsoleCommand('faults', 'show the present faults', _faults),
     ConsoleCommand('status', 'show the state of each component',
-                   lambda component, words, now: str(look(component, now))),
+                   lambda component, words, now: str(ComponentSnapshot.of(component, now))),
 )
 OTHERS = (('help', 'show this'), ('quit', 'end'))
 

@@ -32,7 +32,7 @@ from .components import components, load, Scenario, Types
 from .console import execute
 from .csv_file import write_records
 from .options import parser, payload_types
-from .view import LiveView, Look, look, PlainView
+from .view import ComponentSnapshot, LiveView, PlainView
 from ..options import mavlink_version, signing
 from ..termination import Termination
 from ...mavlink.link import Link, LinkThreadError
@@ -63,7 +63,7 @@ class _Simulation:
         # Text to write, with the line that it answers; None ends the process.
         self._texts: queue.Queue[tuple[str, str | None] | None] = queue.Queue(MAX_TEXTS)
         self._ended = threading.Event()
-        self._looks: list[Look] = []
+        self._snapshots: list[ComponentSnapshot] = []
         live = sys.stdout is not None and sys.stdout.isatty() and not options.plain
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
         self._endpoint: SimulatedComponents[SimulatedDevice] = SimulatedComponents(described, 0.0)
@@ -89,19 +89,20 @@ class _Simulation:
         self._view.say(self._headline)
         # Lines before a "quit" have answers that may still be queued.
         while not (self._ended.is_set() and self._texts.empty()):
-            self._link.call(self._look)
+            self._link.call(self._take_snapshots)
             with contextlib.suppress(queue.Empty):
                 if (text := self._texts.get(timeout=VIEW_INTERVAL)) is not None:
                     self._view.say(text[0], typed=text[1])
-            self._view.show(self._looks)
+            self._view.show(self._snapshots)
         self._link.stop()
 
     def _end(self) -> None:
         self._ended.set()
         self._put(None)
 
-    def _look(self, now: float) -> None:
-        self._looks = [look(component, now) for component in self._endpoint.components]
+    def _take_snapshots(self, now: float) -> None:
+        self._snapshots = [
+            ComponentSnapshot.of(component, now) for component in self._endpoint.components]
 
     def _listen(self) -> None:
         """Execute the lines of standard input, until its end."""

@@ -29,30 +29,30 @@ SPARE_LINES = 4
 
 
 @dataclass(frozen=True)
-class Look:
+class ComponentSnapshot:
     """The state of a simulated component at a moment, for people."""
 
     name: str
-    snapshot: Snapshot
+    device: Snapshot
     faults: str
+
+    @classmethod
+    def of(cls, component: SimulatedComponent[SimulatedDevice], now: float) -> ComponentSnapshot:
+        """Return the actual state of a component, whatever it reports."""
+        device = component.device
+        faults = device.faults.active(device.behaviour, device.normal)
+        return cls(' '.join(filter(None, (str(component.address), component.name))),
+                   device.snapshot(now), f'[{", ".join(faults)}]' if faults else '')
 
     def __str__(self) -> str:
         """Return the line."""
-        return '  '.join(filter(None, (f'{self.name:12}', self.snapshot.text, self.faults)))
+        return '  '.join(filter(None, (f'{self.name:12}', self.device.text, self.faults)))
 
-    def differs(self, other: Look | None) -> bool:
+    def differs(self, other: ComponentSnapshot | None) -> bool:
         """Return whether it differs enough from the last shown one for a new line."""
         return other is None or (
-            (self.snapshot.state, self.faults) != (other.snapshot.state, other.faults)
-            or abs(self.snapshot.drift - other.snapshot.drift) >= 1)
-
-
-def look(component: SimulatedComponent[SimulatedDevice], now: float) -> Look:
-    """Return the actual state of a component, whatever it reports."""
-    device = component.device
-    faults = device.faults.active(device.behaviour, device.normal)
-    return Look(' '.join(filter(None, (str(component.address), component.name))),
-                device.snapshot(now), f'[{", ".join(faults)}]' if faults else '')
+            (self.device.state, self.faults) != (other.device.state, other.faults)
+            or abs(self.device.drift - other.device.drift) >= 1)
 
 
 class PlainView:
@@ -60,11 +60,11 @@ class PlainView:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._shown: dict[str, Look] = {}
+        self._shown: dict[str, ComponentSnapshot] = {}
 
-    def show(self, looks: Sequence[Look]) -> None:
+    def show(self, components: Sequence[ComponentSnapshot]) -> None:
         """Show the present state of the components."""
-        for one in looks:
+        for one in components:
             if one.differs(self._shown.get(one.name)):
                 self._shown[one.name] = one
                 self.say(str(one))
@@ -91,13 +91,13 @@ class LiveView:
         self._lines: list[str] = []
         self._height = 0
 
-    def show(self, looks: Sequence[Look]) -> None:
+    def show(self, components: Sequence[ComponentSnapshot]) -> None:
         """Show the present state of the components."""
         size = shutil.get_terminal_size()
         room = max(size.lines - SPARE_LINES, 1)
-        lines = [str(one) for one in looks[:room]]
-        if len(looks) > room:
-            lines[-1] = f'... and {len(looks) - room + 1} more'
+        lines = [str(one) for one in components[:room]]
+        if len(components) > room:
+            lines[-1] = f'... and {len(components) - room + 1} more'
         lines = [line[:size.columns - 1] for line in lines]
         if len(lines) != self._height:
             self._lines = lines
