@@ -434,11 +434,16 @@ class Light:
         """Return whether another source holds the light, so that a request is not sent."""
         return bool(self._sources.holder and self._sources.refusal(source))
 
-    def release(self, source: str, now: float) -> None:
-        """Release the light: the next lower source that has claimed it then holds it."""
+    def release(self, source: str, now: float) -> str:
+        """
+        Release the light: the next lower source that has claimed it then holds it.
+
+        :return: the source that holds it now, '' if none does.
+        """
         self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.release(source, now), now)
         self._changed(self, now)
+        return self._sources.holder or ''
 
     def _claim(
         self, source: str, now: float, *, enabled: bool | None = None,

@@ -165,14 +165,17 @@ class LightNode:
 
     def _enable_service(self, source: str, prefix: str) -> ros_node.AnyService:
         def enable(request: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
-            self._request_enable(source, request.data, now, f'{prefix}service', answer)
+            if light := self._light_or_refusal(now, answer):
+                light.enable(
+                    request.data, now,
+                    lambda result, now: answer(result.success, result.message),
+                    detail=f'{prefix}service', source=source)
 
         return ros_node.RequestService(f'{prefix}enable', SetBool, enable)
 
     def _release(self, source: str, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):
-            light.release(source, now)
-            answer(True, f'held by {light.snapshot(now).holder or "no source"}')
+            answer(True, f'held by {light.release(source, now) or "no source"}')
 
     def _command_topics(
         self, source: str, prefix: str,
@@ -195,17 +198,12 @@ class LightNode:
             answer(False, self.absence(now))
         return light
 
-    def _request_enable(
-        self, source: str, on: bool, now: float, way: str, answer: ros_node.Answer,
-    ) -> None:
-        if light := self._light_or_refusal(now, answer):
-            light.enable(on, now, lambda result, now: answer(result.success, result.message),
-                         detail=way, source=source)
+    def _warning_on(self, topic: str) -> ros_node.Answer:
+        """Return a function that logs the message of an answer to a topic, which has none."""
+        return lambda success, message: self._log.warning(f'~/{topic}: {message}', topic)
 
     def _switch(self, source: str, prefix: str, on: bool, now: float) -> None:
-        def warn(success: bool, message: str) -> None:
-            topic = f'{prefix}cmd/enable'
-            self._log.warning(f'~/{topic}: {message}', topic)
+        warn = self._warning_on(f'{prefix}cmd/enable')
 
         def done(result: Result, now: float) -> None:
             light = self._light()
@@ -222,9 +220,7 @@ class LightNode:
             light.refresh(now, lambda result, now: answer(result.success, result.message))
 
     def _set_brightness(self, source: str, prefix: str, brightness: float, now: float) -> None:
-        topic = f'{prefix}cmd/brightness'
-        if light := self._light_or_refusal(now, lambda success, message: self._log.warning(
-                f'~/{topic}: {message}', topic)):
+        if light := self._light_or_refusal(now, self._warning_on(f'{prefix}cmd/brightness')):
             light.set_brightness(brightness, now, source=source)
 
     def _check_value(self, name: str, value: object) -> None:
