@@ -61,7 +61,7 @@ class IlluminatorClient(Payload):
     ) -> None:
         self.mounts = MountOrientations()
         self.mount_moved: Listeners[int] = Listeners()
-        self.commands = commands
+        self._commands = commands
         self.settings = settings
         self.events: Listeners[AnyLightEvent] = Listeners()
         self._discovery = Discovery(
@@ -90,7 +90,7 @@ class IlluminatorClient(Payload):
             if address in self._discovery.devices:
                 self.events.emit(event)
 
-        return Light(address, self.commands, self.settings, emit, self._changed)
+        return Light(address, self._commands, self.settings, emit, self._changed)
 
     def _changed(self, light: Light, now: float) -> None:
         self._discovery.changed(light.address)

@@ -58,7 +58,7 @@ REPEATS = 3
 REPEAT_INTERVAL = 2.0
 
 
-class PendingReason(Enum):
+class _PendingReason(Enum):
     """The reason why values must be sent."""
 
     OVERRIDE = 'override'
@@ -69,13 +69,13 @@ class PendingReason(Enum):
 
 # Values with these reasons are dropped when the light has accepted and not applied them; a
 # RepeatLimit limits further attempts.
-_SENT_ONCE = (PendingReason.LIMIT, PendingReason.OTHER_SENDER)
+_SENT_ONCE = (_PendingReason.LIMIT, _PendingReason.OTHER_SENDER)
 
 
 @dataclass
-class Pending:
+class _Pending:
     """
-    Values that must be sent, see :class:`PendingReason`.
+    Values that must be sent, see :class:`_PendingReason`.
 
     :param attempts: how often the light has accepted them but then reported others.
     :param due: when they are sent next, s.
@@ -83,7 +83,7 @@ class Pending:
     """
 
     values: Changes
-    reason: PendingReason
+    reason: _PendingReason
     due: float
     attempts: int = 0
     has_ended: bool = False
@@ -134,7 +134,7 @@ class ConfigurationManager:
         self._brightness_is_switch = False
         self._shared_address = False
         self._setpoint: float | None = None
-        self._pending: Pending | None = None
+        self._pending: _Pending | None = None
         self._sent: _Sent | None = None
         # A configuration that the light has accepted but does not report.
         self._unapplied: Configuration | None = None
@@ -165,7 +165,7 @@ class ConfigurationManager:
         """Whether the light must be sent a configuration before it is switched on."""
         pending = self._pending
         return (pending is not None and not pending.has_ended
-                and pending.reason is not PendingReason.OTHER_SENDER)
+                and pending.reason is not _PendingReason.OTHER_SENDER)
 
     @property
     def sent_at(self) -> float:
@@ -217,14 +217,14 @@ class ConfigurationManager:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._want({**self._wanted, **values}, PendingReason.OVERRIDE, self._first_due(now))
+        self._want({**self._wanted, **values}, _PendingReason.OVERRIDE, self._first_due(now))
 
     def _first_due(self, now: float) -> float:
         return now if self.confirmed else now + FIRST_STATUS_TIMEOUT
 
-    def _want(self, values: Changes, reason: PendingReason, due: float) -> None:
+    def _want(self, values: Changes, reason: _PendingReason, due: float) -> None:
         """Send values when they are due; the reason of values that already wait is kept."""
-        self._pending = Pending(values, self._pending.reason if self._pending else reason, due)
+        self._pending = _Pending(values, self._pending.reason if self._pending else reason, due)
 
     @property
     def _wanted(self) -> Changes:
@@ -348,7 +348,7 @@ class ConfigurationManager:
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
             # Overrides that have not been sent yet replace confirmed values.
-            self._pending = Pending({**values, **self._wanted}, PendingReason.RESTART, now)
+            self._pending = _Pending({**values, **self._wanted}, _PendingReason.RESTART, now)
         elif self._pending and self._pending.reason in _SENT_ONCE:
             # The light has other values now.
             self._pending = None
@@ -407,7 +407,7 @@ class ConfigurationManager:
             self._adopt(reported, events.ChangeCause.FIRST_STATUS, now)
             if self._pending:
                 self._pending.due, self._pending.has_ended = min(self._pending.due, now), False
-        elif self._pending and self._pending.reason is not PendingReason.OVERRIDE:
+        elif self._pending and self._pending.reason is not _PendingReason.OVERRIDE:
             wanted = replace(self.confirmed, **self._pending.values)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
                 # The light has kept the values, or another sender has restored them.
@@ -474,7 +474,7 @@ class ConfigurationManager:
         due = self._undoing.take(now)
         if due is not None:
             self._want({**{name: getattr(confirmed, name) for name in names}, **self._wanted},
-                       PendingReason.OTHER_SENDER, due)
+                       _PendingReason.OTHER_SENDER, due)
         self._emit(events.ChangedByOther(
             self._address, reported.describe(names), due is not None))
         return due is not None
@@ -488,11 +488,11 @@ class ConfigurationManager:
             self.limit_exceeded = exceeded
             self._emit(exceeded)
         # Values that undo a change by another sender may be due only later.
-        is_free = self._pending is None or self._pending.reason is PendingReason.OTHER_SENDER
+        is_free = self._pending is None or self._pending.reason is _PendingReason.OTHER_SENDER
         if exceeded.excess and is_free and (due := self._limiting.take(now)) is not None:
             limited = self._limits.clipped(reported, self._strobe_range)
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
-            self._pending = Pending({**values, **self._wanted}, PendingReason.LIMIT, due)
+            self._pending = _Pending({**values, **self._wanted}, _PendingReason.LIMIT, due)
 
     def _is_own(
         self, name: str, reported: Configuration, switched_at: float, now: float,
@@ -547,7 +547,7 @@ class ConfigurationManager:
     def _restored(self, success: bool, message: str) -> None:
         self._emit(events.ConfigurationRestored(self._address, success, message))
 
-    def _send_pending(self, pending: Pending, now: float) -> None:
+    def _send_pending(self, pending: _Pending, now: float) -> None:
         pending.due = now + RESTORE_INTERVAL
         try:
             self._goal(pending.values)

@@ -107,6 +107,7 @@ class Light:
     :param changed: called with the light and the time when :meth:`next_deadline` or
         ``has_answered`` may have changed.
     :ivar connected: whether it is heard.
+    :ivar heard_at: the time of its last message, s; -inf before the first.
     :ivar status: the newest status, None before the first.
     :ivar lost_at: when it was lost, s; infinity while it is heard.
     :ivar restarts: how often it has restarted since it was found.
@@ -119,12 +120,12 @@ class Light:
         emit: Callable[[events.AnyLightEvent], None], changed: Callable[[Light, float], None],
     ) -> None:
         self.address = address
-        self.settings = settings
+        self._settings = settings
         self.connected = False
         self.heard_at = -math.inf
         self.lost_at = math.inf
         self.status: Status | None = None
-        self.status_at = -math.inf
+        self._status_at = -math.inf
         self.restarts = 0
         self.was_commanded = False
         self.has_answered = False
@@ -224,7 +225,7 @@ class Light:
             return
         if not is_first:
             self._note(status, now)
-        self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self.settings.status_interval)
+        self._status_due = now + max(STATUS_TIMEOUT, 2.5 * self._settings.status_interval)
         if restarted:
             self._restarted(now)
         if not is_first and not is_awaited:
@@ -238,7 +239,7 @@ class Light:
             self._publish(status, now)
 
     def _note(self, status: Status, now: float) -> None:
-        self.status, self.status_at = status, now
+        self.status, self._status_at = status, now
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
         self._measures_temperature |= bool(status.temperature)
 
@@ -294,7 +295,7 @@ class Light:
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(self.address, status.enabled, origin))
         # A light is switched on again only where a request has switched it on.
-        if not self.settings.reassert or is_own or before and (was_lost or not on):
+        if not self._settings.reassert or is_own or before and (was_lost or not on):
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
@@ -305,7 +306,7 @@ class Light:
                 self._undoing))
 
     def _is_silent(self, now: float) -> bool:
-        limit = self.settings.off_after_silence
+        limit = self._settings.off_after_silence
         return bool(limit) and now >= self._requested_at + limit
 
     def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
@@ -360,7 +361,7 @@ class Light:
 
     def _set_up(self, now: float) -> None:
         """Request what a light does not send by itself, when it is heard or has restarted."""
-        interval = self.settings.status_interval
+        interval = self._settings.status_interval
         if interval > 0:
             self._target.send(
                 MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6), now)
@@ -395,8 +396,8 @@ class Light:
     def snapshot(self, now: float) -> events.LightSnapshot:
         """Return the state, for any thread."""
         return events.LightSnapshot(
-            self.address, self.connected, self.heard_at, self.status, self.status_at,
-            self.settings.status_interval, self.restarts, self.temperature,
+            self.address, self.connected, self.heard_at, self.status, self._status_at,
+            self._settings.status_interval, self.restarts, self.temperature,
             self._configuration.confirmed, self._configuration.discrepancy,
             self._configuration.limit_exceeded,
             self._identity_query.identity, self._identity_query.is_settled(now),
@@ -472,7 +473,7 @@ class Light:
             self._switching.cancel(
                 f'{change.before} no longer holds it', now,
                 lambda request: request.is_waiting and not request.overtakes)
-            if self.settings.off_on_release:
+            if self._settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
         elif change.cause is not Cause.CLAIM:
@@ -649,7 +650,7 @@ class Light:
     def poll(self, now: float) -> None:
         """Do what is due."""
         # Compute the same sum as next_deadline(); the difference is rounded differently.
-        if self.connected and now >= self.heard_at + self.settings.heartbeat_timeout:
+        if self.connected and now >= self.heard_at + self._settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
         if now >= self._question_due:
             self._asked_at, self._status_due = now, now + STATUS_TIMEOUT
@@ -657,7 +658,7 @@ class Light:
         self._identity_query.poll(now)
         self._change_holder(self._sources.poll(now), now)
         if now >= self._silence_due:
-            limit = self.settings.off_after_silence
+            limit = self._settings.off_after_silence
             self._switch_automatically(_AutomaticSwitch(
                 False, f'off_after_silence: no request for {format_seconds(limit)}', now))
         if self._automatic and now >= self._automatic_due:
@@ -683,10 +684,10 @@ class Light:
         # lights at the address.
         may_be_on = self._enabled or self._last_switch[0] and (
             self._enabled is None or self._is_shared)
-        if (not self.settings.off_after_silence or not may_be_on or not self.connected
+        if (not self._settings.off_after_silence or not may_be_on or not self.connected
                 or self._automatic and not self._automatic.on):
             return math.inf
-        return self._requested_at + self.settings.off_after_silence
+        return self._requested_at + self._settings.off_after_silence
 
     @property
     def _automatic_due(self) -> float:
@@ -728,9 +729,9 @@ class Light:
                   self._switching.next_deadline(),
                   self._configuration.next_deadline(connected=self.connected))
         if self.connected:
-            due = min(due, self.heard_at + self.settings.heartbeat_timeout)
+            due = min(due, self.heard_at + self._settings.heartbeat_timeout)
         # Called after each message, so only the deadlines in use are computed.
-        if self.settings.off_after_silence:
+        if self._settings.off_after_silence:
             due = min(due, self._silence_due)
         if self._automatic:
             due = min(due, self._automatic_due)
