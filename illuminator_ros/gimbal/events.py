@@ -170,11 +170,15 @@ class GimbalSnapshot:
 
     :param unreachable: why it is not connected, for people; '' if it is.
     :param managers: the managers that announce it and are heard; the first one is used.
-    :param capabilities: None if the manager has not sent them.
+    :param capabilities: None if the manager has not sent them; likewise ``ranges``.
+    :param identity: None if the device has not sent it; likewise ``attitude``.
     :param attitude_at: when the last attitude status came, s; -inf if none has.
     :param attitude_problem: why the last status has no attitude, '' if it has one.
+    :param control: the components in control, None if they are not known.
+    :param in_control: whether this component has primary control.
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
     :param enforces_control: False if the manager is known to obey components without control.
+    :param setpoints_sent: since the gimbal was found, with repetitions.
     :param holder: the source of commands that holds it, '' if none does; None without sources.
     :param held_since: when it got this holder, s.
     """

@@ -231,7 +231,10 @@ class LightSnapshot(NamedTuple):
     """
     A light at one moment, for any thread. Times are s on the link's clock.
 
+    :param heard_at: of its last message, -inf if none has come; likewise ``status_at``.
     :param status_interval: s between statuses that the light was asked for, 0 for its own rate.
+    :param restarts: since the light was found.
+    :param temperature: degC; None where the light does not measure it, or its sensor fails.
     :param configuration: as confirmed, None before the first status.
     :param discrepancy: why the light does not have a configuration that it should have, '' if it
         has.

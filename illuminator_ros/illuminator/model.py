@@ -197,6 +197,7 @@ def checked(name: str, value: object, strobe_range: StrobeRange | None = None) -
 
     :param name: one of :data:`FIELDS`.
     :param value: a number, or for the mode one of :data:`MODES`.
+    :param strobe_range: that the light reports, None where no light is known.
     :raises InvalidValue: if the light must not get it.
     """
     if name == 'mode':

@@ -77,11 +77,13 @@ class CameraSnapshot:
     The camera at one moment, for any thread; times are s on the link's clock.
 
     :param address: its latest address, None if it was never heard.
+    :param heard_at: when its last heartbeat came, -inf if none has.
     :param loss: a text with the reason of its loss, '' if it is connected or was never heard.
     :param conflict: whether several components have the camera's component id.
     :param round_trip: of the last answered PING, s; None if no PING was answered.
     :param unanswered_pings: PINGs without a reply since the last reply.
     :param images: images that were reported since the start.
+    :param image_index: of the newest reported image; None before it, and after a loss.
     """
 
     address: Address | None

@@ -102,7 +102,13 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class Action:
-    """The last request from this monitor to a light."""
+    """
+    The last request from this monitor to a light.
+
+    :param text: the request, for people.
+    :param answer: of the service, or why there is none; '' while it is pending.
+    :param at: when the outcome was noted, s.
+    """
 
     text: str
     outcome: Outcome

@@ -125,7 +125,8 @@ class ViewState:
     """
     The input of the screen.
 
-    :param selected: the name of the selected light.
+    :param selected: the name of the selected light, None for none.
+    :param now: the time, s.
     :param ascii_only: whether the terminal shows ASCII only.
     """
 
@@ -144,6 +145,7 @@ class Column:
     :param width: characters.
     :param rank: the column with the highest rank is left out first if the screen is narrow.
     :param grows: whether it takes the remaining width.
+    :param plain: whether the table for a file or a pipe has it.
     """
 
     title: str

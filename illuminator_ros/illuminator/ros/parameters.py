@@ -88,6 +88,7 @@ class BeamGeometry(NamedTuple):
     """
     The frame of a light, and the cone of its beam along +x of that frame.
 
+    :param frame_id: of the frame.
     :param beam_range: the length of the beam, m; 0 for none.
     :param beam_angle: the full opening angle of the beam, rad.
     :param mounted_on: gimbal device id of the gimbal that turns it, 0 for the one that the light
