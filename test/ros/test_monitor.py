@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from illuminator_ros.cli.monitor import key_bindings
 from illuminator_ros.cli.monitor.model import Outcome, State
 from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS, type_name
+from illuminator_ros.illuminator.ros.event_publisher import PUBLICATIONS
 import pytest
 from std_msgs.msg import Bool, Float32, UInt32
 from support.light import ServedLight
@@ -62,6 +63,11 @@ def test_monitor_shows_a_light_with_the_link_and_identity_and_sends_its_requests
     assert light.fake.fields['strobe_period'] == 0.0
     light.report(mode=1, error_status=0, brightness=45.0)
     monitor.wait(lambda light: light.setpoint == 45.0)
+
+
+def test_topics_of_the_monitor_are_those_of_a_light() -> None:
+    # The monitor has a table of its own, since the import of the bridge's takes 0.15 s.
+    assert {one.name: one.type for one in PUBLICATIONS} == TOPICS
 
 
 class FakeBridge:
