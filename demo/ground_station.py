@@ -50,7 +50,7 @@ class GroundStation:
                           (mode, brightness, strobe_period, duty_cycle))
         results: SimpleQueue[CommandResult] = SimpleQueue()
         self._link.call(lambda now: self._commands.start(
-            command, now, lambda result, now: results.put(result), limit=now + timeout))
+            command, now, lambda result, now: results.put(result), deadline=now + timeout))
         return results.get(timeout=timeout + 1.0)
 
     def close(self) -> None:

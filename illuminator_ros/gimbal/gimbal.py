@@ -593,7 +593,7 @@ class Gimbal:
             done(request.Result(False, reason), now)
             return False
         self._stop(now)
-        self._commands.start(command, now, ended, limit=now + REQUEST_LIMIT)
+        self._commands.start(command, now, ended, deadline=now + REQUEST_LIMIT)
         return True
 
     # Setpoints
@@ -796,7 +796,7 @@ def _request(
         done(result, now)
 
     return request.Request(
-        target, lambda now: change, ended, now=now, limit=now + REQUEST_LIMIT)
+        target, lambda now: change, ended, now=now, deadline=now + REQUEST_LIMIT)
 
 
 def _no_status(manager: Address, status_at: float, now: float) -> str:

@@ -15,6 +15,6 @@
 """
 The MAVLink illuminator protocol, both sides. No ROS, no sockets, no clock.
 
-Throughout, ``now``, deadlines and limits are s on a monotonic clock.
+Throughout, ``now`` and deadlines are s on a monotonic clock.
 https://mavlink.io/en/services/illuminator.html
 """

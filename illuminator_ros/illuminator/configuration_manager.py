@@ -336,7 +336,7 @@ class ConfigurationManager:
             done(result, now)
 
         self._queue.submit(Request(
-            self._target, prepare, finished, now=now, limit=now + CONFIGURE_LIMIT,
+            self._target, prepare, finished, now=now, deadline=now + CONFIGURE_LIMIT,
             is_stream=is_stream), now)
 
     # Reports

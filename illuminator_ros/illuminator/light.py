@@ -543,7 +543,7 @@ class Light:
                 self._emit(events.LightSwitched(self.address, on, events.Origin.REQUEST, detail))
 
         self._switching.submit(Request(
-            self._target, prepare, finished, now=now, limit=now + PROGRESS_LIMIT,
+            self._target, prepare, finished, now=now, deadline=now + PROGRESS_LIMIT,
             is_stream=is_stream, overtakes=not on,
             earliest_start=self._earliest_on if on else at_any_time), now)
 

@@ -15,6 +15,5 @@
 """
 MAVLink for any payload: framing, commands, transports. No ROS, and nothing about lights.
 
-Throughout, ``now``, deadlines and limits are s on a monotonic clock, and ``unix_time`` is s since
-1970.
+Throughout, ``now`` and deadlines are s on a monotonic clock, and ``unix_time`` is s since 1970.
 """

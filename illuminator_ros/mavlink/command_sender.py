@@ -156,9 +156,9 @@ class EarlierCommand(NamedTuple):
     command: Command
     result: int | None
     ended_at: float
-    tries: int = 1
-    elapsed: float = 0.0
-    last_ack_at: float = math.inf
+    tries: int
+    elapsed: float
+    last_ack_at: float
 
 
 class CommandResult(NamedTuple):
@@ -210,18 +210,13 @@ class CommandResult(NamedTuple):
     def timing(self, elapsed: float | None = None) -> str:
         """Return the number of tries and the time taken, or another time (s)."""
         time = format_seconds(self.elapsed if elapsed is None else elapsed)
-        return f'{plural(self.tries, "try", "tries")}, {time}'
+        return f'{self.tries} {"try" if self.tries == 1 else "tries"}, {time}'
 
     def __str__(self) -> str:
         return f'{self.describe()} ({self.timing()})'
 
 
 Done = Callable[[CommandResult, float], None]
-
-
-def plural(number: int, one: str, many: str) -> str:
-    """Return ``1 try`` or ``3 tries``."""
-    return f'{number} {one if number == 1 else many}'
 
 
 def format_seconds(seconds: float) -> str:
@@ -285,7 +280,7 @@ class RttEstimator:
         return min(max(4 * slow, MIN_TIMEOUT), longest)
 
 
-class RequestState(Enum):
+class CommandState(Enum):
     """
     The state of a command that has not ended.
 
@@ -303,32 +298,32 @@ class RequestState(Enum):
 
 
 # The state after an acknowledgement. Results that are not here end the command.
-TRANSITIONS: dict[tuple[RequestState, int], RequestState] = {
-    (RequestState.SENT, MavResult.IN_PROGRESS): RequestState.IN_PROGRESS,
-    (RequestState.SENT, MavResult.TEMPORARILY_REJECTED): RequestState.BACKOFF,
-    (RequestState.SENT, MavResult.COMMAND_INT_ONLY): RequestState.SENT,
-    (RequestState.BACKOFF, MavResult.IN_PROGRESS): RequestState.IN_PROGRESS,
-    (RequestState.BACKOFF, MavResult.TEMPORARILY_REJECTED): RequestState.BACKOFF,
-    (RequestState.BACKOFF, MavResult.COMMAND_INT_ONLY): RequestState.SENT,
-    (RequestState.IN_PROGRESS, MavResult.IN_PROGRESS): RequestState.IN_PROGRESS,
+TRANSITIONS: dict[tuple[CommandState, int], CommandState] = {
+    (CommandState.SENT, MavResult.IN_PROGRESS): CommandState.IN_PROGRESS,
+    (CommandState.SENT, MavResult.TEMPORARILY_REJECTED): CommandState.BACKOFF,
+    (CommandState.SENT, MavResult.COMMAND_INT_ONLY): CommandState.SENT,
+    (CommandState.BACKOFF, MavResult.IN_PROGRESS): CommandState.IN_PROGRESS,
+    (CommandState.BACKOFF, MavResult.TEMPORARILY_REJECTED): CommandState.BACKOFF,
+    (CommandState.BACKOFF, MavResult.COMMAND_INT_ONLY): CommandState.SENT,
+    (CommandState.IN_PROGRESS, MavResult.IN_PROGRESS): CommandState.IN_PROGRESS,
 }
 
 
 @dataclass(eq=False, slots=True)
-class _Request:
+class _PendingCommand:
     command: Command
     key: Key
     done: Done
-    limit: float
-    state: RequestState = RequestState.WAITING
-    as_int: bool = False
+    deadline: float
+    as_int: bool
+    state: CommandState = CommandState.WAITING
     tries: int = 0
     # Tries that were answered with a reason to try again: these were not lost.
     rejected: int = 0
     first_sent: float = 0.0
     last_sent: float = 0.0
     due: float = math.inf
-    deadline: float = math.inf
+    tries_end: float = math.inf
     result: int | None = None
     progress: int | None = None
 
@@ -342,7 +337,7 @@ class _Request:
         if result == MavResult.COMMAND_INT_ONLY:
             return self.as_int
         return result == MavResult.TEMPORARILY_REJECTED and (
-            self.state is RequestState.IN_PROGRESS or self.rejected == self.tries)
+            self.state is CommandState.IN_PROGRESS or self.rejected == self.tries)
 
 
 @dataclass
@@ -374,8 +369,8 @@ class CommandSender:
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
-    # In the order of sending: the sent request first, then the waiting ones.
-    _requests: dict[Address, list[_Request]] = field(default_factory=dict)
+    # In the order of sending: the sent command first, then the waiting ones.
+    _pending: dict[Address, list[_PendingCommand]] = field(default_factory=dict)
     # In the order of their ends; those that ended more than ACK_LIFETIME ago do not matter.
     _earlier: dict[Key, EarlierCommand] = field(default_factory=dict)
     _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
@@ -388,7 +383,7 @@ class CommandSender:
 
     def __len__(self) -> int:
         """Return how many commands have not ended."""
-        return sum(map(len, self._requests.values()))
+        return sum(map(len, self._pending.values()))
 
     def send(self, message: Message) -> None:
         """Send a message that is not a command from our address."""
@@ -396,40 +391,40 @@ class CommandSender:
 
     def start(
         self, command: Command, now: float, done: Done = lambda result, now: None, *,
-        limit: float = math.inf, overtake: bool = False,
+        deadline: float = math.inf, overtake: bool = False,
     ) -> None:
         """
         Send a command, or queue it behind the one of its kind that was sent.
 
         :param done: called once, with the outcome and the time.
-        :param limit: the time by which it ends, even if it is in progress.
+        :param deadline: s, the time by which it ends, even if it is in progress.
         :param overtake: end all commands of its kind that are not in progress, with CANCELLED, and
             send this one at once, even beside a command in progress.
         """
-        if now >= limit:
+        if now >= deadline:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
             return
         key = command.key
-        request = _Request(command, key, done, limit, as_int=command.position is not None)
-        requests = self._requests.setdefault(command.target, [])
-        kind = [other for other in requests if other.key == key] if requests else []
+        pending = _PendingCommand(command, key, done, deadline, command.position is not None)
+        queue = self._pending.setdefault(command.target, [])
+        kind = [other for other in queue if other.key == key] if queue else []
         if not kind or overtake:
-            requests.append(request)
-            self._begin(request, now)
+            queue.append(pending)
+            self._begin(pending, now)
             # End the waiting ones first, so that none is sent in the place of another.
             for other in reversed(kind):
-                if other.state is not RequestState.IN_PROGRESS:
+                if other.state is not CommandState.IN_PROGRESS:
                     self._end(other, CommandStatus.CANCELLED, now)
-        elif sum(other.state is RequestState.WAITING for other in kind) >= MAX_WAITING:
+        elif sum(other.state is CommandState.WAITING for other in kind) >= MAX_WAITING:
             done(CommandResult(CommandStatus.REFUSED_LOCALLY), now)
         else:
-            requests.append(request)
+            queue.append(pending)
 
     def cancel(self, command: Command, now: float) -> None:
         """End a command that was started with CANCELLED, if it has not ended."""
-        for request in list(self._requests.get(command.target, ())):
-            if request.command is command:
-                self._end(request, CommandStatus.CANCELLED, now)
+        for pending in list(self._pending.get(command.target, ())):
+            if pending.command is command:
+                self._end(pending, CommandStatus.CANCELLED, now)
 
     def round_trip(self, target: Address) -> RttEstimator:
         """Return the round-trip times of a target's acknowledgements."""
@@ -460,13 +455,13 @@ class CommandSender:
             return
         self.unanswering.pop(source, None)
         is_expected = False
-        for request in self._requests.get(source, ()):
-            if (request.command.command == ack.command
-                    and request.state is not RequestState.WAITING):
+        for pending in self._pending.get(source, ()):
+            if (pending.command.command == ack.command
+                    and pending.state is not CommandState.WAITING):
                 is_expected = True
                 # A rejection belongs not to a command in progress but to a command sent beside it.
-                if not request.answers_another_try(ack.result):
-                    self._answered(request, ack, now)
+                if not pending.answers_another_try(ack.result):
+                    self._answered(pending, ack, now)
                     return
         if not is_expected and source in self._round_trips:
             self._estimator(source).expect_ambiguous(now)
@@ -486,61 +481,61 @@ class CommandSender:
                 self._estimator(source).add(earlier.elapsed, now)
                 return
 
-    def _answered(self, request: _Request, ack: messages.CommandAck, now: float) -> None:
-        if request.tries == 1 and request.result is None:
+    def _answered(self, pending: _PendingCommand, ack: messages.CommandAck, now: float) -> None:
+        if pending.tries == 1 and pending.result is None:
             # An acknowledgement after a resend may be of either try and is not measured (RFC
             # 6298).
-            self._estimator(request.command.target).add(now - request.last_sent, now)
-        request.result = ack.result
-        state = TRANSITIONS.get((request.state, ack.result))
-        if state is RequestState.IN_PROGRESS:
-            request.progress = ack.progress if ack.progress <= 100 else None
-            request.due = now + PROGRESS_TIMEOUT
-        elif state is RequestState.BACKOFF:
+            self._estimator(pending.command.target).add(now - pending.last_sent, now)
+        pending.result = ack.result
+        state = TRANSITIONS.get((pending.state, ack.result))
+        if state is CommandState.IN_PROGRESS:
+            pending.progress = ack.progress if ack.progress <= 100 else None
+            pending.due = now + PROGRESS_TIMEOUT
+        elif state is CommandState.BACKOFF:
             first, last = REJECTED_BACKOFF
-            request.due = now + min(first * 2 ** min(request.rejected, 8), last)
-            request.rejected += 1
-            if request.due >= min(request.deadline, request.limit):
+            pending.due = now + min(first * 2 ** min(pending.rejected, 8), last)
+            pending.rejected += 1
+            if pending.due >= min(pending.tries_end, pending.deadline):
                 # The target may be busy with a try that was never answered.
-                self._end(request, CommandStatus.ANSWERED if request.rejected == request.tries
+                self._end(pending, CommandStatus.ANSWERED if pending.rejected == pending.tries
                           else CommandStatus.OUT_OF_TIME, now)
                 return
-        elif state is RequestState.SENT and now < request.limit:
-            request.as_int = True
-            request.rejected += 1
-            self._transmit(request, now)
+        elif state is CommandState.SENT and now < pending.deadline:
+            pending.as_int = True
+            pending.rejected += 1
+            self._transmit(pending, now)
         else:
-            self._end(request, CommandStatus.ANSWERED, now)
+            self._end(pending, CommandStatus.ANSWERED, now)
             return
-        request.state = state
+        pending.state = state
 
     def poll(self, now: float) -> None:
         """Resend or end what is due."""
-        for requests in list(self._requests.values()):
-            for request in list(requests):
-                if request in requests and now >= min(request.due, request.limit):
-                    self._overdue(request, now)
+        for queue in list(self._pending.values()):
+            for pending in list(queue):
+                if pending in queue and now >= min(pending.due, pending.deadline):
+                    self._overdue(pending, now)
 
-    def _overdue(self, request: _Request, now: float) -> None:
-        if now >= request.limit:
-            unanswered = request.state is RequestState.SENT and not request.rejected
-            self._end(request, CommandStatus.NO_ANSWER if unanswered
+    def _overdue(self, pending: _PendingCommand, now: float) -> None:
+        if now >= pending.deadline:
+            unanswered = pending.state is CommandState.SENT and not pending.rejected
+            self._end(pending, CommandStatus.NO_ANSWER if unanswered
                       else CommandStatus.OUT_OF_TIME, now)
-        elif request.state is RequestState.IN_PROGRESS:
-            self._end(request, CommandStatus.PROGRESS_STOPPED, now)
-        elif request.tries - request.rejected > self.retries or now >= request.deadline:
-            self._end(request, CommandStatus.NO_ANSWER, now)
+        elif pending.state is CommandState.IN_PROGRESS:
+            self._end(pending, CommandStatus.PROGRESS_STOPPED, now)
+        elif pending.tries - pending.rejected > self.retries or now >= pending.tries_end:
+            self._end(pending, CommandStatus.NO_ANSWER, now)
         else:
-            request.state = RequestState.SENT
-            self._estimator(request.command.target).expect_ambiguous(now)
-            self._transmit(request, now)
+            pending.state = CommandState.SENT
+            self._estimator(pending.command.target).expect_ambiguous(now)
+            self._transmit(pending, now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do, infinity if never."""
         due = math.inf
-        for requests in self._requests.values():
-            for request in requests:
-                due = min(due, request.due, request.limit)
+        for queue in self._pending.values():
+            for pending in queue:
+                due = min(due, pending.due, pending.deadline)
         return due
 
     def end_all(
@@ -552,79 +547,79 @@ class CommandSender:
 
         :param ends: returns whether a command ends.
         """
-        requests = [request for one in self._requests.values() for request in one
-                    if (target is None or request.command.target == target)
-                    and ends(request.command)]
-        # End the sent request last, so that no waiting one is sent in its place.
-        for request in reversed(requests):
-            self._end(request, status, now)
+        ended = [pending for queue in self._pending.values() for pending in queue
+                 if (target is None or pending.command.target == target)
+                 and ends(pending.command)]
+        # End the sent command last, so that no waiting one is sent in its place.
+        for pending in reversed(ended):
+            self._end(pending, status, now)
 
-    def _begin(self, request: _Request, now: float) -> None:
-        request.state = RequestState.SENT
-        request.first_sent = now
-        request.deadline = now + self.timeout * (self.retries + 1)
-        self._transmit(request, now)
+    def _begin(self, pending: _PendingCommand, now: float) -> None:
+        pending.state = CommandState.SENT
+        pending.first_sent = now
+        pending.tries_end = now + self.timeout * (self.retries + 1)
+        self._transmit(pending, now)
 
-    def _transmit(self, request: _Request, now: float) -> None:
-        command = request.command
-        self.send(command.message(request.tries, request.as_int))
-        request.tries += 1
+    def _transmit(self, pending: _PendingCommand, now: float) -> None:
+        command = pending.command
+        self.send(command.message(pending.tries, pending.as_int))
+        pending.tries += 1
         self.counters.sent += 1
-        self.counters.resent += request.tries > 1
-        request.last_sent = now
+        self.counters.resent += pending.tries > 1
+        pending.last_sent = now
         timeout = self.round_trip(command.target).timeout(self.timeout)
-        lost = request.tries - request.rejected - 1
+        lost = pending.tries - pending.rejected - 1
         if lost > 0:
             timeout = min(timeout * 2 ** min(lost, 16), self.timeout)
-        request.due = now + timeout
+        pending.due = now + timeout
 
-    def _end(self, request: _Request, status: CommandStatus, now: float) -> None:
-        command, key = request.command, request.key
-        requests = self._requests.get(command.target, [])
-        if request not in requests:
+    def _end(self, pending: _PendingCommand, status: CommandStatus, now: float) -> None:
+        command, key = pending.command, pending.key
+        queue = self._pending.get(command.target, [])
+        if pending not in queue:
             return
-        requests.remove(request)
-        if not requests:
-            del self._requests[command.target]
-        if request.state is RequestState.WAITING:
-            request.done(CommandResult(status), now)
+        queue.remove(pending)
+        if not queue:
+            del self._pending[command.target]
+        if pending.state is CommandState.WAITING:
+            pending.done(CommandResult(status), now)
             return
         result = CommandResult(
-            status, request.result, request.tries, now - request.first_sent, request.progress,
+            status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
             self._earlier.pop(key, None))
         answered = status is CommandStatus.ANSWERED
         while self._earlier and now > (
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
             del self._earlier[oldest.command.key]
-        is_measure = answered and request.tries > 1 and not request.rejected
-        between = request.last_sent - request.first_sent
+        is_measure = answered and pending.tries > 1 and not pending.rejected
+        between = pending.last_sent - pending.first_sent
         self._earlier[key] = EarlierCommand(
-            command, request.result if answered else None, now, request.tries, result.elapsed,
+            command, pending.result if answered else None, now, pending.tries, result.elapsed,
             now + between / 2 if is_measure else math.inf)
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering[command.target] = None
             if len(self.unanswering) > MAX_TARGETS:
                 del self.unanswering[next(iter(self.unanswering))]
-        late = self._send_next(key, now) if requests else []
-        request.done(result, now)
+        late = self._send_next(key, now) if queue else []
+        pending.done(result, now)
         for other in late:
             other.done(CommandResult(CommandStatus.OUT_OF_TIME), now)
 
-    def _send_next(self, key: Key, now: float) -> list[_Request]:
-        """Send the next command of a kind; return those whose limit has passed."""
+    def _send_next(self, key: Key, now: float) -> list[_PendingCommand]:
+        """Send the next command of a kind; return those whose deadline has passed."""
         late = []
-        requests = self._requests[key[0]]
-        for request in [one for one in requests if one.key == key]:
-            if request.state is not RequestState.WAITING:
+        queue = self._pending[key[0]]
+        for pending in [one for one in queue if one.key == key]:
+            if pending.state is not CommandState.WAITING:
                 break
-            if now < request.limit:
-                self._begin(request, now)
+            if now < pending.deadline:
+                self._begin(pending, now)
                 break
-            requests.remove(request)
-            late.append(request)
-        if not requests:
-            del self._requests[key[0]]
+            queue.remove(pending)
+            late.append(pending)
+        if not queue:
+            del self._pending[key[0]]
         return late
 
 

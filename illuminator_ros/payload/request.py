@@ -87,22 +87,22 @@ class Target:
 
     def send(
         self, command: int, params: tuple[float, ...], now: float,
-        done: CommandDone = lambda result, now: None, *, limit: float = math.inf,
+        done: CommandDone = lambda result, now: None, *, deadline: float = math.inf,
         overtake: bool = False, to: Address | None = None,
     ) -> None:
         """Send a command, to the device or to another component; see :class:`CommandSender`."""
         self._start(command_sender.Command(to or self.address, command, params), now, done,
-                    limit=limit, overtake=overtake)
+                    deadline=deadline, overtake=overtake)
 
     def _start(
         self, command: command_sender.Command, now: float, done: CommandDone, *,
-        limit: float = math.inf, overtake: bool = False,
+        deadline: float = math.inf, overtake: bool = False,
     ) -> None:
         def ended(result: command_sender.CommandResult, now: float) -> None:
             done(result, now)
             self._ended(result, now)
 
-        self._commands.start(command, now, ended, limit=limit, overtake=overtake)
+        self._commands.start(command, now, ended, deadline=deadline, overtake=overtake)
 
     def request_message(
         self, message_id: int, now: float, done: CommandDone = lambda result, now: None, *,
@@ -265,7 +265,7 @@ class Request(Generic[S]):
     :param prepare: returns the change when it is sent: requests before it may affect it.
     :param done: called once, with the result, the change and the status that shows it; None
         stands for a change that was not sent, and for a status that did not come.
-    :param limit: the time by which it ends, s.
+    :param deadline: the time by which it ends, s.
     :param is_stream: whether it is one of a stream: a newer one replaces it while it waits.
     :param overtakes: whether its command is sent beside one of its kind that is in progress.
     :param earliest_start: returns the time before which it must not be sent, s; called at each
@@ -275,11 +275,11 @@ class Request(Generic[S]):
     def __init__(
         self, target: Target, prepare: Callable[[float], Change[S]],
         done: Callable[[Result, Change[S] | None, S | None, float], None], *, now: float,
-        limit: float, is_stream: bool = False, overtakes: bool = False,
+        deadline: float, is_stream: bool = False, overtakes: bool = False,
         earliest_start: Callable[[], float] = at_any_time,
     ) -> None:
         self.phase = Phase.WAITING
-        self.limit = limit
+        self.deadline = deadline
         self.is_stream = is_stream
         self.overtakes = overtakes
         self.earliest_start = earliest_start
@@ -351,7 +351,7 @@ class Request(Generic[S]):
         self._sent_at = now
         change = self._sent
         self._target.send(
-            change.command, change.params, now, self._answered, limit=self.limit,
+            change.command, change.params, now, self._answered, deadline=self.deadline,
             overtake=self.overtakes)
 
     def _answered(self, outcome: command_sender.CommandResult, now: float) -> None:
@@ -366,7 +366,7 @@ class Request(Generic[S]):
         elif accepted or outcome.may_answer_earlier(now):
             self.phase = TRANSITIONS[self.phase, Step.ACKNOWLEDGED]
             self._acknowledged_at = now
-            self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.limit)
+            self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self.deadline)
             self._ask_at = now + ASK_DELAY
         else:
             self._refused(now)
@@ -410,7 +410,7 @@ class Request(Generic[S]):
             self._before = None
         wait = max(delay + ASK_INTERVAL, 2 * report.span)
         self._confirm_until = max(
-            self._confirm_until, min(self._acknowledged_at + wait, self.limit))
+            self._confirm_until, min(self._acknowledged_at + wait, self.deadline))
         if report.sent_by - delay < self._sent_at:
             self._is_outdated = True
             self._ask_at = min(self._ask_at, now + self._outdated_wait)
@@ -585,7 +585,7 @@ class RequestQueue(Generic[S]):
 
     def poll(self, now: float) -> None:
         """Do what is due, and start the next request."""
-        while (late := self._first_waiting) and now >= late.limit:
+        while (late := self._first_waiting) and now >= late.deadline:
             self._requests.remove(late)
             late.fail('not sent: earlier requests took too long', now)
         if self._requests:
@@ -610,8 +610,8 @@ class RequestQueue(Generic[S]):
         if first.phase is Phase.FINISHED:
             return -math.inf
         waiting = self._first_waiting
-        limit = waiting.limit if waiting else math.inf
-        return min(first.earliest_start() if waiting is first else first.next_deadline(), limit)
+        deadline = waiting.deadline if waiting else math.inf
+        return min(first.earliest_start() if waiting is first else first.next_deadline(), deadline)
 
     @property
     def _first_waiting(self) -> Request[S] | None:

@@ -383,7 +383,7 @@ def acknowledged(*switches: Switch) -> tuple[CommandSender, RequestQueue[Status]
     for change in switches:
         queue.submit(Request(
             target, lambda now, change=change: change,  # type: ignore[misc]
-            lambda *ended: None, now=0.0, limit=10.0), 0.0)
+            lambda *ended: None, now=0.0, deadline=10.0), 0.0)
     sender.acknowledge(LIGHT, mav.CommandAck(ON_OFF, ACCEPTED, 0, 0, *BRIDGE), 0.1)
     return sender, queue
 

@@ -134,7 +134,8 @@ class Winch:
         self.was_commanded = True
         self._requests.submit(request.Request(
             self._target, lambda now: Release(length, self._line_length + length),
-            lambda result, change, status, now: done(result, now), now=now, limit=now + 30.0), now)
+            lambda result, change, status, now: done(result, now), now=now,
+            deadline=now + 30.0), now)
 
     def poll(self, now: float) -> None:
         """See :class:`Device`."""

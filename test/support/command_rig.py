@@ -97,7 +97,7 @@ class Rig:
             target, command, (0.0,) * 6 + (number,) if params is None else params))
         self.runs.append(run)
         self.sender.start(
-            run.command, self.now, run, limit=self.now + limit, overtake=overtake)
+            run.command, self.now, run, deadline=self.now + limit, overtake=overtake)
         self.flush()
         return run
 
