@@ -354,7 +354,7 @@ class Gimbal:
         manager.status_at, manager.control = now, Control.of(status)
         manager.status_query = Repetition(now + STATUS_REQUEST_DELAY)
         self._check(now)
-        manager.requests.take(request.Report(status, now, has_clock=False), now)
+        manager.requests.take(request.StatusReport(status, now, has_clock=False), now)
 
     def take_device_information(self, message: GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION of the device."""
@@ -372,7 +372,7 @@ class Gimbal:
             self._attitude, self._problem = None, str(error)
         self._check(now)
         if (manager := self._active) is not None:
-            manager.flag_requests.take(request.Report(status, now, has_clock=False), now)
+            manager.flag_requests.take(request.StatusReport(status, now, has_clock=False), now)
         self._repeat_zero(status, now)
         self._emit(events.AttitudeReceived(self.key, self._attitude, self._flags, self._errors))
 

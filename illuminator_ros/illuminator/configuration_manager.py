@@ -36,7 +36,16 @@ from .model import (
     unexpected_differences,
 )
 from ..payload.repeat_limit import RepeatLimit
-from ..payload.request import Change, Done, Report, Request, RequestQueue, Result, Target
+from ..payload.request import (
+    Change,
+    Done,
+    Phase,
+    Request,
+    RequestQueue,
+    Result,
+    StatusReport,
+    Target,
+)
 
 # s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
 # up to 0.1 s before it sends an answer to a client that it has not discovered yet.
@@ -202,7 +211,8 @@ class ConfigurationManager:
             brightness = self._limits.max_brightness
             self._emit(events.SetpointClipped(self._address, str(error)))
         current = self._queue.current
-        if (current is not None and current.is_stream and not current.is_finished
+        if (current is not None and current.is_stream
+                and current.phase is not Phase.FINISHED
                 and isinstance(current.change, Configure)
                 and current.change.configuration.brightness == brightness):
             # A command with this value is under way; a setpoint that waits is outdated.
@@ -372,7 +382,7 @@ class ConfigurationManager:
             self._setpoint_failed(message)
 
     def take(
-        self, report: Report[Status], now: float, *, can_follow: bool, switched_at: float,
+        self, report: StatusReport[Status], now: float, *, can_follow: bool, switched_at: float,
         brightness_is_switch: bool,
     ) -> None:
         """
@@ -396,8 +406,8 @@ class ConfigurationManager:
             self._keep_limits(reported, now)
 
     def _take_configuration(
-        self, report: Report[Status], reported: Configuration, now: float, *, can_follow: bool,
-        switched_at: float,
+        self, report: StatusReport[Status], reported: Configuration, now: float, *,
+        can_follow: bool, switched_at: float,
     ) -> None:
         status = report.status
         if self._unapplied and not unexpected_differences(

@@ -37,10 +37,11 @@ from ..payload.request import (
     at_any_time,
     Change,
     Done,
-    Report,
+    Phase,
     Request,
     RequestQueue,
     Result,
+    StatusReport,
     Target,
 )
 
@@ -247,7 +248,7 @@ class Light:
         self._emit(events.StatusReceived(self.address, status, now, self.temperature))
 
     def _take_report(
-        self, report: Report[Status], now: float, *, was_lost: bool, restarted: bool,
+        self, report: StatusReport[Status], now: float, *, was_lost: bool, restarted: bool,
     ) -> None:
         before, self._enabled = self._enabled, report.status.enabled
         if self._enabled is False:
@@ -280,7 +281,7 @@ class Light:
             self._check_refreshes(now)
 
     def _follow_switch(
-        self, before: bool | None, report: Report[Status], now: float, *, was_lost: bool,
+        self, before: bool | None, report: StatusReport[Status], now: float, *, was_lost: bool,
     ) -> None:
         """Report that the light was switched without a request under way."""
         status = report.status
@@ -338,7 +339,8 @@ class Light:
                     command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE
                     or command.command == MavCmd.ILLUMINATOR_ON_OFF
                     and command.params == SWITCHES[True].params))
-            self._switching.cancel(message, now, lambda request: request.is_waiting)
+            self._switching.cancel(
+                message, now, lambda request: request.phase is Phase.WAITING)
             self._configuration.lost(message, now)
 
     def link_opened(self, now: float) -> None:
@@ -472,7 +474,7 @@ class Light:
         if change.after is None:
             self._switching.cancel(
                 f'{change.before} no longer holds it', now,
-                lambda request: request.is_waiting and not request.overtakes)
+                lambda request: request.phase is Phase.WAITING and not request.overtakes)
             if self._settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))

@@ -22,7 +22,7 @@ import math
 import operator
 
 from .model import DIMMING_FLAGS, Mode, NOTHING, Status, unexpected_differences
-from ..payload.request import Report
+from ..payload.request import StatusReport
 
 WRAP_MS = 1 << 32
 # s without progress after which a light has no clock.
@@ -408,7 +408,7 @@ class StatusTracker:
 
     def take(
         self, status: Status, uptime: Uptime, now: float, *, commanded: bool, sender: int = 0,
-    ) -> tuple[Report[Status] | None, bool]:
+    ) -> tuple[StatusReport[Status] | None, bool]:
         """
         Return the report of a status, None if it is late, and whether the light has restarted.
 
@@ -420,16 +420,16 @@ class StatusTracker:
         if conflict.detected:
             # The uptimes of several lights cannot be compared.
             self._clock = UptimeClock()
-            return Report(status, now, False, True, conflict.sender, conflict.senders,
-                          conflict.span), False
+            return StatusReport(status, now, False, True, conflict.sender, conflict.senders,
+                                conflict.span), False
         if uptime is Uptime.LATE:
             return None, False
         restarted = uptime is Uptime.RESTARTED
         if restarted:
             self._sending_times = SendingTimes()
         sent_by, has_clock = self._sending_times.take(status, now)
-        return Report(status, sent_by, has_clock, sender=conflict.sender,
-                      senders=conflict.senders), restarted
+        return StatusReport(status, sent_by, has_clock, sender=conflict.sender,
+                            senders=conflict.senders), restarted
 
     def lost(self) -> None:
         """Forget the other lights at the address: the light is lost."""

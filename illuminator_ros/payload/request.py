@@ -57,7 +57,6 @@ PERMANENT_RESULTS = frozenset((
 
 S = TypeVar('S')
 S_contra = TypeVar('S_contra', contravariant=True)
-CommandDone = Callable[[command_sender.CommandResult, float], None]
 
 
 class Target:
@@ -72,7 +71,7 @@ class Target:
 
     def __init__(
         self, address: Address, commands: command_sender.CommandSender,
-        ended: CommandDone = lambda result, now: None, *, kind: str, status_id: int,
+        ended: command_sender.Done = lambda result, now: None, *, kind: str, status_id: int,
         status_name: str, status_sender: Address | None = None,
     ) -> None:
         self.address = address
@@ -87,7 +86,7 @@ class Target:
 
     def send(
         self, command: int, params: tuple[float, ...], now: float,
-        done: CommandDone = lambda result, now: None, *, deadline: float = math.inf,
+        done: command_sender.Done = lambda result, now: None, *, deadline: float = math.inf,
         overtake: bool = False, to: Address | None = None,
     ) -> None:
         """Send a command, to the device or to another component; see :class:`CommandSender`."""
@@ -95,7 +94,7 @@ class Target:
                     deadline=deadline, overtake=overtake)
 
     def _start(
-        self, command: command_sender.Command, now: float, done: CommandDone, *,
+        self, command: command_sender.Command, now: float, done: command_sender.Done, *,
         deadline: float = math.inf, overtake: bool = False,
     ) -> None:
         def ended(result: command_sender.CommandResult, now: float) -> None:
@@ -105,13 +104,13 @@ class Target:
         self._commands.start(command, now, ended, deadline=deadline, overtake=overtake)
 
     def request_message(
-        self, message_id: int, now: float, done: CommandDone = lambda result, now: None, *,
+        self, message_id: int, now: float, done: command_sender.Done = lambda result, now: None, *,
         to: Address | None = None,
     ) -> None:
         """Request one message of the device or of another component."""
         self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
 
-    def request_status(self, now: float, done: CommandDone | None = None) -> None:
+    def request_status(self, now: float, done: command_sender.Done | None = None) -> None:
         """Request the status; without ``done`` only where no such request is under way."""
         if done is not None:
             self.request_message(self._status_id, now, done, to=self._status_sender)
@@ -145,7 +144,7 @@ class Target:
 
 
 @dataclass(slots=True)
-class Report(Generic[S]):
+class StatusReport(Generic[S]):
     """
     A status that is newer than all before.
 
@@ -226,7 +225,11 @@ def at_any_time() -> float:
 
 
 class Phase(Enum):
-    """The phase of a request."""
+    """
+    The phase of a request.
+
+    WAITING was not sent; CONFIRMING was acknowledged, and waits for the status.
+    """
 
     # Enum.__hash__ is a call in Python; a lookup in the table of transitions makes two.
     __hash__ = object.__hash__
@@ -270,6 +273,7 @@ class Request(Generic[S]):
     :param overtakes: whether its command is sent beside one of its kind that is in progress.
     :param earliest_start: returns the time before which it must not be sent, s; called at each
         poll.
+    :ivar change: the change, None until it is sent.
     """
 
     def __init__(
@@ -304,24 +308,9 @@ class Request(Generic[S]):
         self._shown_since = math.inf
 
     @property
-    def is_finished(self) -> bool:
-        """Whether it has ended."""
-        return self.phase is Phase.FINISHED
-
-    @property
-    def is_confirming(self) -> bool:
-        """Whether the device has acknowledged, and the status is awaited."""
-        return self.phase is Phase.CONFIRMING
-
-    @property
-    def is_waiting(self) -> bool:
-        """Whether it has not been sent."""
-        return self.phase is Phase.WAITING
-
-    @property
     def is_accepted(self) -> bool:
         """Whether the device has accepted, and the status is awaited."""
-        return self.is_confirming and self._answer.accepted
+        return self.phase is Phase.CONFIRMING and self._answer.accepted
 
     @property
     def _sent(self) -> Change[S]:
@@ -390,7 +379,7 @@ class Request(Generic[S]):
         self._was_repeated |= self._repeats >= 0
         return self._repeats >= 0
 
-    def take(self, report: Report[S], now: float) -> None:
+    def take(self, report: StatusReport[S], now: float) -> None:
         """
         Take a status that is newer than all before.
 
@@ -433,7 +422,7 @@ class Request(Generic[S]):
 
     def poll(self, now: float) -> None:
         """Request the status, or end the request."""
-        if not self.is_confirming:
+        if self.phase is not Phase.CONFIRMING:
             return
         if now >= self._confirm_until:
             self._unconfirmed(now)
@@ -454,12 +443,12 @@ class Request(Generic[S]):
 
     def fail(self, message: str, now: float) -> None:
         """End without a success, if it has not ended."""
-        if not self.is_finished:
+        if self.phase is not Phase.FINISHED:
             self._finish(Result(False, message), now)
 
     def replace(self, now: float) -> None:
         """End without a success, if it has not ended: a newer request replaces it."""
-        if not self.is_finished:
+        if self.phase is not Phase.FINISHED:
             self._finish(Result(False, OVERTAKEN, superseded=True), now)
 
     def _refused(self, now: float) -> None:
@@ -546,7 +535,7 @@ class RequestQueue(Generic[S]):
         """
         replaced = self._remove(
             lambda one: request.overtakes and not one.overtakes
-            or request.is_stream and one.is_stream and one.is_waiting)
+            or request.is_stream and one.is_stream and one.phase is Phase.WAITING)
         if len(self._requests) < MAX_WAITING:
             self._requests.append(request)
             self._start_next(now)
@@ -574,7 +563,7 @@ class RequestQueue(Generic[S]):
         self._requests = [one for one in self._requests if one not in removed]
         return removed
 
-    def take(self, report: Report[S], now: float) -> None:
+    def take(self, report: StatusReport[S], now: float) -> None:
         """Take a status that is newer than all before."""
         self._status = report.status
         if self._requests:

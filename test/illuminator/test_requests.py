@@ -33,10 +33,10 @@ from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.request import (
     ASK_DELAY,
     MAX_WAITING,
-    Report,
     Request,
     RequestQueue,
     Result,
+    StatusReport,
     Target,
 )
 import pytest
@@ -396,7 +396,7 @@ def commands(sender: CommandSender) -> list[tuple[int, float]]:
 
 def test_the_status_that_ends_a_request_sends_the_next_one_without_a_poll() -> None:
     sender, queue = acknowledged(Switch(True), Switch(False))
-    queue.take(Report(ON, 0.2), 0.2)
+    queue.take(StatusReport(ON, 0.2), 0.2)
     assert commands(sender) == [(ON_OFF, 1.0), (ON_OFF, 0.0)]
     assert len(queue) == 1
 
@@ -408,7 +408,7 @@ def test_a_status_is_requested_unless_it_follows_the_acknowledgement_at_once(
 ) -> None:
     sender, queue = acknowledged(Switch(True))
     queue.poll(0.1 + after)
-    queue.take(Report(ON, 0.1 + after), 0.1 + after)
+    queue.take(StatusReport(ON, 0.1 + after), 0.1 + after)
     assert commands(sender) == [(ON_OFF, 1.0), *asked]
     assert len(queue) == 0
 

@@ -28,7 +28,7 @@ import math
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_receiver import AnyCommand
-from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.command_sender import CommandSender, Done
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.payload import request, simulated
 from illuminator_ros.payload.discovery import Discovery
@@ -108,7 +108,7 @@ class Winch:
     """One winch: a :class:`Device` of the discovery."""
 
     def __init__(
-        self, address: mav.Address, commands: CommandSender, ended: request.CommandDone,
+        self, address: mav.Address, commands: CommandSender, ended: Done,
     ) -> None:
         self.address = address
         self.lost_at = math.inf
@@ -127,7 +127,7 @@ class Winch:
         """Take a status."""
         self.heard(now)
         self._line_length = status.line_length
-        self._requests.take(request.Report(status, sent_by=now, has_clock=False), now)
+        self._requests.take(request.StatusReport(status, sent_by=now, has_clock=False), now)
 
     def release(self, length: float, now: float, done: request.Done) -> None:
         """Release line, m, or wind it in if negative; ``done`` gets the confirmed result."""
