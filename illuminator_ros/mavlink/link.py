@@ -309,7 +309,7 @@ class Link:
         # No channel is handed over any more, and one that just was is among the calls.
         self._connector.stop()
         self._run_calls()
-        self._keep_timestamp(last=True)
+        self._store_timestamp(last=True)
         self._close()
         self._status.take(LinkInput.STOPPED, self.clock())
         self._release()
@@ -388,14 +388,14 @@ class Link:
         now = self.clock()
         if now >= self._store_due:
             self._store_due = now + STORE_INTERVAL
-            self._keep_timestamp(last=False)
+            self._store_timestamp(last=False)
         while event := self._status.event(now):
             self._safe_call(self._on_event, event)
 
-    def _keep_timestamp(self, *, last: bool) -> None:
+    def _store_timestamp(self, *, last: bool) -> None:
         if self._store:
-            self._safe_call(
-                self._store.keep, self._signing.timestamp, self._wall_clock(), last)
+            self._safe_call(functools.partial(self._store.store, last=last),
+                            self._signing.timestamp, self._wall_clock())
 
     def _serve(self, handle: object, events: int, *, by_caller: bool = False) -> None:
         """Send or receive on a handle that is ready; a caller leaves large data to the thread."""

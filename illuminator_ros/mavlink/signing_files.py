@@ -137,30 +137,23 @@ class TimestampStore:
             return 0
         return timestamp if 0 <= timestamp <= MAX_TICKS else 0
 
-    def store(self, timestamp: int, unix_time: float = 0.0, *, last: bool = False) -> None:
+    def store(self, timestamp: int, unix_time: float, *, last: bool = False) -> None:
         """
-        Replace the stored time stamp.
+        Replace the stored time stamp; a failure is logged once until it ends.
 
-        :param unix_time: now, s; 0 where there is no clock.
+        :param unix_time: now, s.
         :param last: no other will be used in this run, so the next continues right behind it.
-        :raises OSError: if the directory cannot be written.
         """
         following = timestamp if last else max(
             timestamp + FRAMES_MARGIN, ticks(unix_time) + CLOCK_MARGIN)
-        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         scratch = self.path.with_name(f'{self.path.name}.{os.getpid()}')
         try:
+            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             scratch.write_text(f'{min(following, MAX_TICKS)}\n')
             os.replace(scratch, self.path)
-        finally:
+        except OSError as error:
             with contextlib.suppress(OSError):
                 scratch.unlink()
-
-    def keep(self, timestamp: int, unix_time: float, last: bool = False) -> None:
-        """Store it as :meth:`store` does; a failure is logged once until it ends."""
-        try:
-            self.store(timestamp, unix_time, last=last)
-        except OSError as error:
             if not self._failed:
                 _log.error('cannot store the signing time stamp, trying again: a restart may '
                            'repeat some: %s', error)

@@ -143,7 +143,7 @@ from illuminator_ros.mavlink.signing import SigningMode
 from illuminator_ros.mavlink.signing_files import load_signing
 now = float(sys.argv[2])
 signing, store = load_signing(SigningMode.SIGN, sys.argv[1], 'bridge', now)
-store.keep(signing.timestamp, now)
+store.store(signing.timestamp, now)
 while True:
     signing.sign(b'', now)
     sys.stdout.buffer.write(signing.timestamp.to_bytes(8, 'big'))
@@ -177,16 +177,16 @@ def test_failed_write_is_logged_once_tried_again_and_leaves_the_old_time_stamp(
     def fail(source: object, target: object) -> None:
         raise OSError(28, 'No space left on device')
 
-    store.store(1, last=True)
+    store.store(1, 0.0, last=True)
     with monkeypatch.context() as patch:
         patch.setattr(os, 'replace', fail)
-        store.keep(5, NOW)
-        store.keep(5, NOW)
+        store.store(5, NOW)
+        store.store(5, NOW)
     assert [record.getMessage() for record in caplog.records] == [
         'cannot store the signing time stamp, trying again: a restart may repeat some: '
         '[Errno 28] No space left on device']
     assert (store.load(), os.listdir(store.path.parent)) == (1, [store.path.name])
-    store.keep(5, NOW)
+    store.store(5, NOW)
     assert store.load() > STAMP
 
 
@@ -194,7 +194,7 @@ def test_failed_write_is_logged_once_tried_again_and_leaves_the_old_time_stamp(
     b'', b'nonsense', b'-5', b'\xff\xfe', b'9' * 5000, str(LAST_STAMP + 1).encode()])
 def test_state_file_without_time_stamp_counts_as_none(
         store: TimestampStore, content: bytes) -> None:
-    store.store(LAST_STAMP)
+    store.store(LAST_STAMP, 0.0)
     assert store.load() == LAST_STAMP
     store.path.write_bytes(content)
     assert store.load() == 0
