@@ -66,7 +66,7 @@ def main() -> None:
                 if id_ == mav.CommandAck.id:
                     accepted = True
                 elif id_ == STATUS_ID and accepted:
-                    status = mav.decode_payload(IlluminatorStatus, payload)
+                    status = IlluminatorStatus.decode(payload)
                     response.success = status.enable == request.data
                 data = data[end + CHECKSUM:]
         return response

@@ -89,7 +89,7 @@ class Line:
                 return now
 
     def _messages(self, data: bytes) -> list[Any]:
-        return [mav.decode_payload(CLASSES[frame.message_id], frame.payload)
+        return [CLASSES[frame.message_id].decode(frame.payload)
                 for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
 
     def drain(self) -> None:

@@ -82,7 +82,7 @@ class CommandReceiver:
         if isinstance(command, mav.CommandInt):
             return execute(source, command, now)
         key = source, command.command
-        payload = mav.encode_payload(replace(command, confirmation=0))
+        payload = replace(command, confirmation=0).encode()
         last = self._executed.pop(key, _Executed(b'', mav.MavResult.FAILED, -math.inf))
         if command.confirmation and last.payload == payload and now < last.at + REPEAT_TIME:
             result: mav.MavResult | None = last.result

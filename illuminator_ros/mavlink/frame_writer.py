@@ -88,7 +88,7 @@ class FrameWriter:
         :raises ValueError: if MAVLink 1 cannot carry the message.
         :raises struct.error: if a value does not fit into its field.
         """
-        payload = message.codec.encode(message)
+        payload = message.encode()
         if self._version == 1:
             payload = payload[:message.base_size]
         sequence = self.sequences.get(source, -1)

@@ -443,7 +443,7 @@ class Link:
             self._work_pending = True
             if self.endpoint.inspect is not None:
                 self._safe_call(self.endpoint.inspect, frame, cls)
-            message = cls.codec.decode(frame.payload, sender)
+            message = cls.decode(frame.payload, sender)
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('received from %s: %s', frame.source, message,
                                  extra={'address': frame.source})

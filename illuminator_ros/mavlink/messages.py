@@ -69,13 +69,6 @@ class Layout(NamedTuple):
     size: int
 
 
-class _Codec(NamedTuple):
-    encode: Callable[[Message], bytes]
-    # See decode_payload(). It returns Any: the class that has the codec.
-    decode: Callable[[bytes, int], Any]
-    size: int
-
-
 class Message:
     """
     A message; its fields are as on the wire, and float32 is not rounded before it is sent.
@@ -84,6 +77,7 @@ class Message:
     :cvar name: name in the XML definition.
     :cvar crc_extra: seeds the checksum, so that both sides have the same definition.
     :cvar base_size: bytes of the payload without extension fields, as MAVLink 1 sends it.
+    :cvar full_size: bytes of the payload with them.
     :ivar sender: of a received message, which of several senders with one address has sent it, as
         far as their sequence numbers distinguish them; see :class:`~.statistics.SequenceCounter`.
     """
@@ -94,7 +88,26 @@ class Message:
     name: ClassVar[str]
     crc_extra: ClassVar[int]
     base_size: ClassVar[int]
-    codec: ClassVar[_Codec]
+    full_size: ClassVar[int]
+
+    def encode(self) -> bytes:
+        """
+        Return the payload, extension fields included, trailing zeros not yet cut.
+
+        :raises struct.error: if a value does not fit into its field.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def decode(cls: type[M], payload: bytes, sender: int = 0) -> M:
+        """
+        Return the message of a checked payload.
+
+        A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension
+        fields). Bytes beyond the known fields are ignored, as extensions must be: some lights send
+        a 38-byte ILLUMINATOR_STATUS.
+        """
+        raise NotImplementedError
 
     def __str__(self) -> str:
         """Return the message in a line, for people."""
@@ -113,7 +126,7 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
     """
     Complete a dataclass whose fields are those of a message, in the order of its definition.
 
-    A received message is made without ``__init__``.
+    Its ``decode`` makes a message without ``__init__``.
 
     :param extensions: how many of the fields, the last ones, are extension fields.
     """
@@ -134,6 +147,7 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
         crc = mcrf4xx(seed)
         cls.id, cls.name, cls.crc_extra = id_, name, crc & 0xFF ^ crc >> 8
         cls.base_size = struct.calcsize('<' + ''.join(codes[one] for one in base))
+        cls.full_size = layout.size
         # The values of the layout as text, by field.
         values: dict[str, str] = {}
         at = 0
@@ -147,7 +161,9 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
         namespace: dict[str, Any] = {
             'cls': cls, 'new': cls.__new__, 'pack': layout.pack, 'size': layout.size,
             'unpack': layout.unpack}
-        exec('def decode(payload, sender):\n'
+        exec('def encode(message):\n'
+             f'    return pack({sent})\n'
+             'def decode(payload, sender=0):\n'
              '    if len(payload) != size:\n'
              "        payload = payload[:size].ljust(size, b'\\0')\n"
              '    values = unpack(payload)\n'
@@ -155,32 +171,11 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
              '    message.sender = sender\n'
              + ''.join(f'    message.{one} = {values[one]}\n' for one in names)
              + '    return message\n', namespace)
-        cls.codec = _Codec(eval(f'lambda message: pack({sent})', namespace),
-                           namespace['decode'], layout.size)
+        cls.encode = namespace['encode']  # type: ignore[method-assign]
+        cls.decode = staticmethod(namespace['decode'])  # type: ignore[method-assign]
         LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
         return cls
     return complete
-
-
-def encode_payload(message: Message) -> bytes:
-    """
-    Return the payload of a message, extension fields included, trailing zeros not yet cut.
-
-    :raises struct.error: if a value does not fit into its field.
-    """
-    return message.codec.encode(message)
-
-
-def decode_payload(cls: type[M], payload: bytes, sender: int = 0) -> M:
-    """
-    Return the message of a checked payload.
-
-    A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension fields).
-    Bytes beyond the known fields are ignored, as extensions must be: some lights send a 38-byte
-    ILLUMINATOR_STATUS.
-    """
-    message: M = cls.codec.decode(payload, sender)
-    return message
 
 
 class MavCmd(IntEnum):

@@ -138,7 +138,7 @@ FAULTS = FaultTable({
 class ExtendedCameraFeedback(rededge.CameraFeedback):
     """CAMERA_FEEDBACK as some libraries send it with MAVLink 1: 47 bytes instead of 45."""
 
-    base_size = rededge.CameraFeedback.codec.size
+    base_size = rededge.CameraFeedback.full_size
 
 
 @dataclass(frozen=True, slots=True)

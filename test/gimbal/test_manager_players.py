@@ -143,7 +143,7 @@ class Arena:
 
     def _give(self, source: mav.Address, message_id: int, payload: bytes) -> None:
         [cls] = [cls for cls in self.rig.component.messages if cls.id == message_id]
-        message = mav.decode_payload(cls, payload)
+        message = cls.decode(payload)
         events, holder = len(self.rig.events), self.rig.manager.control.holder(Role.PRIMARY)
         if cls.name == 'HEARTBEAT':
             self.heard[source] = self.rig.now

@@ -206,7 +206,7 @@ def test_a_char_field_is_read_as_printable_text_up_to_its_terminator(
 ) -> None:
     assert text(field) == expected
     sent = mav.ComponentInformationBasic(0, 0, 0, b'm' * 32, field, b'1', b'2', b'n-1')
-    message = mav.decode_payload(mav.ComponentInformationBasic, mav.encode_payload(sent))
+    message = mav.ComponentInformationBasic.decode(sent.encode())
     assert Identity.from_message(message) == Identity('m' * 32, expected, '1', '2', 'n-1')
 
 

@@ -25,7 +25,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.illuminator import model
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
-from illuminator_ros.mavlink.messages import encode_payload
 import pytest
 from support.fake_light import status_message
 from support.messages import decode_payload
@@ -177,7 +176,7 @@ def test_error_flags_have_readable_names(flags: int, names: list[str]) -> None:
 
 def read(**fields: Any) -> model.Status:
     """Return a status as it comes from the wire."""
-    message = decode_payload(STATUS_ID, encode_payload(status_message(**fields)))
+    message = decode_payload(STATUS_ID, status_message(**fields).encode())
     assert isinstance(message, IlluminatorStatus)
     return model.Status.from_message(message)
 

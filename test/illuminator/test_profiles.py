@@ -16,7 +16,7 @@
 
 from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
-from illuminator_ros.mavlink.messages import CommandInt, encode_payload, MavCmd
+from illuminator_ros.mavlink.messages import CommandInt, MavCmd
 import pytest
 from support.back_to_back import Pair
 from support.light_bench import LightBench
@@ -88,5 +88,5 @@ def test_a_light_of_ardusub_is_off_at_brightness_0_and_on_restores_the_last_one(
 def test_three_bytes_follow_the_common_35_with_the_same_crc_extra(profile: str) -> None:
     status = LightBench(properties=described(
         profile, zoom_level=7, color_mode=2, gimbal_device_id=154)).status()
-    payload = encode_payload(status)
+    payload = status.encode()
     assert (len(payload), payload[35:], status.crc_extra) == (38, bytes([7, 2, 154]), 66)

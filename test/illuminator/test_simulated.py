@@ -62,7 +62,7 @@ def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench: LightBench
 def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
     bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
     _, information = bench.command(REQUEST, mav.INFORMATION_ID)
-    assert mav.encode_payload(information)[16:] == (
+    assert information.encode()[16:] == (
         b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
         + b'n' * 31 + b'\0')
 

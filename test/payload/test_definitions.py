@@ -45,12 +45,12 @@ def test_a_random_payload_has_the_values_that_pymavlink_reads(cls: type[mav.Mess
     camera: Any = mavlink_1
     of_camera = cls.__module__ == rededge.__name__ and cls is not rededge.CameraFeedback
     known = (camera if of_camera else reference()).mavlink_map[cls.id]
-    assert (cls.name, cls.crc_extra, cls.codec.size) == (
+    assert (cls.name, cls.crc_extra, cls.full_size) == (
         known.msgname, known.crc_extra, known.unpacker.size)
     assert of_camera or mav.LAYOUTS[cls.id] == (known.crc_extra, known.unpacker.size)
 
-    payload = random.Random(cls.id).randbytes(cls.codec.size)
-    message: Any = mav.decode_payload(cls, payload)
+    payload = random.Random(cls.id).randbytes(cls.full_size)
+    message: Any = cls.decode(payload)
 
     assert [field.name for field in fields(message)] == known.fieldnames
     values = iter(known.unpacker.unpack(payload))
@@ -58,7 +58,7 @@ def test_a_random_payload_has_the_values_that_pymavlink_reads(cls: type[mav.Mess
     for name, length in zip(known.ordered_fieldnames, known.lengths, strict=True):
         wire[name] = tuple(next(values) for _ in range(length)) if length > 1 else next(values)
     assert repr(astuple(message)) == repr(tuple(wire[name] for name in known.fieldnames))
-    assert mav.encode_payload(message) == payload
+    assert message.encode() == payload
 
 
 @pytest.mark.parametrize(('enum', 'prefix'), [

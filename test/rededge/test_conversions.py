@@ -22,7 +22,6 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
-from illuminator_ros.mavlink.messages import decode_payload, encode_payload
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
 from illuminator_ros.payload.rotation import flip, Quaternion, Vector
 from illuminator_ros.rededge import conversions
@@ -123,7 +122,7 @@ def test_rounded_angles_do_not_add_up_where_roll_and_yaw_turn_about_one_axis_re_
 @given(rotations)
 def test_attitude_is_that_of_the_frd_body_in_ned_in_radians_re_20(body: Quaternion) -> None:
     sent = conversions.attitude(body, (0.1, 0.2, -0.3), 7)
-    read = decode_payload(Attitude, encode_payload(sent))
+    read = Attitude.decode(sent.encode())
 
     assert error(Rotation.from_euler('ZYX', [read.yaw, read.pitch, read.roll]),
                  ENU_TO_NED * oracle(body) * FLU_TO_FRD) < 0.002
@@ -195,7 +194,7 @@ def test_whatever_comes_either_fits_its_fields_or_is_refused(
         sent = conversions.gps_raw_int(position, utc, velocity, satellites, 0.0)
     except ValueError:
         return
-    assert len(encode_payload(sent)) == 30
+    assert len(sent.encode()) == 30
 
 
 def test_standard_deviations_are_the_roots_of_the_variances() -> None:
@@ -208,7 +207,7 @@ def test_standard_deviations_are_the_roots_of_the_variances() -> None:
 
 
 def test_satellites_are_counted_and_no_single_one_is_invented_re_28() -> None:
-    assert encode_payload(conversions.gps_status(9)) == bytes([9]) + bytes(100)
+    assert conversions.gps_status(9).encode() == bytes([9]) + bytes(100)
 
 
 def feedback(**changes: Any) -> CameraFeedback:

@@ -124,7 +124,7 @@ class Attacker:
         return self._framed(self._draw.choice(MESSAGES), self._source(), now)
 
     def _framed(self, cls: type[mav.Message], source: mav.Address, now: float) -> bytes:
-        draw, payload = self._draw, mav.encode_payload(self._message(cls))
+        draw, payload = self._draw, self._message(cls).encode()
         if draw.random() < 0.1:
             payload = (payload + draw.randbytes(255))[:draw.choice(LENGTHS)]
         elif draw.random() < 0.8:

@@ -69,7 +69,7 @@ class _End:
         for frame in self.decoder.feed(data):
             cls = self.classes.get(frame.message_id)
             if cls is not None:
-                message = mav.decode_payload(cls, frame.payload, self._traffic.count(frame))
+                message = cls.decode(frame.payload, self._traffic.count(frame))
                 self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)

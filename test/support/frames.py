@@ -32,7 +32,7 @@ FILLER = bytes(300)
 def frame_of(message: mav.Message = STATUS, sequence: int = 0, source: mav.Address = LIGHT, *,
              signed: bool = False, version: int = 2) -> bytes:
     """Return a frame of this package, without the signature that a signed one still needs."""
-    payload = mav.encode_payload(message)
+    payload = message.encode()
     return encode_frame(
         message.id, payload if version == 2 else payload[:message.base_size], sequence=sequence,
         source=source, crc_extra=message.crc_extra, signed=signed, version=version)

@@ -19,7 +19,6 @@ No field has its default, and each number is exact in float32.
 """
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.mavlink import messages
 from illuminator_ros.mavlink import messages as mav
 
 STATUS = IlluminatorStatus(
@@ -44,4 +43,4 @@ HANDLED: dict[int, type[mav.Message]] = {message.id: type(message) for message i
 
 def decode_payload(message_id: int, payload: bytes) -> mav.Message:
     """Return the message of a payload; its class is the one of :data:`HANDLED`."""
-    return messages.decode_payload(HANDLED[message_id], payload)
+    return HANDLED[message_id].decode(payload)

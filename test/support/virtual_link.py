@@ -21,7 +21,6 @@ from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import decode_payload
 from support.frames import Codec
 
 # s; the initial time: not 0, so that a wrong use of 0 as a time shows.
@@ -86,4 +85,4 @@ class VirtualLink:
                         if receiver.inspect is not None:
                             receiver.inspect(frame, cls)
                         receiver.receive(
-                            frame.source, decode_payload(cls, frame.payload), self.now)
+                            frame.source, cls.decode(frame.payload), self.now)

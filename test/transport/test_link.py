@@ -29,7 +29,7 @@ from illuminator_ros.mavlink import link as link_module
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.link import Link, LinkThreadError
 from illuminator_ros.mavlink.link_state import LinkEvent
-from illuminator_ros.mavlink.messages import CommandLong, decode_payload
+from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.signing_files import TimestampStore
 from illuminator_ros.mavlink.transport import open_channel, tcp
@@ -152,7 +152,7 @@ def test_message_with_a_value_that_does_not_fit_costs_no_other_message(
     sent: list[int] = []
     while 2 not in sent:
         frames = (frame for _, data in other.receive() for frame in decoder.feed(data))
-        sent += [decode_payload(CommandLong, frame.payload).confirmation
+        sent += [CommandLong.decode(frame.payload).confirmation
                  for frame in frames if frame.message_id == CommandLong.id]
     assert sent == [0, 2]
     assert 'internal error in the link' in caplog.text
