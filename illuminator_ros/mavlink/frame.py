@@ -31,7 +31,7 @@ from typing import cast, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
-from .messages import Address, Layout, LAYOUTS
+from .messages import Address, LAYOUTS
 
 STX_V1 = 0xFE
 STX_V2 = 0xFD
@@ -43,7 +43,6 @@ FLAG_SIGNED = 0x01
 MAX_ID_V1 = 255
 MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 
-STARTS = (b'\xfd', b'\xfe')
 # STX, payload length, incompatibility and compatibility flags, sequence number, system id,
 # component id, and message id in two parts.
 _HEADER_V2 = struct.Struct('<BBBBBBBHB').unpack_from
@@ -129,13 +128,12 @@ class Decoder:
     Decodes checked frames from a stream of bytes, which may come in any pieces.
 
     Keeps at most one incomplete frame (:data:`MAX_FRAME` bytes). Frames with an id that is not
-    in ``layouts`` cannot be checked and are never returned.
+    in :data:`~.messages.LAYOUTS` cannot be checked and are never returned.
 
     :ivar taken: the bytes taken, which are the position in the stream.
     :ivar rest: the beginning of a frame whose rest is awaited.
     """
 
-    layouts: Mapping[int, Layout] = field(default_factory=lambda: LAYOUTS)
     counters: DecoderCounters = field(default_factory=DecoderCounters)
     taken: int = 0
     rest: bytes = b''
@@ -238,7 +236,7 @@ class Decoder:
             stx, length, flags, _, sequence, system, component, low, high = _HEADER_V2(data, start)
             id_ = low | high << 16
             crc_extra = foreign_extra = foreign.get(id_)
-            if crc_extra is None and (layout := self.layouts.get(id_)):
+            if crc_extra is None and (layout := LAYOUTS.get(id_)):
                 crc_extra = bytes((layout.crc_extra,))
             end = start + HEADER_V2 + length
             if (stx != STX_V2 or flags or crc_extra is None or start + length > last
@@ -263,7 +261,7 @@ class Decoder:
 
     def _is_frame(self, data: bytes, start: int) -> bool:
         """Return whether a whole and valid frame begins here."""
-        found = self._read(data, start) if data[start:start + 1] in STARTS else None
+        found = self._read(data, start) if _START.match(data, start) else None
         return found is not None and found[1] is not None
 
     def _read(self, data: bytes, start: int) -> tuple[int, Frame | None] | None:
@@ -275,7 +273,7 @@ class Decoder:
         length, flags = data[start + 1], data[start + 2] if version == 2 else 0
         sequence, system, component = data[at:at + 3]
         message_id = int.from_bytes(data[at + 3:start + header], 'little')
-        layout = self.layouts.get(message_id)
+        layout = LAYOUTS.get(message_id)
         # "Incompatibility flags": a frame with a flag that is not understood must be dropped.
         # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting for
         # the rest of it would delay the valid frames after it.

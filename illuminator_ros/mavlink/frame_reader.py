@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
 from .messages import LAYOUTS
-from .signing import Signing, SigningMode
+from .signing import Signing
 from .transport import Peer
 
 # Peers whose incomplete frames are kept apart.
@@ -61,7 +61,7 @@ class FrameReader:
     def __init__(self, signing: Signing, handled: Collection[int]) -> None:
         self.counters = DecoderCounters()
         self._signing = signing
-        self._signing_is_off = signing.mode is SigningMode.OFF
+        self._signing_is_off = not signing.signs
         # Making a Frame of each foreign frame takes twice the time on a busy link.
         self._foreign = {} if not self._signing_is_off else {
             id_: bytes((layout.crc_extra,))

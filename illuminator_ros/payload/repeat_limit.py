@@ -17,6 +17,9 @@ from __future__ import annotations
 
 import math
 
+# s without a change that end a row of changes.
+ROW_TIME = 30.0
+
 
 class RepeatLimit:
     """
@@ -24,11 +27,9 @@ class RepeatLimit:
 
     Two programs that both repeat their command would otherwise make a light flash.
 
-    :param times: how often in a row; a row ends after :attr:`row_time` s without a change.
+    :param times: how often in a row; a row ends after :data:`ROW_TIME`, s, without a change.
     :param interval: s between two of a row.
     """
-
-    row_time = 30.0
 
     def __init__(self, times: int, interval: float) -> None:
         self._times = times
@@ -38,7 +39,7 @@ class RepeatLimit:
 
     def take(self, now: float) -> float | None:
         """Return when a change may be undone, s; None if it must be left as it is."""
-        if now >= self._last + self.row_time:
+        if now >= self._last + ROW_TIME:
             self._count = 0
         if self._count >= self._times:
             self._last = now

@@ -129,7 +129,6 @@ class _LineChannel(StreamChannel):
     ) -> None:
         super().__init__(name, fd, 'the device has gone')
         self.rate = rate
-        self._fd = fd
         self._close = close
         self._before_sending = before_sending
 
@@ -140,6 +139,6 @@ class _LineChannel(StreamChannel):
     def close(self) -> None:
         # Closing would otherwise wait up to 30 s for bytes that flow control holds back.
         with contextlib.suppress(OSError, termios.error):
-            termios.tcflush(self._fd, termios.TCOFLUSH)
+            termios.tcflush(self._descriptor, termios.TCOFLUSH)
         with contextlib.suppress(OSError):
             self._close()

@@ -323,9 +323,8 @@ class Session(Endpoint):
     def __init__(
         self, address: Address, payload_messages: Sequence[type[Message]],
         is_device: Callable[[Message], bool], describe: Callable[[Message], str],
-        target: Address | None, component: int | None = None,
-        discovery: type[Message] | None = None,
-        part_of: Callable[[Message], int] = lambda message: 0,
+        target: Address | None, component: int | None, discovery: type[Message] | None,
+        part_of: Callable[[Message], int],
     ) -> None:
         super().__init__()
         self.address = address
