@@ -585,8 +585,7 @@ class Gimbal:
 
         def ended(result: CommandResult, now: float) -> None:
             explained(request.Result(
-                result.accepted, str(result), refused=(
-                    result.status is CommandStatus.ANSWERED and not result.accepted)), now)
+                result.accepted, str(result), refused=result.refused), now)
 
         self._begin(now)
         if reason := self.unavailable(now):

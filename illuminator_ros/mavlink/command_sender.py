@@ -185,6 +185,11 @@ class CommandResult(NamedTuple):
         """Whether the target acknowledged with MAV_RESULT_ACCEPTED."""
         return self.status is CommandStatus.ANSWERED and self.result == MavResult.ACCEPTED
 
+    @property
+    def refused(self) -> bool:
+        """Whether the target acknowledged with another MAV_RESULT."""
+        return self.status is CommandStatus.ANSWERED and self.result != MavResult.ACCEPTED
+
     def may_answer_earlier(self, now: float) -> bool:
         """
         Return whether the acknowledgement may belong to the earlier command of this kind.

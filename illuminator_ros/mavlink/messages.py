@@ -106,6 +106,8 @@ class Message:
         A short payload is filled with zeros (MAVLink 2 cuts them, MAVLink 1 has no extension
         fields). Bytes beyond the known fields are ignored, as extensions must be: some lights send
         a 38-byte ILLUMINATOR_STATUS.
+
+        :param sender: see :attr:`sender`.
         """
         raise NotImplementedError
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import math
 
 from .request import Target
-from ..mavlink.command_sender import CommandResult, CommandStatus
-from ..mavlink.messages import ComponentInformationBasic, result_name
+from ..mavlink.command_sender import CommandResult
+from ..mavlink.messages import ComponentInformationBasic
 
 # s from the acknowledgement to the message.
 MESSAGE_TIMEOUT = 0.5
@@ -106,10 +106,8 @@ class IdentityQuery:
             return
         if result.accepted:
             self._message_until = now + MESSAGE_TIMEOUT
-        elif result.status is CommandStatus.ANSWERED and result.result is not None:
-            self._finish(f'refused: {result_name(result.result)}', now)
         else:
-            self._finish(result.describe(), now)
+            self._finish(f'{"refused: " if result.refused else ""}{result.describe()}', now)
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""

@@ -77,7 +77,7 @@ _LOCK_BIT = int(MountFlags.YAW_LOCK)
 
 def names_frame(flags: int) -> bool:
     """Return whether flags name a yaw frame; those of old implementations do not."""
-    return bool(flags & (MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME))
+    return bool(int(flags) & (_EARTH_BIT | _VEHICLE_BIT))
 
 
 def yaw_frame(flags: int) -> YawFrame:

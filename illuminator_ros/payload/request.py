@@ -453,13 +453,14 @@ class Request(Generic[S]):
 
     def _refused(self, now: float) -> None:
         answer = self._answer
-        answered = answer.status is command_sender.CommandStatus.ANSWERED
         if self._was_repeated and answer.result is None:
             self._end(f'{self._sent.goal} not confirmed: the acknowledgement may belong to an '
                       'earlier command', now)
         else:
-            self._end(f'{"refused: " if answered else ""}{answer.describe()}', now,
-                      refused=answered, permanent=answered and answer.result in PERMANENT_RESULTS)
+            self._end(
+                f'{"refused: " if answer.refused else ""}{answer.describe()}', now,
+                refused=answer.refused,
+                permanent=answer.refused and answer.result in PERMANENT_RESULTS)
 
     def _unconfirmed(self, now: float) -> None:
         name, kind = self._target.status_name, self._target.kind
