@@ -206,12 +206,12 @@ def link_report(
             + (f': {absence}' if link.state.is_open else '')))
     if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
-    own = link.devices.get(device, {}) if device else {}
-    loss = own.get('loss_percent')
-    if isinstance(loss, float) and loss > LOSS_WARNING:
-        findings.append((WARN, f'{loss:.0f} % of the frames lost'))
+    counts = link.state.traffic.sources.get(device) if device else None
+    if counts and counts.recent_loss > LOSS_WARNING:
+        findings.append((WARN, f'{counts.recent_loss:.0f} % of the frames lost'))
     if limit_reached:
         findings.append((WARN, f'more than {count} {kind}s, some ignored'))
     known = {} if count is None else {f'{kind}s': count}
+    own = link.devices.get(device, {}) if device else {}
     return Report('link', str(link.values['url']), findings, f'open: {link.state.name}',
                   lambda: {**link.values, **known, **own})

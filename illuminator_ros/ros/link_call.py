@@ -28,9 +28,9 @@ T = TypeVar('T')
 # Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
 
-# A request: called in a turn of the link with the time, s, and with the function that it must
-# call once with its answer, then or later.
-Request = Callable[[float, Callable[[T], None]], None]
+# Called in a turn of the link with the time, s, and with the function that it must call once with
+# its answer, then or later.
+LinkRequest = Callable[[float, Callable[[T], None]], None]
 
 
 class LinkCalls:
@@ -50,7 +50,7 @@ class LinkCalls:
         self._lock = threading.Lock()
 
     def ask(
-        self, request: Request[T], answer: Callable[[T], None], refusal: Callable[[str], T],
+        self, request: LinkRequest[T], answer: Callable[[T], None], refusal: Callable[[str], T],
     ) -> None:
         """
         Start a request, and wait for its answer for :data:`~..mavlink.link.CALLER_WAIT` at most.
