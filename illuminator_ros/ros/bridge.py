@@ -30,6 +30,7 @@ from rclpy.node import Node
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
+from .ignored_parameters import ignored_sections, unknown_parameters
 from .logger_services import LoggerServices
 from .node_manager import NodeManager
 from .parameters import (
@@ -37,11 +38,9 @@ from .parameters import (
     declare_payloads,
     declare_read_only,
     given_parameters,
-    ignored_sections,
     LINK_PARAMETERS,
     LinkParameters,
     ParameterError,
-    unknown_parameters,
 )
 from .payload import Host, RosPayload, ServedPayload
 from .payload_node import PayloadNode

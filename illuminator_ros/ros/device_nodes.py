@@ -23,8 +23,8 @@ from typing import Generic, Protocol, TypeVar
 from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsSource
+from .ignored_parameters import ignored_parameters
 from .node_manager import NodeRequest
-from .parameters import ignored_parameters
 from .payload import Host
 from .throttled_log import NodeLog
 

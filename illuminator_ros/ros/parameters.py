@@ -16,11 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-import difflib
+from collections.abc import Iterable, Mapping
 import math
-from pathlib import Path
-import re
 import threading
 import time
 from typing import Any, NamedTuple
@@ -28,7 +25,6 @@ from typing import Any, NamedTuple
 from rcl_interfaces import msg
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-import yaml
 
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
@@ -264,107 +260,6 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
         raise RuntimeError(
             'this version of rclpy is not supported: it has no Node._parameter_overrides, which '
             'holds the parameters given on the command line') from None
-
-
-def unknown_parameters(
-    nodes: Sequence[Node], arguments: Sequence[str], restrictions: Set[str],
-) -> list[str]:
-    """
-    Return a warning for each parameter that is given and unknown.
-
-    A section with a wildcard that has no parameter of ours is meant for other nodes: its
-    parameters are unknown only if they resemble one of ours.
-
-    :param nodes: those that exist at the start.
-    :param restrictions: names of parameters that must not be missed because they are misspelt.
-    :raises ParameterError: if one of them is misspelt.
-    """
-    known = {name for node in nodes for name in node.list_parameters([], 0).names}
-    given = dict.fromkeys(name for node in nodes for name in given_parameters(node))
-    others = {name.partition('.')[0] for _, section, values in _files(arguments)
-              if not _WILDCARDS.keys().isdisjoint(section) and known.isdisjoint(values - _OF_RCLPY)
-              for name in values}
-    warnings = []
-    for name in given:
-        if name in known:
-            continue
-        close = difflib.get_close_matches(name, known, 1, 0.75)
-        is_ours = name.partition('.')[0] not in {*others, 'qos_overrides'}
-        # Another node may have a parameter with a similar name.
-        if not restrictions.isdisjoint(
-                close if is_ours else difflib.get_close_matches(name, known, 1, 0.9)):
-            raise ParameterError(f'{name} is unknown; did you mean {close[0]!r}?')
-        if is_ours or close:
-            warnings.append(_unknown(name, close))
-    return warnings
-
-
-def ignored_parameters(node: Node, first: Node) -> list[str]:
-    """Return a warning for each parameter that is given for a further node and has no effect."""
-    warnings = []
-    for name, parameter in given_parameters(node).items():
-        if node.has_parameter(name):
-            continue
-        if not first.has_parameter(name):
-            if name not in given_parameters(first):
-                warnings.append(_unknown(name, difflib.get_close_matches(
-                    name, node.list_parameters([], 0).names, 1, 0.75)))
-        elif parameter.value not in (None, first.get_parameter(name).value):
-            # None is an empty list.
-            warnings.append(f'parameter {name!r} is ignored here: the value of '
-                            f'{first.get_fully_qualified_name()} applies')
-    return warnings
-
-
-def _unknown(name: str, close: Sequence[str]) -> str:
-    hint = f'; did you mean {close[0]!r}?' if close else ''
-    return f'parameter {name!r} is unknown and ignored{hint}'
-
-
-def ignored_sections(
-    arguments: Sequence[str], names: Sequence[str], may_name: Callable[[str], bool],
-) -> list[str]:
-    """
-    Return a warning for each section of the given parameter files that matches no node.
-
-    :param names: fully qualified, of the nodes that exist.
-    :param may_name: whether a node that is made later may have a name, without namespace.
-    """
-    namespace = names[0].rpartition('/')[0]
-    warnings = []
-    for path, section, _ in _files(arguments):
-        *_, last = section
-        later = [f'{namespace}/{last}'] if may_name(last) else []
-        pattern = ''.join(_WILDCARDS.get(part, '/' + re.escape(part)) for part in section)
-        if not any(re.fullmatch(pattern, name) for name in (*names, *later)):
-            warnings.append(f'{path}: the section {"/".join(section)} matches no node and is '
-                            f'ignored; the name here is {", ".join(names)}')
-    return warnings
-
-
-# Parameters that each node of rclpy has.
-_OF_RCLPY = {'use_sim_time', 'start_type_description_service'}
-# Patterns for wildcards in a name of a parameter file (rcl_yaml_param_parser).
-_WILDCARDS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
-
-
-def _files(arguments: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], Set[str]]]:
-    """Return path, name in parts and parameters of each section of the parameter files."""
-    for option, path in zip(arguments, arguments[1:], strict=False):
-        if option == '--params-file':
-            # As rcl reads it: several documents, and no types but its own.
-            for content in yaml.load_all(
-                    Path(path).read_text(encoding='utf-8'), yaml.BaseLoader):
-                yield from ((path, *section) for section in _sections(content))
-
-
-def _sections(content: object) -> Iterator[tuple[tuple[str, ...], Set[str]]]:
-    for key, below in content.items() if isinstance(content, Mapping) else ():
-        if key == 'ros__parameters':
-            yield (), below.keys() if isinstance(below, Mapping) else set()
-        else:
-            parts = [part for part in str(key).split('/') if part]
-            yield from (((*parts, *rest), values) for rest, values in _sections(below))
 
 
 class DeviceParameters:

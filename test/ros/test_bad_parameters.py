@@ -20,7 +20,8 @@ from pathlib import Path
 import re
 from typing import Any, cast
 
-from illuminator_ros.ros.parameters import ignored_sections, ParameterError, unknown_parameters
+from illuminator_ros.ros.ignored_parameters import ignored_sections, unknown_parameters
+from illuminator_ros.ros.parameters import ParameterError
 import pytest
 from rclpy.node import Node
 from support.embedded import refusal
