@@ -138,9 +138,7 @@ class ManagerWithClient(Payload):
         """Pass the client's messages to the manager; send those for other components."""
         while self._own.outgoing:
             source, message = self._own.outgoing.popleft()
-            target = (getattr(message, 'target_system', 0),
-                      getattr(message, 'target_component', 0))
-            if target != self._commands.address:
+            if mav.target_of(message) != self._commands.address:
                 self._commands.send(message)
             elif isinstance(message, AnyCommand):
                 ack = self._received.take(source, message, now, self._execute)

@@ -65,9 +65,8 @@ class CommandReceiver:
         :return: None for a command to another component, and for an unsupported one to all
             components.
         """
-        target = mav.Address(command.target_system, command.target_component)
-        if target.system not in (self._address.system, 0) or target.component not in (
-                self._address.component, 0):
+        target = mav.target_of(command)
+        if not target.includes(self._address):
             return None
         result = self._result(source, command, now, execute)
         if result is None:

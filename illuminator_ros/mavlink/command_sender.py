@@ -454,9 +454,7 @@ class CommandSender:
         address or 0, since the extension fields may be missing. It answers the oldest of several
         commands, but progress belongs to the command in progress.
         """
-        ours = self.address
-        if (ack.target_system not in (0, ours.system)
-                or ack.target_component not in (0, ours.component)):
+        if not messages.target_of(ack).includes(self.address):
             return
         self.unanswering.pop(source, None)
         is_expected = False

@@ -37,7 +37,7 @@ from .frame import Frame, MAX_ID_V1
 from .frame_reader import FrameReader
 from .frame_writer import FrameWriter
 from .link_state import LinkEvent, LinkInput, LinkSnapshot, LinkStatus
-from .messages import Address, Message
+from .messages import Address, Message, target_of
 from .routing_table import RoutingTable
 from .signing import Signing
 from .signing_files import TimestampStore
@@ -543,9 +543,8 @@ class Link:
             self._log_fault()
         else:
             if _frame_log.isEnabledFor(logging.DEBUG):
-                to = Address(*(getattr(message, f'target_{part}', 0)
-                               for part in ('system', 'component')))
-                _frame_log.debug('sent from %s: %s', source, message, extra={'address': to})
+                _frame_log.debug('sent from %s: %s', source, message,
+                                 extra={'address': target_of(message)})
 
     def _send(self, frames: Sequence[bytes], peers: Sequence[Peer], now: float) -> None:
         channel = self._channel

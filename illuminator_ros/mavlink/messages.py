@@ -58,6 +58,10 @@ class Address(NamedTuple):
     system: int
     component: int
 
+    def includes(self, other: Address) -> bool:
+        """Return whether a message to this address is for a component; an id of 0 means all."""
+        return self.system in (0, other.system) and self.component in (0, other.component)
+
     def __str__(self) -> str:
         return f'{self.system}/{self.component}'
 
@@ -238,6 +242,11 @@ def command_name(command: int) -> str:
         return f'MAV_CMD_{one.name}'
     except ValueError:
         return f'MAV_CMD {command}'
+
+
+def target_of(message: Message) -> Address:
+    """Return the address that a message is for; an id is 0 where the message does not name it."""
+    return Address(getattr(message, 'target_system', 0), getattr(message, 'target_component', 0))
 
 
 def _shown(name: str, value: object) -> str:

@@ -332,8 +332,7 @@ class SimulatedComponent(Generic[D]):
     def _is_addressed(self, message: Message) -> bool:
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
         behaviour = self.device.behaviour
-        system = getattr(message, 'target_system', 0)
-        component = getattr(message, 'target_component', 0)
+        system, component = messages.target_of(message)
         if behaviour.adopts_system_id:
             system = self.address.system
         if (system, component) == self.address or not behaviour.filters_target:

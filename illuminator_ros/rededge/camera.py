@@ -23,7 +23,7 @@ import math
 
 from . import messages as rededge
 from ..mavlink.command_sender import format_seconds
-from ..mavlink.messages import Address, Message
+from ..mavlink.messages import Address, Message, target_of
 
 # s between PINGs, and the wait for a reply; a requested PING is tried twice.
 PING_INTERVAL = 2.0
@@ -244,7 +244,7 @@ class Camera:
 
     def take_ping(self, message: rededge.Ping, now: float) -> None:
         """Take a PING of the camera, which is a reply if its target is our address."""
-        if (message.target_system, message.target_component) != self._own:
+        if target_of(message) != self._own:
             return
         sent_at = self._pings.pop(message.seq, None)
         if sent_at is None:

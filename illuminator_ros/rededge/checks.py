@@ -28,7 +28,7 @@ import math
 from typing import NamedTuple
 
 from . import messages as rededge
-from ..mavlink.messages import Address, Heartbeat, Message
+from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload.checks import component_requirements as component
 from ..payload.checks.requirement import (
     Conditions,
@@ -264,8 +264,7 @@ async def ping_once(tester: CameraTester) -> None:
 @requires('ping-target', 'addresses the answer to PING to its sender', section='PING')
 async def ping_target(tester: CameraTester) -> None:
     """Read the target of an answer."""
-    answer = await tester.ping()
-    target = Address(answer.target_system, answer.target_component)
+    target = target_of(await tester.ping())
     if target != tester.session.address:
         raise Failed(f'to {target} instead of {tester.session.address}')
 
@@ -438,11 +437,10 @@ REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
 def describe(message: Message) -> str:
     """Return the text of a message of the camera, '' for another message."""
     if isinstance(message, rededge.Ping):
-        target = Address(message.target_system, message.target_component)
+        target = target_of(message)
         return f'PING {message.seq} to {target}' if any(target) else f'PING {message.seq}'
     if isinstance(message, rededge.DigicamControl):
-        target = Address(message.target_system, message.target_component)
-        return f'DIGICAM_CONTROL to {target}: shot {message.shot}'
+        return f'DIGICAM_CONTROL to {target_of(message)}: shot {message.shot}'
     if isinstance(message, rededge.CameraStatus):
         return f'CAMERA_STATUS image {message.img_idx}, event {message.event_id}'
     if isinstance(message, rededge.CameraFeedback):

@@ -29,7 +29,7 @@ import math
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from . import messages as rededge
-from ..mavlink.messages import Address, Heartbeat, Message
+from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
@@ -364,7 +364,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         return ()
 
     def _answer(self, source: Address, ping: rededge.Ping) -> Iterable[Message]:
-        if ping.target_system or ping.target_component:
+        if any(target_of(ping)):
             return
         target = source if self.behaviour.ping_target else Address(0, 0)
         yield replace(ping, seq=(ping.seq + self.behaviour.ping_sequence) & 0xFFFFFFFF,

@@ -43,7 +43,15 @@ from .tester import (
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ..messages import Capabilities, GimbalCommand
-from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, MavType, Message
+from ...mavlink.messages import (
+    Address,
+    CommandLong,
+    Heartbeat,
+    heartbeat,
+    MavType,
+    Message,
+    target_of,
+)
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
     Conditions,
@@ -130,8 +138,8 @@ async def status_to_all(tester: DeviceTester) -> str:
     if not received:
         raise Skipped('none was received')
     return component.none_of([
-        Failed(f'to {one.target_system}/{one.target_component}', []) for one in received
-        if (one.target_system, one.target_component) != (0, 0)], len(received), 'statuses')
+        Failed(f'to {target}', []) for target in map(target_of, received) if any(target)],
+        len(received), 'statuses')
 
 
 @requirement('device-id', 'leaves gimbal_device_id 0, as it is a component of its own', MESSAGES,

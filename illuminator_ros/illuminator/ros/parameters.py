@@ -154,8 +154,7 @@ class Selection:
 
     def is_target(self, address: Address) -> bool:
         """Return whether the first node may serve a light."""
-        return (self._target.system in (0, address.system)
-                and self._target.component in (0, address.component))
+        return self._target.includes(address)
 
     def is_served(self, address: Address) -> bool:
         """Return whether any node may serve a light."""

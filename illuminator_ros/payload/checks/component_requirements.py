@@ -359,9 +359,7 @@ def _late(one: Transaction, sender: Address) -> str:
 
 def _to_others(one: Transaction, sender: Address) -> str:
     # The target fields are extensions, so they may be missing.
-    return ', '.join(
-        f'to {ack.target}' for ack in one.acks
-        if any(value not in (0, ours) for value, ours in zip(ack.target, sender, strict=True)))
+    return ', '.join(f'to {ack.target}' for ack in one.acks if not ack.target.includes(sender))
 
 
 def _unfinished(one: Transaction, sender: Address) -> str:

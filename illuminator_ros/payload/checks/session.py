@@ -281,7 +281,7 @@ class Transaction:
 
 def _protocol_text(message: Message) -> str:
     if isinstance(message, CommandAck):
-        target = Address(message.target_system, message.target_component)
+        target = messages.target_of(message)
         progress = message.result == MavResult.IN_PROGRESS
         return (f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
                 + (f', progress {message.progress}' if progress else '')
@@ -402,8 +402,8 @@ class Session(Endpoint):
             received.append((self.now, message))
         if isinstance(message, CommandAck) and message.command in self._latest:
             self._latest[message.command].acknowledge(
-                Ack(self.now, message.result, message.progress,
-                    Address(message.target_system, message.target_component)), self.log[-1])
+                Ack(self.now, message.result, message.progress, messages.target_of(message)),
+                self.log[-1])
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
